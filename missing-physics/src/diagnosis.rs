@@ -1,0 +1,281 @@
+//! The answer: everything that a report, a machine or another program needs of a diagnosis.
+
+/// What the recording says of the baseline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The baseline explains the data to within their noise.
+    Adequate,
+    /// The chosen mechanisms bring the model to within the noise.
+    Explained,
+    /// Several sets of mechanisms fit equally well.
+    Ambiguous,
+    /// Something is wrong that no listed mechanism describes.
+    Unexplained,
+}
+
+impl Verdict {
+    /// The word of the answer's format.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Adequate => "adequate",
+            Self::Explained => "explained",
+            Self::Ambiguous => "ambiguous",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// Where a channel's noise level comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// A calibration that came with the recording.
+    Calibration,
+    /// Rows that were measured again under the same conditions.
+    Replicates,
+    /// The data themselves: what is left of them once everything smooth is taken away.
+    Differences,
+}
+
+impl NoiseSource {
+    /// The word of the answer's format.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Calibration => "calibration",
+            Self::Replicates => "replicates",
+            Self::Differences => "differences",
+        }
+    }
+}
+
+/// The noise of one channel under the model that the diagnosis ended with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelNoise {
+    /// Name of the channel.
+    pub channel: String,
+    /// One sigma of a reading, in the channel's unit, the correlated part included.
+    pub sigma: f64,
+    /// Where it comes from.
+    pub source: NoiseSource,
+    /// The part of the variance that is correlated from row to row, in [0, 1].
+    pub correlated_share: f64,
+    /// Correlation length of that part along the noise variable, in that variable's unit; 0 for white noise.
+    pub correlation_length: f64,
+}
+
+/// One test of the adequacy bank.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestOutcome {
+    /// What was tested, for a person (`z_m depends on t_s`).
+    pub name: String,
+    /// The statistic.
+    pub statistic: f64,
+    /// Its own p-value, before multiplicity is accounted for.
+    pub p_value: f64,
+}
+
+/// A place where the baseline misses the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Location {
+    /// Name of the channel.
+    pub channel: String,
+    /// Name of the variable along which the place is an interval.
+    pub variable: Option<String>,
+    /// Start of the interval.
+    pub from: Option<f64>,
+    /// End of the interval.
+    pub to: Option<f64>,
+    /// Labels of the runs in which it shows.
+    pub runs: Vec<String>,
+    /// Share of the whole misfit that lies here, in [0, 1].
+    pub share: f64,
+    /// Mean residual there (measured less predicted), in the channel's unit.
+    pub mean_residual: f64,
+    /// The residual of largest modulus there, in the channel's unit.
+    pub largest_residual: f64,
+    /// Size of the misfit in standard errors.
+    pub z: f64,
+}
+
+/// A parameter's estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name with its unit as a suffix.
+    pub name: String,
+    /// The unit alone.
+    pub unit: String,
+    /// Best value.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// What is said of one mechanism.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MechanismReport {
+    /// Identifier.
+    pub id: String,
+    /// Name for a person.
+    pub name: String,
+    /// Equation.
+    pub equation: String,
+    /// Reference.
+    pub reference: String,
+    /// Probability that it is at work, given these data and the listed mechanisms.
+    pub probability: f64,
+    /// Its parameters, from the best set that holds it (alone, where it is in none of the leading sets).
+    pub parameters: Vec<Estimate>,
+    /// Gain in log score on runs that the fit has not seen, over the baseline.
+    pub heldout_log_score_gain: f64,
+    /// Root mean square error on such runs, by channel.
+    pub heldout_rmse: Vec<(String, f64)>,
+    /// Why it is no explanation, where it is none (`at its bound`, `negative drag`).
+    pub ruled_out: Option<String>,
+}
+
+/// What is said of one set of mechanisms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetReport {
+    /// Identifiers; empty for the baseline.
+    pub ids: Vec<String>,
+    /// Probability among all sets that were tried.
+    pub probability: f64,
+    /// p-value of the adequacy bank, where it was run.
+    pub p_value: Option<f64>,
+    /// Gain in log score on unseen runs, over the baseline.
+    pub heldout_log_score_gain: Option<f64>,
+    /// Why it is no explanation, where it is none.
+    pub ruled_out: Option<String>,
+}
+
+/// Errors of one channel under one model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelFit {
+    /// Name of the channel.
+    pub channel: String,
+    /// Root mean square residual of the fit to all runs.
+    pub rmse: f64,
+    /// Root mean square residual on runs that the fit has not seen.
+    pub heldout_rmse: f64,
+}
+
+/// How often data from one rival are taken for another's, by simulation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Confusion {
+    /// The rival sets.
+    pub sets: Vec<Vec<String>>,
+    /// `matrix[i][j]`: the share of data simulated from set `i` for which set `j` is chosen.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// The empirical law found in the residual of an unexplained recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Law {
+    /// The whole law, in plain text.
+    pub formula: String,
+    /// `sparse` (a few terms), `periodic` (an oscillation) or `smooth` (an empirical curve, no formula).
+    pub kind: &'static str,
+    /// Channel or quantity that it adds to, with its unit.
+    pub adds_to: (String, String),
+    /// Variables in it, with their units.
+    pub variables: Vec<(String, String)>,
+    /// Its coefficients.
+    pub coefficients: Vec<Estimate>,
+    /// Root mean square error on unseen data by channel: name, without the law, with it.
+    pub heldout_rmse: Vec<(String, f64, f64)>,
+    /// Gain in log score on unseen data.
+    pub heldout_log_score_gain: f64,
+}
+
+/// The action that separates the rivals best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextExperiment {
+    /// Settings, by name with unit.
+    pub action: Vec<(String, f64)>,
+    /// The action in words.
+    pub words: String,
+    /// Identifiers of the mechanisms that it tells apart.
+    pub separates: Vec<String>,
+    /// Expected log Bayes factor for the true rival against the nearest other.
+    pub expected_log_bayes_factor: f64,
+}
+
+/// A row that was set aside because its neighbours contradict it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlier {
+    /// Label of the run.
+    pub run: String,
+    /// Row in the run, from 0.
+    pub row: usize,
+    /// Name of the channel.
+    pub channel: String,
+    /// Distance from what its neighbours say, in robust sigmas.
+    pub z: f64,
+}
+
+/// Data and fits of one run, for drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curves {
+    /// Label of the run.
+    pub run: String,
+    /// Known inputs, one column a variable.
+    pub inputs: Vec<Vec<f64>>,
+    /// Measurements, one column a channel (NaN where missing).
+    pub measured: Vec<Vec<f64>>,
+    /// The baseline's fit, one column a channel.
+    pub before: Vec<Vec<f64>>,
+    /// The final model's fit, one column a channel; equal to `before` where nothing was added.
+    pub after: Vec<Vec<f64>>,
+}
+
+/// A whole diagnosis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnosis {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// p-value of the baseline's adequacy.
+    pub p_value: f64,
+    /// The smallest p-value that the bootstrap could give; `p_value` at this floor means "below".
+    pub p_floor: f64,
+    /// The tests that made up the p-value.
+    pub tests: Vec<TestOutcome>,
+    /// Names and units of channels.
+    pub channels: Vec<(String, String)>,
+    /// Names and units of known inputs.
+    pub variables: Vec<(String, String)>,
+    /// What the baseline is.
+    pub baseline: String,
+    /// The baseline's own shared parameters.
+    pub baseline_parameters: Vec<Estimate>,
+    /// Noise by channel.
+    pub noise: Vec<ChannelNoise>,
+    /// Where the baseline misses; empty only for [`Verdict::Adequate`].
+    pub location: Vec<Location>,
+    /// Every mechanism that these data can speak of, likeliest first.
+    pub mechanisms: Vec<MechanismReport>,
+    /// The leading sets of mechanisms, likeliest first.
+    pub sets: Vec<SetReport>,
+    /// The chosen set.
+    pub chosen: Vec<String>,
+    /// Other sets that fit equally well.
+    pub confused_with: Vec<Vec<String>>,
+    /// How the rivals are confused, by simulation.
+    pub confusion: Option<Confusion>,
+    /// p-value of the final model's adequacy, where one was chosen.
+    pub final_p_value: Option<f64>,
+    /// Errors of the baseline.
+    pub before: Vec<ChannelFit>,
+    /// Errors of the final model.
+    pub after: Vec<ChannelFit>,
+    /// The law found where nothing listed explains the data.
+    pub law: Option<Law>,
+    /// The experiment to do next.
+    pub next_experiment: Option<NextExperiment>,
+    /// What these data cannot determine, one sentence each.
+    pub undetermined: Vec<String>,
+    /// Rows set aside.
+    pub outliers: Vec<Outlier>,
+    /// Remarks: non-convergence, few rows, strong correlation.
+    pub remarks: Vec<String>,
+    /// Data and fits, for drawing.
+    pub curves: Vec<Curves>,
+}

@@ -1,0 +1,6 @@
+#![doc = include_str!("../README.md")]
+pub mod data;
+pub mod diagnosis;
+pub mod fit;
+pub mod model;
+pub mod observer;

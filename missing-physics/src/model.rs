@@ -1,0 +1,216 @@
+//! What the engine asks of a simulation: its parameters, its mechanisms and its prediction of a run.
+
+use crate::data::Run;
+use rand::Rng;
+
+/// A named number with a unit: a measured channel or a known input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Quantity {
+    /// Name with its unit as a suffix, as in the recording (`z_m`).
+    pub name: String,
+    /// The unit alone (`m`); empty for a pure number.
+    pub unit: String,
+}
+
+impl Quantity {
+    /// A quantity of the given name and unit.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { name: name.into(), unit: unit.into() }
+    }
+}
+
+/// Whether a parameter has one value for the whole recording or one for each run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// One value over all runs.
+    Shared,
+    /// One value for each run (a nuisance such as the state at the start).
+    PerRun,
+}
+
+/// One parameter of the full model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name with its unit as a suffix (`k_per_m`), unique in the model.
+    pub name: String,
+    /// The unit alone (`1/m`).
+    pub unit: String,
+    /// Shared by all runs, or one for each run.
+    pub scope: Scope,
+    /// The value from which a fit starts; for a mechanism's parameter the value at which it is off.
+    pub start: f64,
+    /// Smallest value allowed (may be `-inf`).
+    pub lower: f64,
+    /// Largest value allowed (may be `inf`).
+    pub upper: f64,
+    /// A typical size of its departures from `start`; finite and above zero.
+    pub scale: f64,
+}
+
+/// A quantity that is computed from a mechanism's parameters and reported beside them.
+#[derive(Clone)]
+pub struct Derived {
+    /// Name with its unit as a suffix.
+    pub name: String,
+    /// The unit alone.
+    pub unit: String,
+    /// The value from the shared parameters, in the order of [`Spec::parameters`] restricted to [`Scope::Shared`].
+    pub value: std::sync::Arc<dyn Fn(&[f64]) -> f64 + Send + Sync>,
+}
+
+impl std::fmt::Debug for Derived {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Derived").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// A named group of the full model's parameters; off where each has its `start` value.
+#[derive(Debug, Clone, Default)]
+pub struct Mechanism {
+    /// Identifier in lower case with hyphens (`quadratic-drag`).
+    pub id: String,
+    /// Name for a person (`air drag, quadratic`).
+    pub name: String,
+    /// One sentence: what it is.
+    pub explanation: String,
+    /// Its equation, in plain text.
+    pub equation: String,
+    /// Where the equation is from (author, year, DOI).
+    pub reference: String,
+    /// Identifiers that it is easily confused with, for the reader; the engine measures confusion itself.
+    pub confused_with: Vec<String>,
+    /// Indices into [`Spec::parameters`] of the parameters that it frees.
+    pub parameters: Vec<usize>,
+    /// Parameters freed with it because it acts only through them (wind acts through drag), not reported as its own.
+    pub companions: Vec<usize>,
+    /// Identifiers of mechanisms that make the companions unnecessary.
+    pub companions_unless: Vec<String>,
+    /// Quantities computed from its parameters, reported beside them.
+    pub derived: Vec<Derived>,
+}
+
+/// A candidate term of an unknown law: a parameter of the model that no mechanism frees.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Term {
+    /// Index into [`Spec::parameters`] of its coefficient.
+    pub parameter: usize,
+    /// The term as it stands in the equation, without the coefficient (`|v|^2 v`).
+    pub formula: String,
+    /// The quantity that it adds to (`acceleration`), with its unit.
+    pub adds_to: Quantity,
+    /// The names of the variables in it.
+    pub variables: Vec<String>,
+}
+
+/// Everything that the engine knows of a model before it is run.
+#[derive(Debug, Clone, Default)]
+pub struct Spec {
+    /// What the baseline is, in one sentence.
+    pub baseline: String,
+    /// All parameters of the full model.
+    pub parameters: Vec<Parameter>,
+    /// The groups of parameters that may have to be on.
+    pub mechanisms: Vec<Mechanism>,
+    /// Candidate terms of an unknown law.
+    pub terms: Vec<Term>,
+}
+
+impl Spec {
+    /// Number of parameters with the given scope.
+    pub fn count(&self, scope: Scope) -> usize {
+        self.parameters.iter().filter(|p| p.scope == scope).count()
+    }
+
+    /// Position of each parameter among those of its scope.
+    pub fn slots(&self) -> Vec<usize> {
+        let (mut shared, mut own) = (0, 0);
+        self.parameters
+            .iter()
+            .map(|p| {
+                let counter = if p.scope == Scope::Shared { &mut shared } else { &mut own };
+                *counter += 1;
+                *counter - 1
+            })
+            .collect()
+    }
+}
+
+/// A prediction that could not be made at the given parameters.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("no prediction for run {run}: {reason}")]
+pub struct PredictError {
+    /// Label of the run.
+    pub run: String,
+    /// What went wrong, with the values involved.
+    pub reason: String,
+}
+
+/// A full model: a simulation with every effect in it.
+///
+/// Parameters come in two slices: `shared` (those with [`Scope::Shared`], in the order of [`Spec::parameters`]) and
+/// `own` (those with [`Scope::PerRun`], likewise). A prediction fills `out` channel by channel:
+/// `out[c * run.len() + i]` is channel `c` at row `i`.
+pub trait Model: Sync {
+    /// Parameters, mechanisms and candidate terms.
+    fn spec(&self) -> &Spec;
+
+    /// Predicts all channels of a run.
+    ///
+    /// # Errors
+    /// [`PredictError`] where the simulation has no answer at these parameters.
+    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError>;
+
+    /// Fills in good starting values of the run's own parameters; `own` holds each parameter's `start`.
+    fn start(&self, _run: &Run, _own: &mut [f64]) {}
+
+    /// The derivatives of [`Model::predict`] with respect to the shared parameters at the slots `shared_free` and
+    /// the own parameters at the slots `own_free`, one column after the other, each as long as `out`.
+    ///
+    /// The default takes central differences at steps of 1e-5 of a parameter's scale, one-sided at a bound.
+    ///
+    /// # Errors
+    /// As [`Model::predict`].
+    fn jacobian(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        own: &[f64],
+        shared_free: &[usize],
+        own_free: &[usize],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), PredictError> {
+        crate::fit::finite_differences(self, run, shared, own, shared_free, own_free, out, jacobian)
+    }
+
+    /// The log density of a run's measurements, for stochastic models; `None` for deterministic ones, whose
+    /// residuals the engine weighs with its own noise model.
+    fn log_likelihood(&self, _run: &Run, _shared: &[f64], _own: &[f64]) -> Option<Result<f64, PredictError>> {
+        None
+    }
+
+    /// Draws measurements of a run from a stochastic model into `out`; `None` for deterministic ones.
+    fn simulate(
+        &self,
+        _run: &Run,
+        _shared: &[f64],
+        _own: &[f64],
+        _rng: &mut dyn Rng,
+        _out: &mut [f64],
+    ) -> Option<Result<(), PredictError>> {
+        None
+    }
+}
+
+/// Something that the rig could do next, as the runs that it would record.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// The action's settings, by name with unit (`drop_height_m`).
+    pub action: Vec<(String, f64)>,
+    /// The action in words (`drop it from 5 m as well`).
+    pub words: String,
+    /// Runs with their inputs; the measured channels may hold anything.
+    pub runs: Vec<Run>,
+    /// The own parameters of each run, in the order of the model's own parameters.
+    pub own: Vec<Vec<f64>>,
+}
