@@ -1,23 +1,431 @@
-//! Fits.
-use crate::{
-    data::Run,
-    model::{Model, PredictError},
-};
+//! Maximum-likelihood fits: bounded Gauss-Newton with every run's own parameters eliminated run by run.
 
-/// Central differences of a prediction, the default of [`Model::jacobian`].
+use nalgebra::DMatrix;
+
+use crate::data::Run;
+use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, log_determinant};
+use crate::model::{Model, PredictError};
+use crate::problem::{Problem, Selection};
+
+/// Central differences of a prediction (one-sided at a bound), the default of [`Model::jacobian`].
 ///
 /// # Errors
 /// As [`Model::predict`].
 #[allow(clippy::too_many_arguments, reason = "the arguments of Model::jacobian")]
 pub fn finite_differences<M: Model + ?Sized>(
-    _model: &M,
-    _run: &Run,
-    _shared: &[f64],
-    _own: &[f64],
-    _shared_free: &[usize],
-    _own_free: &[usize],
-    _out: &mut [f64],
-    _jacobian: &mut [f64],
+    model: &M,
+    run: &Run,
+    shared: &[f64],
+    own: &[f64],
+    shared_free: &[usize],
+    own_free: &[usize],
+    out: &mut [f64],
+    jacobian: &mut [f64],
 ) -> Result<(), PredictError> {
+    use crate::model::Scope;
+    model.predict(run, shared, own, out)?;
+    let rows = out.len();
+    let (mut shared, mut own) = (shared.to_vec(), own.to_vec());
+    let (mut above, mut below) = (vec![0.0; rows], vec![0.0; rows]);
+    let parameters = |scope| model.spec().parameters.iter().filter(move |p| p.scope == scope);
+    let shared_info: Vec<_> = parameters(Scope::Shared).collect();
+    let own_info: Vec<_> = parameters(Scope::PerRun).collect();
+    let free = shared_free.iter().map(|&s| (true, s)).chain(own_free.iter().map(|&s| (false, s)));
+    for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(rows.max(1))) {
+        let info = if is_shared { shared_info[slot] } else { own_info[slot] };
+        let value = if is_shared { shared[slot] } else { own[slot] };
+        let step = 1e-5 * info.scale.max(1e-3 * value.abs());
+        let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
+        let mut at = |x: f64, out: &mut [f64]| {
+            *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = x;
+            model.predict(run, &shared, &own, out)
+        };
+        at(high, &mut above)?;
+        at(low, &mut below)?;
+        at(value, out)?;
+        for ((d, a), b) in column.iter_mut().zip(&above).zip(&below) {
+            *d = (a - b) / (high - low);
+        }
+    }
     Ok(())
+}
+
+/// The noise of all channels as a fit assumes it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NoiseState {
+    /// Index into the family of shapes, by channel.
+    pub(crate) shape: Vec<usize>,
+    /// One sigma, by channel.
+    pub(crate) sigma: Vec<f64>,
+}
+
+/// A point in parameter space and what the data say there.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub(crate) shared: Vec<f64>,
+    pub(crate) own: Vec<Vec<f64>>,
+    pub(crate) noise: NoiseState,
+    /// Weighted sum of squared residuals.
+    pub(crate) chi2: f64,
+    /// Log likelihood with the runs' own parameters integrated out over a wide prior.
+    pub(crate) log_likelihood: f64,
+    /// Information matrix of the free shared parameters (own ones eliminated).
+    pub(crate) information: DMatrix<f64>,
+    pub(crate) converged: bool,
+    /// Free shared slots that ended at a bound.
+    pub(crate) at_bound: Vec<usize>,
+}
+
+/// How wide the prior of a run's own parameter is, in units of its scale.
+const OWN_PRIOR: f64 = 1e3;
+const MAX_ITERATIONS: usize = 60;
+
+/// Normal equations of one run: free own parameters first, then free shared ones, then the residual.
+struct RunNormal {
+    gram: DMatrix<f64>,
+}
+
+/// Whitened columns of one run: Jacobian by own, by shared, and the residual; channels one after the other.
+pub(crate) fn whitened_columns(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    run: usize,
+    shared: &[f64],
+    own: &[f64],
+) -> Result<Vec<Vec<f64>>, PredictError> {
+    let data = &problem.recording.runs[run];
+    let rows = problem.channels() * data.len();
+    let free = selection.shared.len() + selection.own.len();
+    let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows * free]);
+    problem.model.jacobian(data, shared, own, &selection.shared, &selection.own, &mut out, &mut jacobian)?;
+    if let Some(bad) = out.iter().chain(&jacobian).find(|v| !v.is_finite()) {
+        return Err(PredictError { run: data.label.clone(), reason: format!("the prediction holds {bad}") });
+    }
+    let mut columns = vec![Vec::with_capacity(rows); free + 1];
+    for channel in 0..problem.channels() {
+        let whitener = problem.whitener(run, channel, noise.shape[channel]);
+        let inverse_sigma = 1.0 / noise.sigma[channel];
+        let mut push = |target: usize, mut picked: Vec<f64>| {
+            whitener.whiten(&mut picked);
+            columns[target].extend(picked.into_iter().map(|v| v * inverse_sigma));
+        };
+        for k in 0..free {
+            // The model lists shared columns first; the normal equations eliminate own ones first.
+            let source = if k < selection.own.len() { selection.shared.len() + k } else { k - selection.own.len() };
+            push(k, problem.pick(run, channel, &jacobian[source * rows..(source + 1) * rows]));
+        }
+        let residual: Vec<f64> = problem.rows[run].valid[channel]
+            .iter()
+            .map(|&i| data.outputs[channel][i] - out[channel * data.len() + i])
+            .collect();
+        push(free, residual);
+    }
+    Ok(columns)
+}
+
+fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
+    let n = columns.len();
+    let mut gram = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            gram[(i, j)] = dot(&columns[i], &columns[j]);
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    gram
+}
+
+/// A run's own parameters eliminated from its normal equations.
+struct Eliminated {
+    factor: DMatrix<f64>,
+    kept: Vec<bool>,
+    /// Forward-solved columns: own-by-(shared and residual).
+    border: Vec<Vec<f64>>,
+    log_determinant: f64,
+}
+
+fn eliminate(normal: &RunNormal, own: usize, damping: f64) -> Eliminated {
+    let total = normal.gram.nrows();
+    let mut factor = normal.gram.view((0, 0), (own, own)).into_owned();
+    for i in 0..own {
+        factor[(i, i)] *= 1.0 + damping;
+    }
+    let kept = cholesky(&mut factor, RANK_FLOOR);
+    let border = (own..total)
+        .map(|j| {
+            let mut column: Vec<f64> = (0..own).map(|i| normal.gram[(i, j)]).collect();
+            forward(&factor, &kept, &mut column);
+            column
+        })
+        .collect();
+    let log_determinant = log_determinant(&factor, &kept);
+    Eliminated { factor, kept, border, log_determinant }
+}
+
+struct Linearised {
+    normals: Vec<RunNormal>,
+    /// Sum of squares, the own parameters' prior included.
+    chi2: f64,
+}
+
+fn linearise(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    shared: &[f64],
+    own: &[Vec<f64>],
+) -> Result<Linearised, PredictError> {
+    let mut normals = Vec::with_capacity(own.len());
+    let mut chi2 = 0.0;
+    for (run, values) in own.iter().enumerate() {
+        let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, values)?);
+        let last = gram.nrows() - 1;
+        for (i, &slot) in selection.own.iter().enumerate() {
+            let precision = 1.0 / (OWN_PRIOR * problem.own.scale[slot]).powi(2);
+            let departure = problem.own_start[run][slot] - values[slot];
+            gram[(i, i)] += precision;
+            gram[(i, last)] += precision * departure;
+            gram[(last, i)] += precision * departure;
+            gram[(last, last)] += precision * departure * departure;
+        }
+        chi2 += gram[(last, last)];
+        normals.push(RunNormal { gram });
+    }
+    Ok(Linearised { normals, chi2 })
+}
+
+/// Schur complement over all runs: information of the shared parameters and their gradient.
+fn reduce(linear: &Linearised, eliminated: &[Eliminated], own: usize, shared: usize) -> (DMatrix<f64>, Vec<f64>) {
+    let mut information = DMatrix::zeros(shared, shared);
+    let mut gradient = vec![0.0; shared];
+    for (normal, e) in linear.normals.iter().zip(eliminated) {
+        for i in 0..shared {
+            for j in 0..=i {
+                information[(i, j)] += normal.gram[(own + i, own + j)] - dot(&e.border[i], &e.border[j]);
+            }
+            gradient[i] += normal.gram[(own + i, own + shared)] - dot(&e.border[i], &e.border[shared]);
+        }
+    }
+    for i in 0..shared {
+        for j in 0..i {
+            information[(j, i)] = information[(i, j)];
+        }
+    }
+    (information, gradient)
+}
+
+/// Fits the free parameters for a given noise, from a given start.
+pub(crate) fn solve(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    shared: &[f64],
+    own: &[Vec<f64>],
+) -> Result<Fit, PredictError> {
+    let (n_own, n_shared) = (selection.own.len(), selection.shared.len());
+    let (mut shared, mut own) = (shared.to_vec(), own.to_vec());
+    let mut linear = linearise(problem, selection, noise, &shared, &own)?;
+    let mut damping = 0.0;
+    let mut converged = false;
+    let mut fixed = vec![false; n_shared];
+    for _ in 0..MAX_ITERATIONS {
+        let eliminated: Vec<Eliminated> = linear.normals.iter().map(|n| eliminate(n, n_own, damping)).collect();
+        let (mut information, mut step) = reduce(&linear, &eliminated, n_own, n_shared);
+        for (i, &slot) in selection.shared.iter().enumerate() {
+            let (table, x) = (&problem.shared, shared[slot]);
+            fixed[i] = (x <= table.lower[slot] && step[i] < 0.0) || (x >= table.upper[slot] && step[i] > 0.0);
+            information[(i, i)] = information[(i, i)] * (1.0 + damping) + 1e-12 / table.scale[slot].powi(2);
+            if fixed[i] {
+                step[i] = 0.0;
+                for j in 0..n_shared {
+                    information[(i, j)] = 0.0;
+                    information[(j, i)] = 0.0;
+                }
+            }
+        }
+        let gradient = step.clone();
+        let kept = cholesky(&mut information, RANK_FLOOR);
+        forward(&information, &kept, &mut step);
+        backward(&information, &kept, &mut step);
+        let mut predicted = dot(&gradient, &step);
+        let mut trial_shared = shared.clone();
+        for (i, &slot) in selection.shared.iter().enumerate() {
+            trial_shared[slot] =
+                (shared[slot] + step[i]).clamp(problem.shared.lower[slot], problem.shared.upper[slot]);
+        }
+        let mut trial_own = own.clone();
+        for ((e, values), normal) in eliminated.iter().zip(&mut trial_own).zip(&linear.normals) {
+            let mut right = e.border[n_shared].clone();
+            predicted += dot(&right, &right);
+            for (border, s) in e.border.iter().zip(&step) {
+                right.iter_mut().zip(border).for_each(|(r, b)| *r -= s * b);
+            }
+            backward(&e.factor, &e.kept, &mut right);
+            for (i, &slot) in selection.own.iter().enumerate() {
+                values[slot] = (values[slot] + right[i]).clamp(problem.own.lower[slot], problem.own.upper[slot]);
+            }
+            debug_assert_eq!(normal.gram.nrows(), n_own + n_shared + 1);
+        }
+        if !(predicted > 1e-9 * (1.0 + 1e-6 * linear.chi2)) {
+            converged = true;
+            break;
+        }
+        match linearise(problem, selection, noise, &trial_shared, &trial_own) {
+            Ok(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
+                let gained = linear.chi2 - next.chi2;
+                (shared, own, linear) = (trial_shared, trial_own, next);
+                damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
+                if gained < 1e-7 && predicted < 1e-5 {
+                    converged = true;
+                    break;
+                }
+            }
+            _ if damping > 1e8 => {
+                // No step goes down any more: rounding, a bound of an own parameter, or a kink.
+                converged = predicted < 1e-4 * (1.0 + linear.chi2);
+                break;
+            }
+            _ => damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 },
+        }
+    }
+    let eliminated: Vec<Eliminated> = linear.normals.iter().map(|n| eliminate(n, n_own, 0.0)).collect();
+    let (information, _) = reduce(&linear, &eliminated, n_own, n_shared);
+    let mut log_likelihood = -0.5 * linear.chi2;
+    for e in &eliminated {
+        log_likelihood -= 0.5 * e.log_determinant;
+    }
+    for channel in 0..problem.channels() {
+        log_likelihood -= problem.count(channel) as f64 * noise.sigma[channel].ln();
+        for run in 0..problem.rows.len() {
+            log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
+        }
+    }
+    let at_bound = (0..n_shared).filter(|&i| fixed[i]).map(|i| selection.shared[i]).collect();
+    Ok(Fit { shared, own, noise: noise.clone(), chi2: linear.chi2, log_likelihood, information, converged, at_bound })
+}
+
+/// How the noise is chosen while a model is fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct NoiseRule {
+    /// A channel's sigma where a calibration fixes it.
+    pub(crate) fixed_sigma: Vec<Option<f64>>,
+    /// The shapes that are allowed.
+    pub(crate) allowed: Vec<usize>,
+    /// The smallest sigma that is believed, by channel (a reading has a last digit).
+    pub(crate) floor: Vec<f64>,
+}
+
+/// The likeliest noise of each channel given a fit's residuals (restricted to what the own parameters leave).
+pub(crate) fn estimate_noise(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    rule: &NoiseRule,
+    shared: &[f64],
+    own: &[Vec<f64>],
+) -> Result<NoiseState, PredictError> {
+    let channels = problem.channels();
+    let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
+    let total: usize = (0..channels).map(|c| problem.count(c)).sum();
+    let mut state = white.clone();
+    let mut raw = Vec::with_capacity(own.len());
+    for (run, values) in own.iter().enumerate() {
+        raw.push(whitened_columns(problem, selection, &white, run, shared, values)?);
+    }
+    for channel in 0..channels {
+        let mut best = f64::NEG_INFINITY;
+        for &shape in &rule.allowed {
+            let mut sums = Sums::default();
+            for (run, columns) in raw.iter().enumerate() {
+                let start: usize = (0..channel).map(|c| problem.rows[run].valid[c].len()).sum();
+                let end = start + problem.rows[run].valid[channel].len();
+                let whitener = problem.whitener(run, channel, shape);
+                let n_own = selection.own.len();
+                let whitened: Vec<Vec<f64>> = (0..n_own)
+                    .chain([columns.len() - 1])
+                    .map(|k| {
+                        let mut column = columns[k][start..end].to_vec();
+                        whitener.whiten(&mut column);
+                        column
+                    })
+                    .collect();
+                let residual = &whitened[n_own];
+                sums.squares += dot(residual, residual);
+                let mut own_gram = gram(&whitened[..n_own]);
+                let kept = cholesky(&mut own_gram, 1e-9);
+                sums.log_determinant += whitener.log_determinant + log_determinant(&own_gram, &kept);
+                sums.used += kept.iter().filter(|k| **k).count();
+                sums.rows += end - start;
+            }
+            let share = sums.rows as f64 / total.max(1) as f64;
+            let freedom = (sums.rows as f64 - sums.used as f64 - share * selection.shared.len() as f64).max(1.0);
+            let sigma = match rule.fixed_sigma[channel] {
+                Some(sigma) => sigma,
+                None => (sums.squares / freedom).sqrt().max(rule.floor[channel]),
+            };
+            let score =
+                -freedom * sigma.ln() - 0.5 * sums.log_determinant - 0.5 * sums.squares / (sigma * sigma);
+            if score > best {
+                best = score;
+                state.shape[channel] = shape;
+                state.sigma[channel] = sigma;
+            }
+        }
+    }
+    Ok(state)
+}
+
+#[derive(Default)]
+struct Sums {
+    squares: f64,
+    log_determinant: f64,
+    used: usize,
+    rows: usize,
+}
+
+/// Fits parameters and noise in turn until neither moves.
+pub(crate) fn fit(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    rule: &NoiseRule,
+    start: (&[f64], &[Vec<f64>]),
+    noise: Option<&NoiseState>,
+) -> Result<Fit, PredictError> {
+    let first = match noise {
+        Some(noise) => noise.clone(),
+        None => {
+            let sigma = rule.fixed_sigma.iter().zip(&rule.floor).map(|(s, f)| s.unwrap_or(*f)).collect();
+            NoiseState { shape: vec![0; problem.channels()], sigma }
+        }
+    };
+    let mut best = solve(problem, selection, &first, start.0, start.1)?;
+    for _ in 0..6 {
+        let noise = estimate_noise(problem, selection, rule, &best.shared, &best.own)?;
+        let still = noise.shape == best.noise.shape
+            && noise.sigma.iter().zip(&best.noise.sigma).all(|(a, b)| (a / b - 1.0).abs() < 1e-4);
+        if still {
+            break;
+        }
+        best = solve(problem, selection, &noise, &best.shared, &best.own)?;
+    }
+    Ok(best)
+}
+
+/// The covariance of the free shared parameters; `None` where the data do not determine one of them.
+pub(crate) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = information.nrows();
+    let mut factor = information.clone();
+    let kept = cholesky(&mut factor, 1e-13);
+    if kept.iter().any(|k| !k) {
+        return None;
+    }
+    let mut inverse = DMatrix::zeros(n, n);
+    for j in 0..n {
+        let mut column = vec![0.0; n];
+        column[j] = 1.0;
+        forward(&factor, &kept, &mut column);
+        backward(&factor, &kept, &mut column);
+        inverse.column_mut(j).copy_from_slice(&column);
+    }
+    Some(inverse)
 }

@@ -1,0 +1,320 @@
+//! Measurement noise: white, correlated, or both, along a run.
+//!
+//! A channel's noise is `sigma` times a unit-variance process that is the sum of a white part and a correlated part, the
+//! latter an Ornstein-Uhlenbeck process (an AR(1) on evenly spaced rows) or a Matern process with nu = 3/2 (smooth, the
+//! error of a camera or a thermometer). Both have a state of one or two numbers, so that a Kalman filter whitens a
+//! column in O(n) at any spacing of the rows and with rows missing (Hartikainen and Sarkka 2010,
+//! doi:10.1109/MLSP.2010.5589113).
+
+/// How the unit-variance noise of one channel is correlated along a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Share of the variance that is correlated, in [0, 1].
+    pub correlated: f64,
+    /// Correlation length of that part, in median steps between rows.
+    pub length_steps: f64,
+    /// Whether the correlated part is smooth (Matern 3/2) or rough (Ornstein-Uhlenbeck).
+    pub smooth: bool,
+}
+
+impl Shape {
+    /// White noise.
+    pub const WHITE: Self = Self { correlated: 0.0, length_steps: 0.0, smooth: false };
+}
+
+/// The shapes among which the data choose; white first.
+pub fn family() -> Vec<Shape> {
+    let mut shapes = vec![Shape::WHITE];
+    let rough = |phi: f64, correlated: f64| Shape { correlated, length_steps: -1.0 / phi.ln(), smooth: false };
+    for phi in [0.2, 0.4, 0.6, 0.75, 0.86, 0.93, 0.97, 0.99] {
+        shapes.push(rough(phi, 1.0));
+    }
+    for correlated in [0.15, 0.4, 0.7, 0.9, 0.98] {
+        for phi in [0.75, 0.9, 0.97] {
+            shapes.push(rough(phi, correlated));
+        }
+    }
+    for correlated in [0.3, 0.7, 0.93, 0.99] {
+        for length_steps in [3.0, 7.0, 18.0] {
+            shapes.push(Shape { correlated, length_steps, smooth: true });
+        }
+    }
+    shapes
+}
+
+/// Turns noise of one shape at fixed positions into white noise of unit variance, and back.
+#[derive(Debug, Clone)]
+pub struct Whitener {
+    steps: Vec<Step>,
+    kind: Kind,
+    /// Log determinant of the covariance.
+    pub log_determinant: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    White,
+    Rough,
+    Smooth,
+}
+
+/// What the filter does at one row: transition from the row before, gain, one over the innovation's sigma.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    transition: [f64; 4],
+    gain: [f64; 2],
+    inverse_sigma: f64,
+}
+
+impl Whitener {
+    /// A whitener for rows at `positions` (rising), with lengths in units of `step`.
+    pub fn new(positions: &[f64], step: f64, shape: Shape) -> Self {
+        let kind = match shape {
+            s if s.correlated <= 0.0 => Kind::White,
+            s if s.smooth => Kind::Smooth,
+            _ => Kind::Rough,
+        };
+        if kind == Kind::White {
+            return Self { steps: Vec::new(), kind, log_determinant: 0.0 };
+        }
+        let (correlated, length) = (shape.correlated, shape.length_steps * step);
+        // The white part never vanishes altogether: readings have a last digit, and the filter stays regular.
+        let white = (1.0 - correlated).max(if shape.smooth { 1e-6 } else { 0.0 });
+        let rate = if shape.smooth { 3f64.sqrt() / length } else { 1.0 / length };
+        // Stationary covariance of the state: diagonal in both cases.
+        let stationary = [correlated, if shape.smooth { rate * rate * correlated } else { 0.0 }];
+        let mut covariance = [stationary[0], 0.0, stationary[1]]; // p11, p12, p22
+        let mut log_determinant = 0.0;
+        let steps = (0..positions.len())
+            .map(|i| {
+                let gap = if i == 0 { 0.0 } else { (positions[i] - positions[i - 1]).max(0.0) };
+                let decay = (-rate * gap).exp();
+                let f = if shape.smooth {
+                    let scaled = rate * gap;
+                    [decay * (1.0 + scaled), decay * gap, -decay * rate * scaled, decay * (1.0 - scaled)]
+                } else {
+                    [decay, 0.0, 0.0, 0.0]
+                };
+                if i > 0 {
+                    covariance = propagate(covariance, stationary, f);
+                }
+                let innovation = covariance[0] + white;
+                let gain = [covariance[0] / innovation, covariance[1] / innovation];
+                covariance = [
+                    covariance[0] - gain[0] * covariance[0],
+                    covariance[1] - gain[0] * covariance[1],
+                    covariance[2] - gain[1] * covariance[1],
+                ];
+                log_determinant += innovation.ln();
+                Step { transition: f, gain, inverse_sigma: 1.0 / innovation.sqrt() }
+            })
+            .collect();
+        Self { steps, kind, log_determinant }
+    }
+
+    /// Whitens a column in place.
+    pub fn whiten(&self, column: &mut [f64]) {
+        self.run(column, |value, mean, inverse_sigma| {
+            let innovation = value - mean;
+            (innovation * inverse_sigma, innovation)
+        });
+    }
+
+    /// Turns white noise of unit variance into noise of this shape, in place.
+    pub fn colour(&self, column: &mut [f64]) {
+        self.run(column, |value, mean, inverse_sigma| {
+            let innovation = value / inverse_sigma;
+            (mean + innovation, innovation)
+        });
+    }
+
+    #[inline]
+    fn run(&self, column: &mut [f64], output: impl Fn(f64, f64, f64) -> (f64, f64)) {
+        match self.kind {
+            Kind::White => {}
+            Kind::Rough => {
+                let mut state = 0.0;
+                for (value, step) in column.iter_mut().zip(&self.steps) {
+                    state *= step.transition[0];
+                    let (out, innovation) = output(*value, state, step.inverse_sigma);
+                    state += step.gain[0] * innovation;
+                    *value = out;
+                }
+            }
+            Kind::Smooth => {
+                let (mut state, mut slope) = (0.0, 0.0);
+                for (value, step) in column.iter_mut().zip(&self.steps) {
+                    let f = step.transition;
+                    (state, slope) = (f[0] * state + f[1] * slope, f[2] * state + f[3] * slope);
+                    let (out, innovation) = output(*value, state, step.inverse_sigma);
+                    state += step.gain[0] * innovation;
+                    slope += step.gain[1] * innovation;
+                    *value = out;
+                }
+            }
+        }
+    }
+}
+
+/// Covariance after a transition `f` of a process with diagonal stationary covariance.
+fn propagate(p: [f64; 3], stationary: [f64; 2], f: [f64; 4]) -> [f64; 3] {
+    // P' = S + F (P - S) F^T keeps the stationary covariance exactly.
+    let d = [p[0] - stationary[0], p[1], p[2] - stationary[1]];
+    let top = [f[0] * d[0] + f[1] * d[1], f[0] * d[1] + f[1] * d[2]];
+    let bottom = [f[2] * d[0] + f[3] * d[1], f[2] * d[1] + f[3] * d[2]];
+    [
+        (stationary[0] + top[0] * f[0] + top[1] * f[1]).max(0.0),
+        top[0] * f[2] + top[1] * f[3],
+        (stationary[1] + bottom[0] * f[2] + bottom[1] * f[3]).max(0.0),
+    ]
+}
+
+/// A row whose neighbours contradict it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spike {
+    /// Index into the column.
+    pub index: usize,
+    /// Distance from the line or curve through its neighbours, in robust sigmas.
+    pub z: f64,
+}
+
+/// Sigma of a column's rough part, from differences that a locally cubic curve does not touch; `None` below 8 rows.
+///
+/// `values` at `positions`; robust against spikes (median of moduli).
+pub fn rough_sigma(positions: &[f64], values: &[f64]) -> Option<f64> {
+    if values.len() < 8 {
+        return None;
+    }
+    let mut moduli: Vec<f64> = (2..values.len() - 2).map(|i| departure(positions, values, i).abs()).collect();
+    Some(median(&mut moduli)? / 0.6745)
+}
+
+/// Single rows further than `limit` robust sigmas from the cubic through the two neighbours on either side.
+///
+/// A jump is no spike: a row counts only where its neighbours agree with one another without it.
+pub fn spikes(positions: &[f64], values: &[f64], limit: f64) -> Vec<Spike> {
+    let Some(sigma) = rough_sigma(positions, values).filter(|s| *s > 0.0) else { return Vec::new() };
+    let n = values.len();
+    let score: Vec<f64> =
+        (0..n).map(|i| if i < 2 || i + 2 >= n { 0.0 } else { departure(positions, values, i) / sigma }).collect();
+    (2..n - 2)
+        .filter(|&i| score[i].abs() > limit)
+        // A spike disturbs its neighbours' scores with the opposite sign and less; it is the largest of them.
+        .filter(|&i| (i - 2..=i + 2).all(|j| score[j].abs() <= score[i].abs()))
+        .filter(|&i| {
+            // Without it, the neighbours must be in line: the cubic through the next four on either side.
+            i < 4 || i + 4 >= n || {
+                let around = [i - 4, i - 3, i - 2, i - 1, i + 1, i + 2, i + 3, i + 4];
+                let left = |k: usize| {
+                    let ids: Vec<usize> = around.iter().copied().filter(|&j| j != k).collect();
+                    interpolate(positions, values, &nearest(&ids, k), positions[k])
+                };
+                [i - 1, i + 1].iter().all(|&k| (values[k] - left(k)).abs() < 0.5 * limit * sigma * 2.0)
+            }
+        })
+        .map(|i| Spike { index: i, z: score[i] })
+        .collect()
+}
+
+/// The four of `ids` nearest to `k`.
+fn nearest(ids: &[usize], k: usize) -> Vec<usize> {
+    let mut sorted = ids.to_vec();
+    sorted.sort_by_key(|&j| j.abs_diff(k));
+    sorted.truncate(4);
+    sorted
+}
+
+/// Distance of row `i` from the cubic through its four neighbours, scaled to the sigma of one row.
+fn departure(positions: &[f64], values: &[f64], i: usize) -> f64 {
+    let ids = [i - 2, i - 1, i + 1, i + 2];
+    let weights = lagrange(positions, &ids, positions[i]);
+    let guess: f64 = ids.iter().zip(&weights).map(|(&j, w)| w * values[j]).sum();
+    (values[i] - guess) / (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt()
+}
+
+fn interpolate(positions: &[f64], values: &[f64], ids: &[usize], at: f64) -> f64 {
+    ids.iter().zip(lagrange(positions, ids, at)).map(|(&j, w)| w * values[j]).sum()
+}
+
+fn lagrange(positions: &[f64], ids: &[usize], at: f64) -> Vec<f64> {
+    ids.iter()
+        .map(|&j| {
+            ids.iter()
+                .filter(|&&k| k != j)
+                .map(|&k| {
+                    let gap = positions[j] - positions[k];
+                    if gap == 0.0 { 0.0 } else { (at - positions[k]) / gap }
+                })
+                .product()
+        })
+        .collect()
+}
+
+/// The median; `None` of nothing. Sorts its argument.
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    Some(if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    fn covariance(positions: &[f64], step: f64, shape: Shape) -> DMatrix<f64> {
+        let n = positions.len();
+        DMatrix::from_fn(n, n, |i, j| {
+            let gap = (positions[i] - positions[j]).abs() / (step * shape.length_steps.max(1e-9));
+            let kernel = if shape.smooth {
+                (1.0 + 3f64.sqrt() * gap) * (-(3f64.sqrt()) * gap).exp()
+            } else {
+                (-gap).exp()
+            };
+            let white = if i == j { (1.0 - shape.correlated).max(if shape.smooth { 1e-6 } else { 0.0 }) } else { 0.0 };
+            shape.correlated * kernel + white
+        })
+    }
+
+    /// The filter is the Cholesky factor of the covariance: same quadratic form, same determinant, uneven rows.
+    #[test]
+    fn whitening_agrees_with_the_dense_covariance() {
+        let positions: Vec<f64> =
+            (0..40).scan(0.0, |t, i| { *t += 0.1 * (1.0 + 0.5 * f64::from(i % 3)); Some(*t) }).collect();
+        let values: Vec<f64> = (0..40).map(|i| (f64::from(i) * 0.7).sin() + 0.1 * f64::from(i % 5)).collect();
+        for shape in family().into_iter().skip(1) {
+            let dense = covariance(&positions, 0.15, shape).cholesky().expect("positive definite");
+            let y = DVector::from_vec(values.clone());
+            let form = y.dot(&dense.solve(&y));
+            let log_determinant: f64 = 2.0 * dense.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            let whitener = Whitener::new(&positions, 0.15, shape);
+            let mut white = values.clone();
+            whitener.whiten(&mut white);
+            let fast: f64 = white.iter().map(|v| v * v).sum();
+            approx::assert_relative_eq!(fast, form, max_relative = 1e-7);
+            approx::assert_relative_eq!(whitener.log_determinant, log_determinant, epsilon = 1e-6);
+            whitener.colour(&mut white);
+            for (a, b) in white.iter().zip(&values) {
+                approx::assert_relative_eq!(a, b, epsilon = 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_spike_is_found_and_a_jump_is_not() {
+        let positions: Vec<f64> = (0..60).map(|i| f64::from(i) * 0.02).collect();
+        let noise = |i: usize| 0.01 * ((i as f64 * 12.9898).sin() * 43758.5453).fract();
+        let mut values: Vec<f64> = positions.iter().enumerate().map(|(i, t)| 4.9 * t * t + noise(i)).collect();
+        values[30] += 0.3;
+        let found = spikes(&positions, &values, 6.0);
+        assert_eq!(found.iter().map(|s| s.index).collect::<Vec<_>>(), vec![30]);
+        values[30] -= 0.3;
+        for v in &mut values[35..] {
+            *v += 0.3;
+        }
+        assert_eq!(spikes(&positions, &values, 6.0), vec![]);
+    }
+}

@@ -1,0 +1,189 @@
+//! A model and a recording put together: which rows count, what starts where, what is whitened how.
+
+use std::sync::OnceLock;
+
+use crate::data::{Recording, Run};
+use crate::model::{Model, Scope, Spec};
+use crate::noise::{Shape, Whitener, family, median};
+
+/// A model and a recording, with everything about the rows that no fit changes.
+pub(crate) struct Problem<'a> {
+    pub(crate) model: &'a dyn Model,
+    pub(crate) recording: Recording,
+    pub(crate) shapes: Vec<Shape>,
+    pub(crate) rows: Vec<RunRows>,
+    /// Median step between rows, in the noise variable's unit.
+    pub(crate) step: f64,
+    pub(crate) slots: Vec<usize>,
+    pub(crate) shared: ParameterTable,
+    pub(crate) own: ParameterTable,
+    /// Where each run's own parameters start.
+    pub(crate) own_start: Vec<Vec<f64>>,
+}
+
+/// The parameters of one scope, column by column.
+pub(crate) struct ParameterTable {
+    pub(crate) start: Vec<f64>,
+    pub(crate) lower: Vec<f64>,
+    pub(crate) upper: Vec<f64>,
+    pub(crate) scale: Vec<f64>,
+    /// Index into [`Spec::parameters`].
+    pub(crate) index: Vec<usize>,
+}
+
+/// The measured rows of one run.
+pub(crate) struct RunRows {
+    /// For each channel, the rows that were measured.
+    pub(crate) valid: Vec<Vec<usize>>,
+    /// For each channel, the noise variable at those rows.
+    pub(crate) positions: Vec<Vec<f64>>,
+    /// For each channel and shape, made when first asked for.
+    whiteners: Vec<Vec<OnceLock<Whitener>>>,
+}
+
+impl ParameterTable {
+    fn new(spec: &Spec, scope: Scope) -> Self {
+        let index: Vec<usize> = (0..spec.parameters.len()).filter(|&i| spec.parameters[i].scope == scope).collect();
+        let column = |f: fn(&crate::model::Parameter) -> f64| index.iter().map(|&i| f(&spec.parameters[i])).collect();
+        Self {
+            start: column(|p| p.start),
+            lower: column(|p| p.lower),
+            upper: column(|p| p.upper),
+            scale: column(|p| p.scale.abs().max(f64::MIN_POSITIVE)),
+            index,
+        }
+    }
+}
+
+impl<'a> Problem<'a> {
+    pub(crate) fn new(model: &'a dyn Model, recording: Recording) -> Self {
+        let shapes = family();
+        let mut gaps = Vec::new();
+        let mut rows = Vec::with_capacity(recording.runs.len());
+        for run in &recording.runs {
+            let along = noise_positions(&recording, run);
+            gaps.extend(along.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 0.0));
+            let valid: Vec<Vec<usize>> = run
+                .outputs
+                .iter()
+                .map(|column| (0..column.len()).filter(|&i| column[i].is_finite()).collect())
+                .collect();
+            let positions = valid.iter().map(|ids| ids.iter().map(|&i| along[i]).collect()).collect();
+            let whiteners = valid.iter().map(|_| shapes.iter().map(|_| OnceLock::new()).collect()).collect();
+            rows.push(RunRows { valid, positions, whiteners });
+        }
+        let spec = model.spec();
+        let own = ParameterTable::new(spec, Scope::PerRun);
+        let own_start = recording
+            .runs
+            .iter()
+            .map(|run| {
+                let mut start = own.start.clone();
+                model.start(run, &mut start);
+                for (i, value) in start.iter_mut().enumerate() {
+                    *value = if value.is_finite() { value.clamp(own.lower[i], own.upper[i]) } else { own.start[i] };
+                }
+                start
+            })
+            .collect();
+        Self {
+            slots: spec.slots(),
+            shared: ParameterTable::new(spec, Scope::Shared),
+            own,
+            own_start,
+            step: median(&mut gaps).unwrap_or(1.0),
+            shapes,
+            rows,
+            recording,
+            model,
+        }
+    }
+
+    /// The same model on other rows of the same recording.
+    pub(crate) fn with(&self, recording: Recording) -> Problem<'a> {
+        let mut other = Problem::new(self.model, recording);
+        other.step = self.step;
+        other
+    }
+
+    pub(crate) fn spec(&self) -> &Spec {
+        self.model.spec()
+    }
+
+    pub(crate) fn channels(&self) -> usize {
+        self.recording.channels.len()
+    }
+
+    /// Measured values of a channel.
+    pub(crate) fn count(&self, channel: usize) -> usize {
+        self.rows.iter().map(|r| r.valid[channel].len()).sum()
+    }
+
+    pub(crate) fn whitener(&self, run: usize, channel: usize, shape: usize) -> &Whitener {
+        let rows = &self.rows[run];
+        rows.whiteners[channel][shape]
+            .get_or_init(|| Whitener::new(&rows.positions[channel], self.step, self.shapes[shape]))
+    }
+
+    /// Picks the measured rows of a channel out of a column over all rows.
+    pub(crate) fn pick(&self, run: usize, channel: usize, column: &[f64]) -> Vec<f64> {
+        let n = self.recording.runs[run].len();
+        self.rows[run].valid[channel].iter().map(|&i| column[channel * n + i]).collect()
+    }
+
+    /// The free parameters with the mechanisms `set` (indices into [`Spec::mechanisms`]) and terms `terms` on.
+    pub(crate) fn select(&self, set: &[usize], terms: &[usize]) -> Selection {
+        let spec = self.spec();
+        let mut free: Vec<bool> = vec![true; spec.parameters.len()];
+        for m in &spec.mechanisms {
+            for &p in m.parameters.iter().chain(&m.companions) {
+                free[p] = false;
+            }
+        }
+        for t in &spec.terms {
+            free[t.parameter] = false;
+        }
+        let baseline = free.clone();
+        for &m in set {
+            let mechanism = &spec.mechanisms[m];
+            mechanism.parameters.iter().for_each(|&p| free[p] = true);
+            let needless = set.iter().any(|&o| o != m && mechanism.companions_unless.contains(&spec.mechanisms[o].id));
+            if !needless {
+                mechanism.companions.iter().for_each(|&p| free[p] = true);
+            }
+        }
+        for &t in terms {
+            free[spec.terms[t].parameter] = true;
+        }
+        let pick = |scope: Scope| -> (Vec<usize>, Vec<bool>) {
+            (0..free.len())
+                .filter(|&p| free[p] && spec.parameters[p].scope == scope)
+                .map(|p| (self.slots[p], !baseline[p]))
+                .unzip()
+        };
+        let (shared, added_shared) = pick(Scope::Shared);
+        let (own, added_own) = pick(Scope::PerRun);
+        Selection { shared, own, added_shared, added_own }
+    }
+}
+
+/// The noise variable of a run: the recording's, or the number of the row.
+pub(crate) fn noise_positions(recording: &Recording, run: &Run) -> Vec<f64> {
+    match recording.noise_along.and_then(|v| run.inputs.get(v)) {
+        Some(column) => column.clone(),
+        None => (0..run.len()).map(|i| i as f64).collect(),
+    }
+}
+
+/// Which parameters a fit may move.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Selection {
+    /// Slots among the shared parameters.
+    pub(crate) shared: Vec<usize>,
+    /// Slots among the runs' own parameters.
+    pub(crate) own: Vec<usize>,
+    /// Which of `shared` a mechanism or term added to the baseline.
+    pub(crate) added_shared: Vec<bool>,
+    /// Which of `own` likewise.
+    pub(crate) added_own: Vec<bool>,
+}
