@@ -1,9 +1,22 @@
 //! The diagnosis from end to end.
 
+use rayon::prelude::*;
+
+use crate::adequacy;
+use crate::compare::{Candidate, HeldOut, candidate, confusion, held_out, nested, search};
 use crate::data::{Recording, RecordingError};
-use crate::diagnosis::Diagnosis;
+use crate::diagnosis::{
+    ChannelFit, ChannelNoise, Confusion, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
+};
+use crate::estimate::estimates;
+use crate::experiment;
+use crate::fit::{Fit, NoiseRule, fit};
+use crate::law;
+use crate::locate::locate;
 use crate::model::{Experiment, Model, PredictError};
-use crate::observer::Observer;
+use crate::noise::{median, rough_sigma, spikes};
+use crate::observer::{Observer, Progress};
+use crate::problem::{Problem, noise_positions};
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,16 +67,481 @@ pub enum DiagnoseError {
     Stopped,
 }
 
+/// A single row further than this many robust sigmas from its neighbours is set aside.
+const SPIKE_LIMIT: f64 = 7.0;
+/// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
+const RIVAL_GAP: f64 = 3.0;
+/// A richer set must beat an adequate simpler one by this log evidence.
+const EARNED: f64 = 2.0;
+/// Below this mean number of rows in a run, correlation along a run is not looked for.
+const ROWS_FOR_COLOUR: usize = 8;
+
 /// Diagnoses a recording: is the baseline adequate; if not, where does it miss, and which mechanisms explain it?
+///
+/// The same recording, options and machine give the same bits on any number of threads; work runs in rayon's current
+/// pool. `experiments` are what the rig could do next.
 ///
 /// # Errors
 /// [`DiagnoseError`]; a verdict, whichever it is, is no error.
 pub fn diagnose(
-    _model: &dyn Model,
-    _recording: &Recording,
-    _experiments: &[Experiment],
-    _options: &Options,
-    _observer: &dyn Observer,
+    model: &dyn Model,
+    recording: &Recording,
+    experiments: &[Experiment],
+    options: &Options,
+    observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    Err(DiagnoseError::Stopped)
+    check(recording, options)?;
+    let tell = |stage: &str, done: f64| -> Result<(), DiagnoseError> {
+        if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }
+    };
+    tell("reading the noise", 0.0)?;
+    let (cleaned, outliers) = without_spikes(recording);
+    let problem = Problem::new(model, cleaned);
+    let rule = noise_rule(&problem);
+    let selection = problem.select(&[], &[]);
+    let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+    let unknowns = selection.shared.len() + selection.own.len() * problem.rows.len() + problem.channels();
+    if rows <= unknowns {
+        return Err(DiagnoseError::TooFewRows { rows, parameters: unknowns });
+    }
+    tell("fitting the baseline", 0.0)?;
+    let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
+    let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
+    let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
+    tell("adequacy of the baseline", 0.0)?;
+    let test = |c: &Candidate, stream: u64| {
+        let rivals: Vec<usize> = everything.iter().copied().filter(|m| !c.set.contains(m)).collect();
+        let seed = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ stream;
+        adequacy::test(&problem, &c.selection, &c.fit, &rivals, &rule, options.replicates, seed)
+    };
+    let adequacy = test(&baseline, 1)?;
+    tell("adequacy of the baseline", 1.0)?;
+
+    let mut work = Work { problem: &problem, rule: &rule, baseline: &baseline, outliers, rows, unknowns };
+    if adequacy.p_value > options.alpha {
+        let base_score = held_out(&problem, &baseline)?;
+        let mut diagnosis = work.skeleton(&adequacy, Verdict::Adequate, &baseline.fit)?;
+        diagnosis.before = work.errors(&baseline.fit, &base_score)?;
+        diagnosis.after = diagnosis.before.clone();
+        return Ok(diagnosis);
+    }
+
+    tell("comparing mechanisms", 0.0)?;
+    let all = search(&problem, &rule, baseline.clone(), &everything, &|done| {
+        observer.progress(Progress { stage: "comparing mechanisms", done })
+    })
+    .ok_or(DiagnoseError::Stopped)?;
+    let mut physical: Vec<&Candidate> =
+        all.iter().filter(|c| c.ruled_out.is_none() && c.evidence.is_finite()).collect();
+    physical.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    let probability = probabilities(&physical);
+
+    tell("adequacy of the best explanation", 0.0)?;
+    // The chosen set has been selected to fit: only a clear failure (a fifth of alpha) speaks against it.
+    let enough = options.alpha / 5.0;
+    let mut best: Option<(&Candidate, f64)> = None;
+    if let Some(&first) = physical.first().filter(|c| !c.set.is_empty()) {
+        let mut current = (first, test(first, 2)?.p_value);
+        loop {
+            let simpler = physical.iter().find(|c| {
+                !c.set.is_empty()
+                    && c.set.len() < current.0.set.len()
+                    && c.set.iter().all(|m| current.0.set.contains(m))
+                    && c.evidence > current.0.evidence - EARNED
+            });
+            let Some(&simpler) = simpler else { break };
+            let p = test(simpler, 3)?.p_value;
+            if p <= options.alpha && p < current.1 {
+                break;
+            }
+            current = (simpler, p);
+        }
+        best = Some(current);
+    }
+    tell("predicting unseen data", 0.0)?;
+    let base_score = held_out(&problem, &baseline)?;
+    let scores: Vec<Option<HeldOut>> = all.par_iter().map(|c| {
+        let wanted = c.set.len() <= 1 || best.is_some_and(|b| b.0.set == c.set);
+        if wanted && c.evidence.is_finite() { held_out(&problem, c).ok() } else { None }
+    }).collect();
+    let score_of = |set: &[usize]| all.iter().position(|c| c.set == set).and_then(|i| scores[i].as_ref());
+    let explained = best.filter(|(c, p)| {
+        *p > enough && score_of(&c.set).is_some_and(|s| s.log_score > base_score.log_score)
+    });
+
+    let final_fit = explained.map_or(&baseline.fit, |(c, _)| &c.fit);
+    let mut diagnosis = work.skeleton(&adequacy, Verdict::Unexplained, final_fit)?;
+    diagnosis.before = work.errors(&baseline.fit, &base_score)?;
+    diagnosis.after = diagnosis.before.clone();
+    work.mechanisms(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best.map(|b| b.0));
+    work.sets(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best);
+    let sigma = match explained {
+        Some((c, _)) => c.fit.noise.sigma.clone(),
+        None => rough_sigmas(&problem, &rule, &baseline.fit),
+    };
+    diagnosis.location = locate(&problem, &baseline.selection, &baseline.fit, &sigma)?;
+
+    if let Some((chosen, p)) = explained {
+        diagnosis.final_p_value = Some(p);
+        diagnosis.chosen = work.ids(&chosen.set);
+        if let Some(score) = score_of(&chosen.set) {
+            diagnosis.after = work.errors(&chosen.fit, score)?;
+        }
+        work.draw(&mut diagnosis, &chosen.fit)?;
+        tell("telling the rivals apart", 0.0)?;
+        let mut rivals = vec![chosen];
+        rivals.extend(physical.iter().copied().filter(|c| {
+            c.set != chosen.set
+                && !c.set.is_empty()
+                && c.evidence > chosen.evidence - RIVAL_GAP
+                && !nested(chosen, c)
+                && !rivals_subset(c, chosen)
+        }));
+        keep_minimal(&mut rivals);
+        rivals.truncate(6);
+        if rivals.len() > 1 {
+            diagnosis.verdict = Verdict::Ambiguous;
+            diagnosis.confused_with = rivals[1..].iter().map(|c| work.ids(&c.set)).collect();
+            let matrix = confusion(&problem, &rule, &rivals, 100, options.seed)?;
+            diagnosis.confusion = Some(Confusion { sets: rivals.iter().map(|c| work.ids(&c.set)).collect(), matrix });
+            tell("choosing the next experiment", 0.0)?;
+            diagnosis.next_experiment = experiment::best(&problem, &rivals, experiments)?;
+            let names: Vec<String> = rivals.iter().map(|c| work.names(&c.set)).collect();
+            diagnosis.undetermined.push(format!("{} cannot be told apart in these data", listed(&names)));
+            if diagnosis.next_experiment.is_none() {
+                diagnosis.undetermined.push("no experiment in the rig's range would separate them".into());
+            }
+        } else {
+            diagnosis.verdict = Verdict::Explained;
+        }
+    } else {
+        tell("looking for a law in the residual", 0.0)?;
+        if let Some(found) = law::find(&problem, &rule, &baseline, &base_score)? {
+            diagnosis.after = work.errors_of(&found.predictions, &found.held_out);
+            for (run, curves) in diagnosis.curves.iter_mut().enumerate() {
+                curves.after.clone_from(&found.predictions[run]);
+            }
+            diagnosis.noise = work.noise(&found.fit);
+            diagnosis.law = Some(found.law);
+        }
+    }
+    tell("done", 1.0)?;
+    Ok(diagnosis)
+}
+
+/// Whether `c` frees only parameters that `chosen` frees too: a simpler set that had its chance.
+fn rivals_subset(c: &Candidate, chosen: &Candidate) -> bool {
+    nested(c, chosen)
+}
+
+/// Drops rivals that only add to another rival.
+fn keep_minimal(rivals: &mut Vec<&Candidate>) {
+    let all = rivals.clone();
+    rivals.retain(|c| !all.iter().any(|o| o.set != c.set && nested(o, c) && o.evidence > c.evidence - EARNED));
+}
+
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+fn check(recording: &Recording, options: &Options) -> Result<(), DiagnoseError> {
+    recording.check()?;
+    if !(options.alpha > 0.0 && options.alpha < 0.5) {
+        return Err(DiagnoseError::Option { name: "alpha", value: options.alpha, expected: "above 0 and below 0.5" });
+    }
+    if options.replicates < 19 {
+        let value = options.replicates as f64;
+        return Err(DiagnoseError::Option { name: "replicates", value, expected: "at least 19" });
+    }
+    Ok(())
+}
+
+/// Sets rows aside that their neighbours contradict, where they are few.
+fn without_spikes(recording: &Recording) -> (Recording, Vec<Outlier>) {
+    let mut cleaned = recording.clone();
+    let mut outliers = Vec::new();
+    for (r, run) in recording.runs.iter().enumerate() {
+        let along = noise_positions(recording, run);
+        for (c, column) in run.outputs.iter().enumerate() {
+            let rows: Vec<usize> = (0..column.len()).filter(|&i| column[i].is_finite()).collect();
+            if rows.len() < 12 {
+                continue;
+            }
+            let positions: Vec<f64> = rows.iter().map(|&i| along[i]).collect();
+            let values: Vec<f64> = rows.iter().map(|&i| column[i]).collect();
+            let found = spikes(&positions, &values, SPIKE_LIMIT);
+            if found.len() * 20 > rows.len() {
+                continue;
+            }
+            for spike in found {
+                let row = rows[spike.index];
+                cleaned.runs[r].outputs[c][row] = f64::NAN;
+                outliers.push(Outlier {
+                    run: run.label.clone(),
+                    row,
+                    channel: recording.channels[c].name.clone(),
+                    z: spike.z,
+                });
+            }
+        }
+    }
+    (cleaned, outliers)
+}
+
+fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
+    let recording = &problem.recording;
+    let floor = (0..problem.channels())
+        .map(|c| {
+            let largest = recording
+                .runs
+                .iter()
+                .flat_map(|r| &r.outputs[c])
+                .filter(|v| v.is_finite())
+                .fold(0.0, |m: f64, v| m.max(v.abs()));
+            let digit = recording.resolution.get(c).copied().unwrap_or(0.0) / 12f64.sqrt();
+            digit.max(1e-9 * largest).max(f64::MIN_POSITIVE)
+        })
+        .collect();
+    let rows: usize = problem.recording.runs.iter().map(|r| r.len()).sum();
+    let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1);
+    let fixed_sigma = (0..problem.channels()).map(|c| recording.calibration.get(c).copied().flatten()).collect();
+    NoiseRule { fixed_sigma, allowed: if long { (0..problem.shapes.len()).collect() } else { vec![0] }, floor }
+}
+
+/// Sigma of each channel's rough part, whatever the model: what is left once everything smooth is taken away.
+fn rough_sigmas(problem: &Problem<'_>, rule: &NoiseRule, fallback: &Fit) -> Vec<f64> {
+    (0..problem.channels())
+        .map(|c| {
+            let mut sigmas: Vec<f64> = problem
+                .rows
+                .iter()
+                .enumerate()
+                .filter_map(|(r, rows)| {
+                    let column = &problem.recording.runs[r].outputs[c];
+                    let values: Vec<f64> = rows.valid[c].iter().map(|&i| column[i]).collect();
+                    rough_sigma(&rows.positions[c], &values)
+                })
+                .collect();
+            rule.fixed_sigma[c]
+                .or_else(|| median(&mut sigmas))
+                .map_or(fallback.noise.sigma[c], |s| s.max(rule.floor[c]))
+        })
+        .collect()
+}
+
+fn probabilities(physical: &[&Candidate]) -> Vec<f64> {
+    let most = physical.iter().map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = physical.iter().map(|c| (c.evidence - most).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    weights.into_iter().map(|w| w / total).collect()
+}
+
+/// What the parts of a diagnosis are made from.
+struct Work<'a> {
+    problem: &'a Problem<'a>,
+    rule: &'a NoiseRule,
+    baseline: &'a Candidate,
+    outliers: Vec<Outlier>,
+    rows: usize,
+    unknowns: usize,
+}
+
+impl Work<'_> {
+    fn ids(&self, set: &[usize]) -> Vec<String> {
+        set.iter().map(|&m| self.problem.spec().mechanisms[m].id.clone()).collect()
+    }
+
+    fn names(&self, set: &[usize]) -> String {
+        let names: Vec<String> = set.iter().map(|&m| self.problem.spec().mechanisms[m].name.clone()).collect();
+        names.join(" with ")
+    }
+
+    fn skeleton(
+        &mut self,
+        adequacy: &adequacy::Adequacy,
+        verdict: Verdict,
+        last: &Fit,
+    ) -> Result<Diagnosis, PredictError> {
+        let recording = &self.problem.recording;
+        let pairs = |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
+        let mut remarks = Vec::new();
+        if !self.baseline.fit.converged {
+            remarks.push("the baseline's fit did not converge; its best estimate is used".to_owned());
+        }
+        if self.rows < 3 * self.unknowns {
+            remarks.push(format!("few data: {} measured values for {} unknowns", self.rows, self.unknowns));
+        }
+        let free: Vec<usize> =
+            self.baseline.selection.shared.iter().map(|&slot| self.problem.shared.index[slot]).collect();
+        let mut diagnosis = Diagnosis {
+            verdict,
+            p_value: adequacy.p_value,
+            p_floor: adequacy.p_floor,
+            tests: adequacy.tests.clone(),
+            channels: pairs(&recording.channels),
+            variables: pairs(&recording.variables),
+            baseline: self.problem.spec().baseline.clone(),
+            baseline_parameters: estimates(self.problem, self.baseline, &free, &[], None),
+            noise: self.noise(last),
+            location: Vec::new(),
+            mechanisms: Vec::new(),
+            sets: Vec::new(),
+            chosen: Vec::new(),
+            confused_with: Vec::new(),
+            confusion: None,
+            final_p_value: None,
+            before: Vec::new(),
+            after: Vec::new(),
+            law: None,
+            next_experiment: None,
+            undetermined: Vec::new(),
+            outliers: std::mem::take(&mut self.outliers),
+            remarks,
+            curves: Vec::new(),
+        };
+        let before = law::predictions(self.problem, &self.baseline.fit)?;
+        diagnosis.curves = recording
+            .runs
+            .iter()
+            .zip(before)
+            .map(|(run, before)| Curves {
+                run: run.label.clone(),
+                inputs: run.inputs.clone(),
+                measured: run.outputs.clone(),
+                after: before.clone(),
+                before,
+            })
+            .collect();
+        Ok(diagnosis)
+    }
+
+    fn noise(&self, fit: &Fit) -> Vec<ChannelNoise> {
+        let recording = &self.problem.recording;
+        (0..self.problem.channels())
+            .map(|c| {
+                let shape = self.problem.shapes[fit.noise.shape[c]];
+                ChannelNoise {
+                    channel: recording.channels[c].name.clone(),
+                    sigma: fit.noise.sigma[c],
+                    source: match self.rule.fixed_sigma[c] {
+                        Some(_) => NoiseSource::Calibration,
+                        None => NoiseSource::Differences,
+                    },
+                    correlated_share: shape.correlated,
+                    correlation_length: shape.length_steps * self.problem.step,
+                }
+            })
+            .collect()
+    }
+
+    fn errors(&self, fit: &Fit, score: &HeldOut) -> Result<Vec<ChannelFit>, PredictError> {
+        Ok(self.errors_of(&law::predictions(self.problem, fit)?, score))
+    }
+
+    fn errors_of(&self, predictions: &[Vec<Vec<f64>>], score: &HeldOut) -> Vec<ChannelFit> {
+        let recording = &self.problem.recording;
+        (0..self.problem.channels())
+            .map(|c| {
+                let squares = recording.runs.iter().zip(predictions).flat_map(|(run, predicted)| {
+                    run.outputs[c].iter().zip(&predicted[c]).map(|(m, p)| (m - p).powi(2)).filter(|v| v.is_finite())
+                });
+                let (sum, n) = squares.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
+                ChannelFit {
+                    channel: recording.channels[c].name.clone(),
+                    rmse: (sum / n.max(1) as f64).sqrt(),
+                    heldout_rmse: score.rmse[c],
+                }
+            })
+            .collect()
+    }
+
+    fn draw(&self, diagnosis: &mut Diagnosis, fit: &Fit) -> Result<(), PredictError> {
+        for (curves, after) in diagnosis.curves.iter_mut().zip(law::predictions(self.problem, fit)?) {
+            curves.after = after;
+        }
+        Ok(())
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "the parts of one table")]
+    fn mechanisms(
+        &self,
+        diagnosis: &mut Diagnosis,
+        all: &[Candidate],
+        scores: &[Option<HeldOut>],
+        base: &HeldOut,
+        physical: &[&Candidate],
+        probability: &[f64],
+        best: Option<&Candidate>,
+    ) {
+        let channels = &self.problem.recording.channels;
+        for (m, mechanism) in self.problem.spec().mechanisms.iter().enumerate() {
+            let single = all.iter().position(|c| c.set == [m]);
+            let holder = best
+                .filter(|c| c.set.contains(&m))
+                .or_else(|| physical.iter().copied().find(|c| c.set.contains(&m)))
+                .or_else(|| single.map(|i| &all[i]));
+            let Some(holder) = holder else { continue };
+            let alone = single.map(|i| &all[i]);
+            let score = all
+                .iter()
+                .position(|c| c.set == holder.set)
+                .and_then(|i| scores[i].as_ref())
+                .or_else(|| single.and_then(|i| scores[i].as_ref()));
+            let profile = best.is_some_and(|b| b.set == holder.set).then_some(self.rule);
+            diagnosis.mechanisms.push(MechanismReport {
+                id: mechanism.id.clone(),
+                name: mechanism.name.clone(),
+                equation: mechanism.equation.clone(),
+                reference: mechanism.reference.clone(),
+                probability: physical
+                    .iter()
+                    .zip(probability)
+                    .filter(|(c, _)| c.set.contains(&m))
+                    .map(|(_, p)| p)
+                    .sum::<f64>()
+                    .min(1.0),
+                parameters: estimates(self.problem, holder, &mechanism.parameters, &mechanism.derived, profile),
+                heldout_log_score_gain: score.map_or(f64::NAN, |s| s.log_score - base.log_score),
+                heldout_rmse: score.map_or(Vec::new(), |s| {
+                    channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()
+                }),
+                ruled_out: alone.and_then(|c| c.ruled_out.clone()),
+            });
+        }
+        diagnosis.mechanisms.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "the parts of one table")]
+    fn sets(
+        &self,
+        diagnosis: &mut Diagnosis,
+        all: &[Candidate],
+        scores: &[Option<HeldOut>],
+        base: &HeldOut,
+        physical: &[&Candidate],
+        probability: &[f64],
+        best: Option<(&Candidate, f64)>,
+    ) {
+        diagnosis.sets = physical
+            .iter()
+            .zip(probability)
+            .take(12)
+            .map(|(c, &probability)| {
+                let at = all.iter().position(|o| o.set == c.set);
+                SetReport {
+                    ids: self.ids(&c.set),
+                    probability,
+                    p_value: best.filter(|b| b.0.set == c.set).map(|b| b.1),
+                    heldout_log_score_gain: at
+                        .and_then(|i| scores[i].as_ref())
+                        .map(|s| s.log_score - base.log_score),
+                    ruled_out: None,
+                }
+            })
+            .collect();
+    }
 }

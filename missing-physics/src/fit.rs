@@ -78,6 +78,15 @@ pub(crate) struct Fit {
 
 /// How wide the prior of a run's own parameter is, in units of its scale.
 const OWN_PRIOR: f64 = 1e3;
+/// The same for one that a mechanism adds.
+const ADDED_OWN_PRIOR: f64 = 10.0;
+
+/// Standard deviation of the prior of the `i`-th free own parameter.
+pub(crate) fn own_prior_width(problem: &Problem<'_>, selection: &Selection, i: usize) -> f64 {
+    let width = if selection.added_own[i] { ADDED_OWN_PRIOR } else { OWN_PRIOR };
+    width * problem.own.scale[selection.own[i]]
+}
+
 const MAX_ITERATIONS: usize = 60;
 
 /// Normal equations of one run: free own parameters first, then free shared ones, then the residual.
@@ -182,7 +191,7 @@ fn linearise(
         let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, values)?);
         let last = gram.nrows() - 1;
         for (i, &slot) in selection.own.iter().enumerate() {
-            let precision = 1.0 / (OWN_PRIOR * problem.own.scale[slot]).powi(2);
+            let precision = 1.0 / own_prior_width(problem, selection, i).powi(2);
             let departure = problem.own_start[run][slot] - values[slot];
             gram[(i, i)] += precision;
             gram[(i, last)] += precision * departure;

@@ -1,9 +1,16 @@
 #![doc = include_str!("../README.md")]
+mod adequacy;
+mod bank;
+mod compare;
 pub mod data;
 pub mod diagnosis;
 pub mod engine;
+mod estimate;
+mod experiment;
 pub mod fit;
 mod linalg;
+mod law;
+mod locate;
 pub mod model;
 pub mod noise;
 pub mod observer;

@@ -1,0 +1,230 @@
+//! Is a model adequate? A bank of tests with one p-value, calibrated by a parametric bootstrap of the whole fit.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Gamma};
+
+use crate::bank::{Bank, Reading};
+use crate::diagnosis::TestOutcome;
+use crate::fit::{Fit, NoiseRule};
+use crate::model::PredictError;
+use crate::problem::{Problem, Selection};
+
+/// What the bank says of a model.
+#[derive(Debug, Clone)]
+pub(crate) struct Adequacy {
+    pub(crate) p_value: f64,
+    pub(crate) p_floor: f64,
+    pub(crate) tests: Vec<TestOutcome>,
+}
+
+/// Relative uncertainty of a calibrated sigma.
+const CALIBRATION_UNCERTAINTY: f64 = 0.02;
+
+/// Tests a fitted model against the mechanisms `rivals`, smooth functions of every variable, serial correlation, shifts of
+/// runs and of intervals, and the calibrated noise.
+pub(crate) fn test(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    fit: &Fit,
+    rivals: &[usize],
+    rule: &NoiseRule,
+    replicates: usize,
+    seed: u64,
+) -> Result<Adequacy, PredictError> {
+    let mut bank = Bank::new(problem, selection, fit, rivals, rule)?;
+    let observed = residuals(problem, fit)?;
+    // The noise of the null worlds is that of the fitted model; shapes that such worlds never choose, nor these data
+    // under any alternative, need not be tried again for each of them.
+    let truth: Vec<(usize, f64)> = fit.noise.shape.iter().copied().zip(fit.noise.sigma.iter().copied()).collect();
+    let mut wanted: Vec<bool> = vec![false; problem.shapes.len()];
+    fit.noise.shape.iter().for_each(|&s| wanted[s] = true);
+    wanted[0] = true;
+    let pilots: Vec<Reading> =
+        (0..12u64).into_par_iter().map(|k| bank.read(&draw(problem, &truth, rule, seed ^ 0x5eed, k))).collect();
+    for reading in pilots.iter().chain([&bank.read(&observed)]) {
+        reading.noise.iter().for_each(|&(s, _)| wanted[bank.in_play()[s]] = true);
+    }
+    let play: Vec<usize> = rule.allowed.iter().copied().filter(|&s| wanted[s]).collect();
+    bank.play(&play);
+
+    let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
+        let reading = bank.read(data);
+        let white = bank.whitened_residual(data, &reading);
+        let mut all = reading.gains;
+        all.extend(omnibus(problem, &white, rule));
+        all
+    };
+    let seen = statistics(&observed);
+    let null: Vec<Vec<f64>> = (0..replicates as u64)
+        .into_par_iter()
+        .map(|k| statistics(&draw(problem, &truth, rule, seed, k)))
+        .collect();
+    let tails: Vec<Tail> = (0..seen.len()).map(|t| Tail::new(null.iter().map(|row| row[t]))).collect();
+    let smallest = |row: &[f64]| row.iter().zip(&tails).map(|(x, tail)| tail.p(*x)).fold(1.0, f64::min);
+    let own = smallest(&seen);
+    let below = null.iter().filter(|row| smallest(row) <= own).count();
+    let floor = 1.0 / (replicates as f64 + 1.0);
+    let names = bank.alternatives.iter().map(|a| a.name.clone()).chain(omnibus_names(problem, rule));
+    let mut tests: Vec<TestOutcome> = names
+        .zip(seen.iter().zip(&tails))
+        .map(|(name, (&statistic, tail))| TestOutcome { name, statistic, p_value: tail.p(statistic) })
+        .collect();
+    tests.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    Ok(Adequacy { p_value: (below as f64 + 1.0) * floor, p_floor: floor, tests })
+}
+
+/// Measured less predicted, `[run][channel]`, measured rows only.
+pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
+    problem
+        .recording
+        .runs
+        .iter()
+        .enumerate()
+        .map(|(run, data)| {
+            let n = data.len();
+            let mut out = vec![0.0; n * problem.channels()];
+            problem.model.predict(data, &fit.shared, &fit.own[run], &mut out)?;
+            Ok((0..problem.channels())
+                .map(|c| problem.rows[run].valid[c].iter().map(|&i| data.outputs[c][i] - out[c * n + i]).collect())
+                .collect())
+        })
+        .collect()
+}
+
+/// Noise alone, `[run][channel]`: what the residual of a true model looks like before the model is fitted.
+pub(crate) fn draw(
+    problem: &Problem<'_>,
+    noise: &[(usize, f64)],
+    rule: &NoiseRule,
+    seed: u64,
+    stream: u64,
+) -> Vec<Vec<Vec<f64>>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(stream + 1);
+    let factors: Vec<f64> = rule
+        .fixed_sigma
+        .iter()
+        .map(|fixed| {
+            let z: f64 = StandardNormal.sample(&mut rng);
+            if fixed.is_some() { (CALIBRATION_UNCERTAINTY * z).exp() } else { 1.0 }
+        })
+        .collect();
+    (0..problem.rows.len())
+        .map(|run| {
+            (0..problem.channels())
+                .map(|c| {
+                    let mut column: Vec<f64> =
+                        problem.rows[run].valid[c].iter().map(|_| StandardNormal.sample(&mut rng)).collect();
+                    problem.whitener(run, c, noise[c].0).colour(&mut column);
+                    column.iter_mut().for_each(|v| *v *= noise[c].1 * factors[c]);
+                    column
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn omnibus_names(problem: &Problem<'_>, rule: &NoiseRule) -> Vec<String> {
+    let mut names = Vec::new();
+    for (c, channel) in problem.recording.channels.iter().enumerate() {
+        let name = &channel.name;
+        names.push(format!("{name}: neighbouring rows (8 lags)"));
+        names.push(format!("{name}: neighbouring rows (24 lags)"));
+        names.push(format!("{name}: shifts between runs"));
+        names.push(format!("{name}: shifts of intervals of rows"));
+        if rule.fixed_sigma[c].is_some() {
+            names.push(format!("{name}: size against the calibrated noise"));
+        }
+    }
+    names
+}
+
+fn omnibus(problem: &Problem<'_>, white: &[Vec<Vec<f64>>], rule: &NoiseRule) -> Vec<f64> {
+    let mut statistics = Vec::new();
+    for c in 0..problem.channels() {
+        let runs: Vec<&[f64]> = white.iter().map(|row| row[c].as_slice()).collect();
+        let total: f64 = runs.iter().flat_map(|r| r.iter()).map(|v| v * v).sum();
+        let rows: usize = runs.iter().map(|r| r.len()).sum();
+        for lags in [8, 24] {
+            statistics.push(portmanteau(&runs, total, rows, lags));
+        }
+        statistics
+            .push(runs.iter().filter(|r| !r.is_empty()).map(|r| r.iter().sum::<f64>().powi(2) / r.len() as f64).sum());
+        statistics.push(scan(&runs));
+        if rule.fixed_sigma[c].is_some() {
+            statistics.push(total / rows.max(1) as f64);
+        }
+    }
+    statistics
+}
+
+/// Ljung and Box 1978 (doi:10.1093/biomet/65.2.297), correlations pooled over runs.
+fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
+    let n = rows as f64;
+    (1..=lags)
+        .map(|lag| {
+            let pairs: usize = runs.iter().map(|r| r.len().saturating_sub(lag)).sum();
+            if pairs < 4 || total <= 0.0 {
+                return 0.0;
+            }
+            let sum: f64 = runs.iter().map(|r| r.iter().zip(r.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>()).sum();
+            n * n * (sum / total).powi(2) / pairs as f64
+        })
+        .sum()
+}
+
+/// The largest standardised sum over an interval of relative position that all runs share.
+fn scan(runs: &[&[f64]]) -> f64 {
+    const BINS: usize = 16;
+    let mut sums = [0.0; BINS + 1];
+    let mut counts = [0.0; BINS + 1];
+    for run in runs {
+        for (i, v) in run.iter().enumerate() {
+            let bin = i * BINS / run.len();
+            sums[bin + 1] += v;
+            counts[bin + 1] += 1.0;
+        }
+    }
+    for i in 0..BINS {
+        sums[i + 1] += sums[i];
+        counts[i + 1] += counts[i];
+    }
+    let mut best: f64 = 0.0;
+    for i in 0..BINS {
+        for j in i + 1..=BINS {
+            let n: f64 = counts[j] - counts[i];
+            if n > 0.0 {
+                best = best.max((sums[j] - sums[i]).abs() / n.sqrt());
+            }
+        }
+    }
+    best
+}
+
+/// The upper tail of a statistic's null distribution: a gamma law with its mean and variance.
+///
+/// It only puts the tests of a bank on one scale; the p-value of the whole bank is counted, not read from this law.
+struct Tail {
+    law: Option<Gamma>,
+}
+
+impl Tail {
+    fn new(values: impl Iterator<Item = f64>) -> Self {
+        let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+        let n = values.len().max(1) as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+        let law = (mean > 1e-9 && variance > 1e-18).then(|| Gamma::new(mean * mean / variance, mean / variance).ok());
+        Self { law: law.flatten() }
+    }
+
+    fn p(&self, value: f64) -> f64 {
+        match &self.law {
+            Some(law) if value > 0.0 && value.is_finite() => law.sf(value).clamp(1e-300, 1.0),
+            _ => 1.0,
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! Which mechanisms have to be on: evidence of sets of mechanisms, and how well each predicts what it has not seen.
+
+use rayon::prelude::*;
+
+use crate::adequacy::{draw, residuals};
+use crate::bank::Bank;
+use crate::data::Recording;
+use crate::fit::{Fit, NoiseRule, NoiseState, covariance, fit, own_prior_width, solve};
+use crate::linalg::{cholesky, log_determinant};
+use crate::model::PredictError;
+use crate::problem::{Problem, Selection};
+
+/// A set of mechanisms, fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    /// Indices into the model's mechanisms, rising.
+    pub(crate) set: Vec<usize>,
+    pub(crate) selection: Selection,
+    pub(crate) fit: Fit,
+    /// Log marginal likelihood plus log prior odds of the set.
+    pub(crate) evidence: f64,
+    /// Why it is no explanation.
+    pub(crate) ruled_out: Option<String>,
+}
+
+/// Log prior odds of each further mechanism.
+const LOG_PRIOR_ODDS: f64 = -1.5;
+/// A mechanism's strength is thought equally likely on a log scale over this many e-folds.
+const LOG_RANGE: f64 = 9.21;
+/// How many sets of one size are tried with one more mechanism.
+const BEAM: usize = 3;
+/// The largest set tried.
+const MOST: usize = 3;
+
+/// Fits one set, from several starts.
+pub(crate) fn candidate(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    set: &[usize],
+    terms: &[usize],
+    near: &Fit,
+    hints: &[(usize, f64)],
+) -> Result<Candidate, PredictError> {
+    let selection = problem.select(set, terms);
+    let added: Vec<usize> =
+        selection.shared.iter().zip(&selection.added_shared).filter(|(_, a)| **a).map(|(s, _)| *s).collect();
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    if !hints.is_empty() {
+        let mut start = near.shared.clone();
+        hints.iter().filter(|(slot, _)| added.contains(slot)).for_each(|&(slot, value)| start[slot] = value);
+        starts.push(start);
+    } else {
+        for side in [0.0, 0.3, -0.3] {
+            let mut start = near.shared.clone();
+            for &slot in &added {
+                let table = &problem.shared;
+                start[slot] = (table.start[slot] + side * table.scale[slot]).clamp(table.lower[slot], table.upper[slot]);
+            }
+            if !starts.contains(&start) {
+                starts.push(start);
+            }
+        }
+    }
+    // Sigmas of the baseline's fit are too large where it misses; a smaller one only sharpens the same surface.
+    let mut best: Option<Fit> = None;
+    let mut failure = None;
+    for start in &starts {
+        match solve(problem, &selection, &near.noise, start, &near.own) {
+            Ok(fit) if best.as_ref().is_none_or(|b| fit.chi2 < b.chi2 - 1e-9) => best = Some(fit),
+            Ok(_) => {}
+            Err(error) => failure = Some(error),
+        }
+    }
+    let Some(first) = best else {
+        return Err(failure.unwrap_or(PredictError { run: "(all)".into(), reason: "no start was possible".into() }));
+    };
+    let fit = fit(problem, &selection, rule, (&first.shared, &first.own), Some(&first.noise))?;
+    let (evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
+    Ok(Candidate { set: set.to_vec(), selection, fit, evidence, ruled_out })
+}
+
+/// Laplace's approximation of the marginal likelihood, and whether the fit is physical.
+fn evidence(
+    problem: &Problem<'_>,
+    set: &[usize],
+    terms: &[usize],
+    selection: &Selection,
+    fit: &Fit,
+) -> (f64, Option<String>) {
+    let name = |slot: usize| problem.spec().parameters[problem.shared.index[slot]].name.clone();
+    let added: Vec<usize> = (0..selection.shared.len()).filter(|&i| selection.added_shared[i]).collect();
+    let bound = added.iter().map(|&i| selection.shared[i]).find(|slot| fit.at_bound.contains(slot));
+    let Some(covariance) = covariance(&fit.information) else {
+        return (f64::NEG_INFINITY, Some("these data do not determine it".into()));
+    };
+    let mut factor = fit.information.clone();
+    let kept = cholesky(&mut factor, 0.0);
+    let two_pi = std::f64::consts::TAU.ln();
+    let mut value = fit.log_likelihood + 0.5 * (selection.shared.len() as f64 * two_pi - log_determinant(&factor, &kept));
+    for (i, added) in selection.added_own.iter().enumerate() {
+        if *added {
+            value -= fit.own.len() as f64 * own_prior_width(problem, selection, i).ln();
+        }
+    }
+    // Each free parameter's prior belongs to the first mechanism or term that frees it.
+    let mut taken: Vec<usize> = Vec::new();
+    let spec = problem.spec();
+    let groups = set
+        .iter()
+        .map(|&m| spec.mechanisms[m].parameters.iter().chain(&spec.mechanisms[m].companions).copied().collect())
+        .chain(terms.iter().map(|&t| vec![spec.terms[t].parameter]));
+    for group in groups {
+        let group: Vec<usize> = group;
+        let mine: Vec<usize> = added
+            .iter()
+            .copied()
+            .filter(|i| {
+                let slot = selection.shared[*i];
+                group.contains(&problem.shared.index[slot]) && !taken.contains(i)
+            })
+            .collect();
+        taken.extend(&mine);
+        value += LOG_PRIOR_ODDS;
+        if mine.is_empty() {
+            continue;
+        }
+        let dimension = mine.len() as f64;
+        let mut square = 0.0;
+        let mut one_sided = false;
+        for &i in &mine {
+            let slot = selection.shared[i];
+            let scale = problem.shared.scale[slot];
+            square += ((fit.shared[slot] - problem.shared.start[slot]).powi(2) + covariance[(i, i)]) / (scale * scale);
+            value -= scale.ln();
+            one_sided |= problem.shared.lower[slot] >= problem.shared.start[slot];
+        }
+        let sphere = 2.0 * std::f64::consts::PI.powf(dimension / 2.0) / statrs::function::gamma::gamma(dimension / 2.0);
+        let sphere = if one_sided { 0.5 * sphere } else { sphere };
+        value -= sphere.ln() + dimension * 0.5 * square.ln() + LOG_RANGE.ln();
+    }
+    let ruled_out = bound.map(|slot| format!("{} ended at its bound of {}", name(slot), fit.shared[slot])).or_else(|| {
+        (!fit.converged).then(|| "its fit did not converge".to_owned())
+    });
+    (value, ruled_out)
+}
+
+/// Tries sets of mechanisms: each alone, then the best ones with one more, to three.
+pub(crate) fn search(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    baseline: Candidate,
+    allowed: &[usize],
+    tell: &(dyn Fn(f64) -> bool + Sync),
+) -> Option<Vec<Candidate>> {
+    let mut all = vec![baseline];
+    let mut layer: Vec<usize> = vec![0];
+    for size in 1..=MOST {
+        let mut wanted: Vec<(Vec<usize>, usize)> = Vec::new();
+        for &parent in &layer {
+            for &m in allowed {
+                let mut set = all[parent].set.clone();
+                if !set.contains(&m) {
+                    set.push(m);
+                    set.sort_unstable();
+                    if !wanted.iter().any(|(s, _)| *s == set) {
+                        wanted.push((set, parent));
+                    }
+                }
+            }
+        }
+        let fitted: Vec<Candidate> = wanted
+            .par_iter()
+            .filter_map(|(set, parent)| {
+                let parent = &all[*parent];
+                let hints = hints(problem, &all, set);
+                let mut found = candidate(problem, rule, set, &[], &parent.fit, &[]).ok();
+                if size > 1
+                    && let Ok(other) = candidate(problem, rule, set, &[], &parent.fit, &hints)
+                    && found.as_ref().is_none_or(|f| other.fit.log_likelihood > f.fit.log_likelihood + 1e-6)
+                {
+                    found = Some(other);
+                }
+                found
+            })
+            .collect();
+        if !tell(size as f64 / MOST as f64) {
+            return None;
+        }
+        let before = best_evidence(&all);
+        let first = all.len();
+        all.extend(fitted);
+        let mut order: Vec<usize> = (first..all.len()).filter(|&i| all[i].evidence.is_finite()).collect();
+        order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
+        if size > 1 && best_evidence(&all) <= before {
+            break;
+        }
+        order.truncate(BEAM);
+        layer = order;
+    }
+    Some(all)
+}
+
+fn best_evidence(all: &[Candidate]) -> f64 {
+    all.iter().filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Values of a set's parameters from the fits of its members alone.
+fn hints(problem: &Problem<'_>, all: &[Candidate], set: &[usize]) -> Vec<(usize, f64)> {
+    let mut hints = Vec::new();
+    for &m in set {
+        let Some(single) = all.iter().find(|c| c.set == [m]) else { continue };
+        for &p in &problem.spec().mechanisms[m].parameters {
+            if let Some(slot) = problem.shared.index.iter().position(|&i| i == p) {
+                hints.push((slot, single.fit.shared[slot]));
+            }
+        }
+    }
+    hints
+}
+
+/// Whether every parameter that `small` frees is also freed by `large`.
+pub(crate) fn nested(small: &Candidate, large: &Candidate) -> bool {
+    small.selection.shared.iter().all(|s| large.selection.shared.contains(s))
+        && small.selection.own.iter().all(|s| large.selection.own.contains(s))
+}
+
+/// What a fit predicts of data that it has not seen.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct HeldOut {
+    /// Log density of the unseen data.
+    pub(crate) log_score: f64,
+    /// Root mean square error, by channel.
+    pub(crate) rmse: Vec<f64>,
+}
+
+/// Leaves out each run (or each of five groups of runs) in turn; a single run's end is predicted from its beginning.
+pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<HeldOut, PredictError> {
+    let runs = problem.recording.runs.len();
+    let mut squares = vec![(0.0, 0usize); problem.channels()];
+    let mut log_score = 0.0;
+    let mut add = |residual: &[Vec<Vec<f64>>], keep: &dyn Fn(usize, usize, usize) -> bool| {
+        for (r, row) in residual.iter().enumerate() {
+            for (c, column) in row.iter().enumerate() {
+                for (i, v) in column.iter().enumerate().filter(|(i, _)| keep(r, c, *i)) {
+                    let _ = i;
+                    squares[c].0 += v * v;
+                    squares[c].1 += 1;
+                }
+            }
+        }
+    };
+    let none = Selection { shared: Vec::new(), added_shared: Vec::new(), ..candidate.selection.clone() };
+    let noise = &candidate.fit.noise;
+    if runs > 1 {
+        let folds = runs.min(5);
+        for fold in 0..folds {
+            let part = |inside: bool| -> Vec<usize> { (0..runs).filter(|r| (r % folds == fold) == inside).collect() };
+            let (test, train) = (part(true), part(false));
+            let pick = |ids: &[usize]| -> (Recording, Vec<Vec<f64>>) {
+                let mut recording = problem.recording.clone();
+                recording.runs = ids.iter().map(|&r| problem.recording.runs[r].clone()).collect();
+                (recording, ids.iter().map(|&r| candidate.fit.own[r].clone()).collect())
+            };
+            let (recording, own) = pick(&train);
+            let trained = solve(&problem.with(recording), &candidate.selection, noise, &candidate.fit.shared, &own)?;
+            let (recording, own) = pick(&test);
+            let unseen = problem.with(recording);
+            let tested = solve(&unseen, &none, noise, &trained.shared, &own)?;
+            log_score += tested.log_likelihood;
+            add(&residuals(&unseen, &tested)?, &|_, _, _| true);
+        }
+    } else {
+        let rows = problem.recording.runs[0].len();
+        for (seen, until) in [(rows / 2, rows * 3 / 4), (rows * 3 / 4, rows)] {
+            let cut = |end: usize| {
+                let mut recording = problem.recording.clone();
+                for column in &mut recording.runs[0].outputs {
+                    column[end..].fill(f64::NAN);
+                }
+                problem.with(recording)
+            };
+            let (begin, both) = (cut(seen), cut(until));
+            let trained = solve(&begin, &candidate.selection, noise, &candidate.fit.shared, &candidate.fit.own)?;
+            let known = solve(&begin, &none, noise, &trained.shared, &trained.own)?;
+            let all = solve(&both, &none, noise, &trained.shared, &trained.own)?;
+            log_score += all.log_likelihood - known.log_likelihood;
+            let valid = &both.rows[0].valid;
+            add(&residuals(&both, &known)?, &|_, c, i| valid[c][i] >= seen);
+        }
+    }
+    let rmse = squares.iter().map(|(sum, n)| (sum / (*n).max(1) as f64).sqrt()).collect();
+    Ok(HeldOut { log_score, rmse })
+}
+
+/// `matrix[i][j]`: how often data simulated from rival `i` favour rival `j`.
+pub(crate) fn confusion(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    rivals: &[&Candidate],
+    draws: usize,
+    seed: u64,
+) -> Result<Vec<Vec<f64>>, PredictError> {
+    let observed = |rival: &Candidate| residuals(problem, &rival.fit);
+    let mut shapes: Vec<usize> = rivals.iter().flat_map(|r| r.fit.noise.shape.iter().copied()).chain([0]).collect();
+    shapes.sort_unstable();
+    shapes.dedup();
+    let mut banks = Vec::with_capacity(rivals.len());
+    let mut constants = Vec::with_capacity(rivals.len());
+    let mut own = Vec::with_capacity(rivals.len());
+    for rival in rivals {
+        let mut bank = Bank::new(problem, &rival.selection, &rival.fit, &[], rule)?.without_alternatives();
+        bank.play(&shapes);
+        let residual = observed(rival)?;
+        constants.push(rival.evidence - bank.read(&residual).score);
+        banks.push(bank);
+        own.push(residual);
+    }
+    let matrix = (0..rivals.len())
+        .map(|truth| {
+            let noise = noise_pairs(&rivals[truth].fit.noise);
+            let winners: Vec<usize> = (0..draws as u64)
+                .into_par_iter()
+                .map(|k| {
+                    let base = draw(problem, &noise, rule, seed ^ (0xc0f + truth as u64), k);
+                    let score = |j: usize| {
+                        // Simulated less predicted by j: noise, plus what truth predicts more than j does.
+                        let data: Vec<Vec<Vec<f64>>> = base
+                            .iter()
+                            .enumerate()
+                            .map(|(r, row)| {
+                                row.iter()
+                                    .enumerate()
+                                    .map(|(c, column)| {
+                                        (0..column.len())
+                                            .map(|i| column[i] + own[j][r][c][i] - own[truth][r][c][i])
+                                            .collect()
+                                    })
+                                    .collect()
+                            })
+                            .collect();
+                        banks[j].read(&data).score + constants[j]
+                    };
+                    let scores: Vec<f64> = (0..rivals.len()).map(score).collect();
+                    (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).unwrap_or(truth)
+                })
+                .collect();
+            (0..rivals.len())
+                .map(|j| winners.iter().filter(|w| **w == j).count() as f64 / draws.max(1) as f64)
+                .collect()
+        })
+        .collect();
+    Ok(matrix)
+}
+
+/// Shape and sigma of each channel.
+fn noise_pairs(noise: &NoiseState) -> Vec<(usize, f64)> {
+    noise.shape.iter().copied().zip(noise.sigma.iter().copied()).collect()
+}

@@ -1,0 +1,103 @@
+//! The next experiment: the action within the rig's range for which the rivals predict the most different things.
+
+use nalgebra::DMatrix;
+
+use crate::compare::Candidate;
+use crate::data::Recording;
+use crate::diagnosis::NextExperiment;
+use crate::fit::{NoiseState, whitened_columns};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward};
+use crate::model::{Experiment, PredictError};
+use crate::problem::{Problem, Selection};
+
+/// Below this expected log Bayes factor an experiment is not worth doing.
+const WORTHWHILE: f64 = 1.0;
+
+/// The experiment with the largest expected log Bayes factor between a rival and its nearest other.
+pub(crate) fn best(
+    problem: &Problem<'_>,
+    rivals: &[&Candidate],
+    experiments: &[Experiment],
+) -> Result<Option<NextExperiment>, PredictError> {
+    let mut best: Option<(f64, &Experiment)> = None;
+    for experiment in experiments {
+        let mut nearest = f64::INFINITY;
+        for (i, truth) in rivals.iter().enumerate() {
+            for (j, other) in rivals.iter().enumerate() {
+                if i != j && let Ok(value) = expected(problem, truth, other, experiment) {
+                    nearest = nearest.min(value);
+                }
+            }
+        }
+        if nearest.is_finite() && best.is_none_or(|(b, _)| nearest > b + 1e-9) {
+            best = Some((nearest, experiment));
+        }
+    }
+    let names = |set: &Candidate| -> Vec<String> {
+        set.set.iter().map(|&m| problem.spec().mechanisms[m].id.clone()).collect()
+    };
+    Ok(best.filter(|(value, _)| *value >= WORTHWHILE).map(|(value, experiment)| {
+        let mut separates: Vec<String> = rivals.iter().flat_map(|r| names(r)).collect();
+        separates.sort();
+        separates.dedup();
+        NextExperiment {
+            action: experiment.action.clone(),
+            words: experiment.words.clone(),
+            separates,
+            expected_log_bayes_factor: value,
+        }
+    }))
+}
+
+/// Expected log Bayes factor of `truth` over `other` after the experiment: half the squared distance that is left once
+/// `other` has moved its parameters as far as the present data allow.
+fn expected(
+    problem: &Problem<'_>,
+    truth: &Candidate,
+    other: &Candidate,
+    experiment: &Experiment,
+) -> Result<f64, PredictError> {
+    let channels = problem.channels();
+    let mut recording = Recording { runs: experiment.runs.clone(), ..problem.recording.clone() };
+    for (run, own) in recording.runs.iter_mut().zip(&experiment.own) {
+        let n = run.len();
+        let mut out = vec![0.0; n * channels];
+        problem.model.predict(run, &truth.fit.shared, own, &mut out)?;
+        run.outputs = (0..channels).map(|c| out[c * n..(c + 1) * n].to_vec()).collect();
+    }
+    let future = problem.with(recording);
+    // The rivals' noise is a property of the rig: white at the level that the present data show.
+    let noise = NoiseState { shape: vec![0; channels], sigma: truth.fit.noise.sigma.clone() };
+    let selection: &Selection = &other.selection;
+    let (n_own, n_shared) = (selection.own.len(), selection.shared.len());
+    let mut information: DMatrix<f64> = other.fit.information.clone();
+    let mut right = vec![0.0; n_shared];
+    let mut total = 0.0;
+    for run in 0..future.rows.len() {
+        let columns =
+            whitened_columns(&future, selection, &noise, run, &other.fit.shared, &experiment.own[run])?;
+        let residual = &columns[n_own + n_shared];
+        total += dot(residual, residual);
+        let mut factor = DMatrix::from_fn(n_own, n_own, |i, j| dot(&columns[i], &columns[j]));
+        let kept = cholesky(&mut factor, RANK_FLOOR);
+        let border = |j: usize| {
+            let mut column: Vec<f64> = (0..n_own).map(|i| dot(&columns[i], &columns[j])).collect();
+            forward(&factor, &kept, &mut column);
+            column
+        };
+        let borders: Vec<Vec<f64>> = (n_own..=n_own + n_shared).map(border).collect();
+        total -= dot(&borders[n_shared], &borders[n_shared]);
+        for i in 0..n_shared {
+            for j in 0..n_shared {
+                information[(i, j)] +=
+                    dot(&columns[n_own + i], &columns[n_own + j]) - dot(&borders[i], &borders[j]);
+            }
+            right[i] += dot(&columns[n_own + i], residual) - dot(&borders[i], &borders[n_shared]);
+        }
+    }
+    let gradient = right.clone();
+    let kept = cholesky(&mut information, RANK_FLOOR);
+    forward(&information, &kept, &mut right);
+    backward(&information, &kept, &mut right);
+    Ok(0.5 * (total - dot(&gradient, &right)).max(0.0))
+}
