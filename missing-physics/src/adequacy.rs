@@ -23,6 +23,9 @@ pub(crate) struct Adequacy {
 /// Relative uncertainty of a calibrated sigma.
 const CALIBRATION_UNCERTAINTY: f64 = 0.02;
 
+/// A test that looks for nothing in particular must be this much surer than one that looks for a listed mechanism.
+const UNDIRECTED_WEIGHT: f64 = 3.0;
+
 /// Tests a fitted model against the mechanisms `rivals`, smooth functions of every variable, serial correlation, shifts of
 /// runs and of intervals, and the calibrated noise.
 pub(crate) fn test(
@@ -38,12 +41,15 @@ pub(crate) fn test(
     let observed = residuals(problem, fit)?;
     // The noise of the null worlds is that of the fitted model; shapes that such worlds never choose, nor these data
     // under any alternative, need not be tried again for each of them.
-    let truth: Vec<(usize, f64)> = fit.noise.shape.iter().copied().zip(fit.noise.sigma.iter().copied()).collect();
+    let truth: Vec<(usize, f64)> =
+        fit.noise.shape.iter().copied().zip(fit.noise.sigma.iter().copied()).collect();
     let mut wanted: Vec<bool> = vec![false; problem.shapes.len()];
     fit.noise.shape.iter().for_each(|&s| wanted[s] = true);
     wanted[0] = true;
-    let pilots: Vec<Reading> =
-        (0..12u64).into_par_iter().map(|k| bank.read(&draw(problem, &truth, rule, seed ^ 0x5eed, k))).collect();
+    let pilots: Vec<Reading> = (0..12u64)
+        .into_par_iter()
+        .map(|k| bank.read(&draw(problem, &truth, rule, seed ^ 0x5eed, k)))
+        .collect();
     for reading in pilots.iter().chain([&bank.read(&observed)]) {
         reading.noise.iter().for_each(|&(s, _)| wanted[bank.in_play()[s]] = true);
     }
@@ -63,7 +69,14 @@ pub(crate) fn test(
         .map(|k| statistics(&draw(problem, &truth, rule, seed, k)))
         .collect();
     let tails: Vec<Tail> = (0..seen.len()).map(|t| Tail::new(null.iter().map(|row| row[t]))).collect();
-    let smallest = |row: &[f64]| row.iter().zip(&tails).map(|(x, tail)| tail.p(*x)).fold(1.0, f64::min);
+    let directed = bank.mechanisms;
+    let smallest = |row: &[f64]| {
+        let weighted = row.iter().zip(&tails).enumerate().map(|(t, (x, tail))| {
+            let weight = if t < directed { 1.0 } else { UNDIRECTED_WEIGHT };
+            weight * tail.p(*x)
+        });
+        weighted.fold(f64::INFINITY, f64::min)
+    };
     let own = smallest(&seen);
     let below = null.iter().filter(|row| smallest(row) <= own).count();
     let floor = 1.0 / (replicates as f64 + 1.0);
@@ -88,7 +101,9 @@ pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Vec<
             let mut out = vec![0.0; n * problem.channels()];
             problem.model.predict(data, &fit.shared, &fit.own[run], &mut out)?;
             Ok((0..problem.channels())
-                .map(|c| problem.rows[run].valid[c].iter().map(|&i| data.outputs[c][i] - out[c * n + i]).collect())
+                .map(|c| {
+                    problem.rows[run].valid[c].iter().map(|&i| data.outputs[c][i] - out[c * n + i]).collect()
+                })
                 .collect())
         })
         .collect()
@@ -151,8 +166,12 @@ fn omnibus(problem: &Problem<'_>, white: &[Vec<Vec<f64>>], rule: &NoiseRule) -> 
         for lags in [8, 24] {
             statistics.push(portmanteau(&runs, total, rows, lags));
         }
-        statistics
-            .push(runs.iter().filter(|r| !r.is_empty()).map(|r| r.iter().sum::<f64>().powi(2) / r.len() as f64).sum());
+        statistics.push(
+            runs.iter()
+                .filter(|r| !r.is_empty())
+                .map(|r| r.iter().sum::<f64>().powi(2) / r.len() as f64)
+                .sum(),
+        );
         statistics.push(scan(&runs));
         if rule.fixed_sigma[c].is_some() {
             statistics.push(total / rows.max(1) as f64);
@@ -170,7 +189,8 @@ fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
             if pairs < 4 || total <= 0.0 {
                 return 0.0;
             }
-            let sum: f64 = runs.iter().map(|r| r.iter().zip(r.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>()).sum();
+            let sum: f64 =
+                runs.iter().map(|r| r.iter().zip(r.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>()).sum();
             n * n * (sum / total).powi(2) / pairs as f64
         })
         .sum()
@@ -217,7 +237,8 @@ impl Tail {
         let n = values.len().max(1) as f64;
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-        let law = (mean > 1e-9 && variance > 1e-18).then(|| Gamma::new(mean * mean / variance, mean / variance).ok());
+        let law = (mean > 1e-9 && variance > 1e-18)
+            .then(|| Gamma::new(mean * mean / variance, mean / variance).ok());
         Self { law: law.flatten() }
     }
 

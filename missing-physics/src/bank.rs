@@ -51,6 +51,8 @@ pub(crate) struct Bank<'a> {
     n_own: usize,
     n_shared: usize,
     pub(crate) alternatives: Vec<Alternative>,
+    /// How many of the alternatives, the first ones, are mechanisms.
+    pub(crate) mechanisms: usize,
     rule: NoiseRule,
     /// Degrees of freedom of each channel's noise.
     freedom: Vec<f64>,
@@ -94,17 +96,25 @@ impl<'a> Bank<'a> {
             for &p in mechanism.parameters.iter().chain(&mechanism.companions) {
                 let slot = problem.slots[p];
                 let is_shared = spec.parameters[p].scope == crate::model::Scope::Shared;
-                let (list, target) = if is_shared { (&mut wide.shared, &mut shared) } else { (&mut wide.own, &mut own) };
+                let (list, target) =
+                    if is_shared { (&mut wide.shared, &mut shared) } else { (&mut wide.own, &mut own) };
                 let at = list.iter().position(|&s| s == slot).unwrap_or_else(|| {
                     list.push(slot);
                     list.len() - 1
                 });
-                let in_model = if is_shared { selection.shared.contains(&slot) } else { selection.own.contains(&slot) };
+                let in_model =
+                    if is_shared { selection.shared.contains(&slot) } else { selection.own.contains(&slot) };
                 if !in_model {
                     target.push(at);
                 }
                 let info = &spec.parameters[p];
-                sign = if info.lower >= info.start { 1.0 } else if info.upper <= info.start { -1.0 } else { 0.0 };
+                sign = if info.lower >= info.start {
+                    1.0
+                } else if info.upper <= info.start {
+                    -1.0
+                } else {
+                    0.0
+                };
             }
             if own.is_empty() && shared.is_empty() {
                 continue;
@@ -128,6 +138,7 @@ impl<'a> Bank<'a> {
                 sign,
             })
             .collect();
+        let mechanisms = alternatives.len();
         let base = n_own + n_shared + extra_own + extra_shared;
         let curves = Curves::new(problem, fit)?;
         for (channel, quantity) in problem.recording.channels.iter().enumerate() {
@@ -173,8 +184,17 @@ impl<'a> Bank<'a> {
                 (rows - used as f64 - n_shared as f64 * rows / counted.max(1) as f64).max(1.0)
             })
             .collect();
-        let mut bank =
-            Self { problem, in_play: Vec::new(), blocks, n_own, n_shared, alternatives, rule: rule.clone(), freedom };
+        let mut bank = Self {
+            problem,
+            in_play: Vec::new(),
+            blocks,
+            n_own,
+            n_shared,
+            alternatives,
+            mechanisms,
+            rule: rule.clone(),
+            freedom,
+        };
         bank.play(&rule.allowed);
         Ok(bank)
     }
@@ -240,7 +260,13 @@ impl<'a> Bank<'a> {
     }
 
     /// Fits the model with an alternative's columns added, for a given noise.
-    fn solve(&self, products: &Products, noise: &[(usize, f64)], own: &[usize], shared: &[usize]) -> Vec<Vec<f64>> {
+    fn solve(
+        &self,
+        products: &Products,
+        noise: &[(usize, f64)],
+        own: &[usize],
+        shared: &[usize],
+    ) -> Vec<Vec<f64>> {
         let (q, s) = (own.len(), shared.len());
         let mut information = DMatrix::zeros(s, s);
         let mut right = vec![0.0; s];
@@ -364,8 +390,10 @@ impl<'a> Bank<'a> {
             for (channel, state) in next.iter_mut().enumerate() {
                 let mut best = f64::NEG_INFINITY;
                 for shape in 0..self.in_play.len() {
-                    let (squares, log_determinant) = self.squares(products, channel, shape, &ids, &coefficients);
-                    let (value, sigma) = self.channel_score(channel, squares, log_determinant);
+                    let (squares, log_determinant) =
+                        self.squares(products, channel, shape, &ids, &coefficients);
+                    let (mut value, sigma) = self.channel_score(channel, squares, log_determinant);
+                    value += self.problem.shapes[self.in_play[shape]].log_prior();
                     if value > best {
                         best = value;
                         *state = (shape, sigma);
@@ -422,7 +450,8 @@ impl<'a> Bank<'a> {
                     .map(|(channel, raw)| {
                         let (shape, sigma) = reading.noise[channel];
                         let mut y = raw.clone();
-                        for (column, x) in self.blocks[run][channel].raw[..used].iter().zip(&reading.coefficients[run])
+                        for (column, x) in
+                            self.blocks[run][channel].raw[..used].iter().zip(&reading.coefficients[run])
                         {
                             y.iter_mut().zip(column).for_each(|(v, c)| *v -= x * c);
                         }
@@ -473,9 +502,8 @@ impl Curves {
     pub(crate) fn new(problem: &Problem<'_>, fit: &Fit) -> Result<Self, PredictError> {
         let recording = &problem.recording;
         let inputs = recording.variables.len();
-        let mut columns: Vec<Vec<Vec<f64>>> = (0..inputs)
-            .map(|v| recording.runs.iter().map(|run| run.inputs[v].clone()).collect())
-            .collect();
+        let mut columns: Vec<Vec<Vec<f64>>> =
+            (0..inputs).map(|v| recording.runs.iter().map(|run| run.inputs[v].clone()).collect()).collect();
         let mut predictions = vec![Vec::new(); problem.channels()];
         for (run, data) in recording.runs.iter().enumerate() {
             let n = data.len();

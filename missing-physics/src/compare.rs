@@ -54,7 +54,8 @@ pub(crate) fn candidate(
             let mut start = near.shared.clone();
             for &slot in &added {
                 let table = &problem.shared;
-                start[slot] = (table.start[slot] + side * table.scale[slot]).clamp(table.lower[slot], table.upper[slot]);
+                start[slot] = (table.start[slot] + side * table.scale[slot])
+                    .clamp(table.lower[slot], table.upper[slot]);
             }
             if !starts.contains(&start) {
                 starts.push(start);
@@ -72,7 +73,9 @@ pub(crate) fn candidate(
         }
     }
     let Some(first) = best else {
-        return Err(failure.unwrap_or(PredictError { run: "(all)".into(), reason: "no start was possible".into() }));
+        return Err(
+            failure.unwrap_or(PredictError { run: "(all)".into(), reason: "no start was possible".into() })
+        );
     };
     let fit = fit(problem, &selection, rule, (&first.shared, &first.own), Some(&first.noise))?;
     let (evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
@@ -96,7 +99,8 @@ fn evidence(
     let mut factor = fit.information.clone();
     let kept = cholesky(&mut factor, 0.0);
     let two_pi = std::f64::consts::TAU.ln();
-    let mut value = fit.log_likelihood + 0.5 * (selection.shared.len() as f64 * two_pi - log_determinant(&factor, &kept));
+    let mut value =
+        fit.log_likelihood + 0.5 * (selection.shared.len() as f64 * two_pi - log_determinant(&factor, &kept));
     for (i, added) in selection.added_own.iter().enumerate() {
         if *added {
             value -= fit.own.len() as f64 * own_prior_width(problem, selection, i).ln();
@@ -107,7 +111,9 @@ fn evidence(
     let spec = problem.spec();
     let groups = set
         .iter()
-        .map(|&m| spec.mechanisms[m].parameters.iter().chain(&spec.mechanisms[m].companions).copied().collect())
+        .map(|&m| {
+            spec.mechanisms[m].parameters.iter().chain(&spec.mechanisms[m].companions).copied().collect()
+        })
         .chain(terms.iter().map(|&t| vec![spec.terms[t].parameter]));
     for group in groups {
         let group: Vec<usize> = group;
@@ -130,17 +136,19 @@ fn evidence(
         for &i in &mine {
             let slot = selection.shared[i];
             let scale = problem.shared.scale[slot];
-            square += ((fit.shared[slot] - problem.shared.start[slot]).powi(2) + covariance[(i, i)]) / (scale * scale);
+            square += ((fit.shared[slot] - problem.shared.start[slot]).powi(2) + covariance[(i, i)])
+                / (scale * scale);
             value -= scale.ln();
             one_sided |= problem.shared.lower[slot] >= problem.shared.start[slot];
         }
-        let sphere = 2.0 * std::f64::consts::PI.powf(dimension / 2.0) / statrs::function::gamma::gamma(dimension / 2.0);
+        let sphere = 2.0 * std::f64::consts::PI.powf(dimension / 2.0)
+            / statrs::function::gamma::gamma(dimension / 2.0);
         let sphere = if one_sided { 0.5 * sphere } else { sphere };
         value -= sphere.ln() + dimension * 0.5 * square.ln() + LOG_RANGE.ln();
     }
-    let ruled_out = bound.map(|slot| format!("{} ended at its bound of {}", name(slot), fit.shared[slot])).or_else(|| {
-        (!fit.converged).then(|| "its fit did not converge".to_owned())
-    });
+    let ruled_out = bound
+        .map(|slot| format!("{} ended at its bound of {}", name(slot), fit.shared[slot]))
+        .or_else(|| (!fit.converged).then(|| "its fit did not converge".to_owned()));
     (value, ruled_out)
 }
 
@@ -254,7 +262,9 @@ pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<H
     if runs > 1 {
         let folds = runs.min(5);
         for fold in 0..folds {
-            let part = |inside: bool| -> Vec<usize> { (0..runs).filter(|r| (r % folds == fold) == inside).collect() };
+            let part = |inside: bool| -> Vec<usize> {
+                (0..runs).filter(|r| (r % folds == fold) == inside).collect()
+            };
             let (test, train) = (part(true), part(false));
             let pick = |ids: &[usize]| -> (Recording, Vec<Vec<f64>>) {
                 let mut recording = problem.recording.clone();
@@ -262,7 +272,8 @@ pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<H
                 (recording, ids.iter().map(|&r| candidate.fit.own[r].clone()).collect())
             };
             let (recording, own) = pick(&train);
-            let trained = solve(&problem.with(recording), &candidate.selection, noise, &candidate.fit.shared, &own)?;
+            let trained =
+                solve(&problem.with(recording), &candidate.selection, noise, &candidate.fit.shared, &own)?;
             let (recording, own) = pick(&test);
             let unseen = problem.with(recording);
             let tested = solve(&unseen, &none, noise, &trained.shared, &own)?;
@@ -280,7 +291,8 @@ pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<H
                 problem.with(recording)
             };
             let (begin, both) = (cut(seen), cut(until));
-            let trained = solve(&begin, &candidate.selection, noise, &candidate.fit.shared, &candidate.fit.own)?;
+            let trained =
+                solve(&begin, &candidate.selection, noise, &candidate.fit.shared, &candidate.fit.own)?;
             let known = solve(&begin, &none, noise, &trained.shared, &trained.own)?;
             let all = solve(&both, &none, noise, &trained.shared, &trained.own)?;
             log_score += all.log_likelihood - known.log_likelihood;
@@ -301,7 +313,8 @@ pub(crate) fn confusion(
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, PredictError> {
     let observed = |rival: &Candidate| residuals(problem, &rival.fit);
-    let mut shapes: Vec<usize> = rivals.iter().flat_map(|r| r.fit.noise.shape.iter().copied()).chain([0]).collect();
+    let mut shapes: Vec<usize> =
+        rivals.iter().flat_map(|r| r.fit.noise.shape.iter().copied()).chain([0]).collect();
     shapes.sort_unstable();
     shapes.dedup();
     let mut banks = Vec::with_capacity(rivals.len());

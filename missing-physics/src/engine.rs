@@ -6,7 +6,8 @@ use crate::adequacy;
 use crate::compare::{Candidate, HeldOut, candidate, confusion, held_out, nested, search};
 use crate::data::{Recording, RecordingError};
 use crate::diagnosis::{
-    ChannelFit, ChannelNoise, Confusion, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
+    ChannelFit, ChannelNoise, Confusion, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport,
+    Verdict,
 };
 use crate::estimate::estimates;
 use crate::experiment;
@@ -42,7 +43,9 @@ pub enum DiagnoseError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// There are too few rows for the baseline's own parameters.
-    #[error("{rows} measured values are too few for the {parameters} parameters of the baseline and its noise")]
+    #[error(
+        "{rows} measured values are too few for the {parameters} parameters of the baseline and its noise"
+    )]
     TooFewRows {
         /// Measured values.
         rows: usize,
@@ -160,14 +163,16 @@ pub fn diagnose(
     }
     tell("predicting unseen data", 0.0)?;
     let base_score = held_out(&problem, &baseline)?;
-    let scores: Vec<Option<HeldOut>> = all.par_iter().map(|c| {
-        let wanted = c.set.len() <= 1 || best.is_some_and(|b| b.0.set == c.set);
-        if wanted && c.evidence.is_finite() { held_out(&problem, c).ok() } else { None }
-    }).collect();
+    let scores: Vec<Option<HeldOut>> = all
+        .par_iter()
+        .map(|c| {
+            let wanted = c.set.len() <= 1 || best.is_some_and(|b| b.0.set == c.set);
+            if wanted && c.evidence.is_finite() { held_out(&problem, c).ok() } else { None }
+        })
+        .collect();
     let score_of = |set: &[usize]| all.iter().position(|c| c.set == set).and_then(|i| scores[i].as_ref());
-    let explained = best.filter(|(c, p)| {
-        *p > enough && score_of(&c.set).is_some_and(|s| s.log_score > base_score.log_score)
-    });
+    let explained = best
+        .filter(|(c, p)| *p > enough && score_of(&c.set).is_some_and(|s| s.log_score > base_score.log_score));
 
     let final_fit = explained.map_or(&baseline.fit, |(c, _)| &c.fit);
     let mut diagnosis = work.skeleton(&adequacy, Verdict::Unexplained, final_fit)?;
@@ -203,7 +208,8 @@ pub fn diagnose(
             diagnosis.verdict = Verdict::Ambiguous;
             diagnosis.confused_with = rivals[1..].iter().map(|c| work.ids(&c.set)).collect();
             let matrix = confusion(&problem, &rule, &rivals, 100, options.seed)?;
-            diagnosis.confusion = Some(Confusion { sets: rivals.iter().map(|c| work.ids(&c.set)).collect(), matrix });
+            diagnosis.confusion =
+                Some(Confusion { sets: rivals.iter().map(|c| work.ids(&c.set)).collect(), matrix });
             tell("choosing the next experiment", 0.0)?;
             diagnosis.next_experiment = experiment::best(&problem, &rivals, experiments)?;
             let names: Vec<String> = rivals.iter().map(|c| work.names(&c.set)).collect();
@@ -237,7 +243,8 @@ fn rivals_subset(c: &Candidate, chosen: &Candidate) -> bool {
 /// Drops rivals that only add to another rival.
 fn keep_minimal(rivals: &mut Vec<&Candidate>) {
     let all = rivals.clone();
-    rivals.retain(|c| !all.iter().any(|o| o.set != c.set && nested(o, c) && o.evidence > c.evidence - EARNED));
+    rivals
+        .retain(|c| !all.iter().any(|o| o.set != c.set && nested(o, c) && o.evidence > c.evidence - EARNED));
 }
 
 fn listed(names: &[String]) -> String {
@@ -251,7 +258,11 @@ fn listed(names: &[String]) -> String {
 fn check(recording: &Recording, options: &Options) -> Result<(), DiagnoseError> {
     recording.check()?;
     if !(options.alpha > 0.0 && options.alpha < 0.5) {
-        return Err(DiagnoseError::Option { name: "alpha", value: options.alpha, expected: "above 0 and below 0.5" });
+        return Err(DiagnoseError::Option {
+            name: "alpha",
+            value: options.alpha,
+            expected: "above 0 and below 0.5",
+        });
     }
     if options.replicates < 19 {
         let value = options.replicates as f64;
@@ -308,8 +319,13 @@ fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         .collect();
     let rows: usize = problem.recording.runs.iter().map(|r| r.len()).sum();
     let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1);
-    let fixed_sigma = (0..problem.channels()).map(|c| recording.calibration.get(c).copied().flatten()).collect();
-    NoiseRule { fixed_sigma, allowed: if long { (0..problem.shapes.len()).collect() } else { vec![0] }, floor }
+    let fixed_sigma =
+        (0..problem.channels()).map(|c| recording.calibration.get(c).copied().flatten()).collect();
+    NoiseRule {
+        fixed_sigma,
+        allowed: if long { (0..problem.shapes.len()).collect() } else { vec![0] },
+        floor,
+    }
 }
 
 /// Sigma of each channel's rough part, whatever the model: what is left once everything smooth is taken away.
@@ -356,7 +372,8 @@ impl Work<'_> {
     }
 
     fn names(&self, set: &[usize]) -> String {
-        let names: Vec<String> = set.iter().map(|&m| self.problem.spec().mechanisms[m].name.clone()).collect();
+        let names: Vec<String> =
+            set.iter().map(|&m| self.problem.spec().mechanisms[m].name.clone()).collect();
         names.join(" with ")
     }
 
@@ -367,7 +384,8 @@ impl Work<'_> {
         last: &Fit,
     ) -> Result<Diagnosis, PredictError> {
         let recording = &self.problem.recording;
-        let pairs = |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
+        let pairs =
+            |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
         let mut remarks = Vec::new();
         if !self.baseline.fit.converged {
             remarks.push("the baseline's fit did not converge; its best estimate is used".to_owned());
@@ -447,7 +465,11 @@ impl Work<'_> {
         (0..self.problem.channels())
             .map(|c| {
                 let squares = recording.runs.iter().zip(predictions).flat_map(|(run, predicted)| {
-                    run.outputs[c].iter().zip(&predicted[c]).map(|(m, p)| (m - p).powi(2)).filter(|v| v.is_finite())
+                    run.outputs[c]
+                        .iter()
+                        .zip(&predicted[c])
+                        .map(|(m, p)| (m - p).powi(2))
+                        .filter(|v| v.is_finite())
                 });
                 let (sum, n) = squares.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
                 ChannelFit {
@@ -504,7 +526,13 @@ impl Work<'_> {
                     .map(|(_, p)| p)
                     .sum::<f64>()
                     .min(1.0),
-                parameters: estimates(self.problem, holder, &mechanism.parameters, &mechanism.derived, profile),
+                parameters: estimates(
+                    self.problem,
+                    holder,
+                    &mechanism.parameters,
+                    &mechanism.derived,
+                    profile,
+                ),
                 heldout_log_score_gain: score.map_or(f64::NAN, |s| s.log_score - base.log_score),
                 heldout_rmse: score.map_or(Vec::new(), |s| {
                     channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()

@@ -90,7 +90,13 @@ fn over_runs(candidate: &Candidate, info: &crate::model::Parameter, slot: usize)
 }
 
 /// The profile-likelihood interval of the `i`-th free shared parameter, where the quadratic one misleads.
-fn followed(problem: &Problem<'_>, candidate: &Candidate, i: usize, half: f64, quadratic: [f64; 2]) -> [f64; 2] {
+fn followed(
+    problem: &Problem<'_>,
+    candidate: &Candidate,
+    i: usize,
+    half: f64,
+    quadratic: [f64; 2],
+) -> [f64; 2] {
     let fit = &candidate.fit;
     let slot = candidate.selection.shared[i];
     let mut others: Selection = candidate.selection.clone();

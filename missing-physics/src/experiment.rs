@@ -24,7 +24,9 @@ pub(crate) fn best(
         let mut nearest = f64::INFINITY;
         for (i, truth) in rivals.iter().enumerate() {
             for (j, other) in rivals.iter().enumerate() {
-                if i != j && let Ok(value) = expected(problem, truth, other, experiment) {
+                if i != j
+                    && let Ok(value) = expected(problem, truth, other, experiment)
+                {
                     nearest = nearest.min(value);
                 }
             }

@@ -121,7 +121,8 @@ pub(crate) fn whitened_columns(
         };
         for k in 0..free {
             // The model lists shared columns first; the normal equations eliminate own ones first.
-            let source = if k < selection.own.len() { selection.shared.len() + k } else { k - selection.own.len() };
+            let source =
+                if k < selection.own.len() { selection.shared.len() + k } else { k - selection.own.len() };
             push(k, problem.pick(run, channel, &jacobian[source * rows..(source + 1) * rows]));
         }
         let residual: Vec<f64> = problem.rows[run].valid[channel]
@@ -205,7 +206,12 @@ fn linearise(
 }
 
 /// Schur complement over all runs: information of the shared parameters and their gradient.
-fn reduce(linear: &Linearised, eliminated: &[Eliminated], own: usize, shared: usize) -> (DMatrix<f64>, Vec<f64>) {
+fn reduce(
+    linear: &Linearised,
+    eliminated: &[Eliminated],
+    own: usize,
+    shared: usize,
+) -> (DMatrix<f64>, Vec<f64>) {
     let mut information = DMatrix::zeros(shared, shared);
     let mut gradient = vec![0.0; shared];
     for (normal, e) in linear.normals.iter().zip(eliminated) {
@@ -239,7 +245,8 @@ pub(crate) fn solve(
     let mut converged = false;
     let mut fixed = vec![false; n_shared];
     for _ in 0..MAX_ITERATIONS {
-        let eliminated: Vec<Eliminated> = linear.normals.iter().map(|n| eliminate(n, n_own, damping)).collect();
+        let eliminated: Vec<Eliminated> =
+            linear.normals.iter().map(|n| eliminate(n, n_own, damping)).collect();
         let (mut information, mut step) = reduce(&linear, &eliminated, n_own, n_shared);
         for (i, &slot) in selection.shared.iter().enumerate() {
             let (table, x) = (&problem.shared, shared[slot]);
@@ -272,7 +279,8 @@ pub(crate) fn solve(
             }
             backward(&e.factor, &e.kept, &mut right);
             for (i, &slot) in selection.own.iter().enumerate() {
-                values[slot] = (values[slot] + right[i]).clamp(problem.own.lower[slot], problem.own.upper[slot]);
+                values[slot] =
+                    (values[slot] + right[i]).clamp(problem.own.lower[slot], problem.own.upper[slot]);
             }
             debug_assert_eq!(normal.gram.nrows(), n_own + n_shared + 1);
         }
@@ -305,13 +313,23 @@ pub(crate) fn solve(
         log_likelihood -= 0.5 * e.log_determinant;
     }
     for channel in 0..problem.channels() {
+        log_likelihood += problem.shapes[noise.shape[channel]].log_prior();
         log_likelihood -= problem.count(channel) as f64 * noise.sigma[channel].ln();
         for run in 0..problem.rows.len() {
             log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
         }
     }
     let at_bound = (0..n_shared).filter(|&i| fixed[i]).map(|i| selection.shared[i]).collect();
-    Ok(Fit { shared, own, noise: noise.clone(), chi2: linear.chi2, log_likelihood, information, converged, at_bound })
+    Ok(Fit {
+        shared,
+        own,
+        noise: noise.clone(),
+        chi2: linear.chi2,
+        log_likelihood,
+        information,
+        converged,
+        at_bound,
+    })
 }
 
 /// How the noise is chosen while a model is fitted.
@@ -367,13 +385,16 @@ pub(crate) fn estimate_noise(
                 sums.rows += end - start;
             }
             let share = sums.rows as f64 / total.max(1) as f64;
-            let freedom = (sums.rows as f64 - sums.used as f64 - share * selection.shared.len() as f64).max(1.0);
+            let freedom =
+                (sums.rows as f64 - sums.used as f64 - share * selection.shared.len() as f64).max(1.0);
             let sigma = match rule.fixed_sigma[channel] {
                 Some(sigma) => sigma,
                 None => (sums.squares / freedom).sqrt().max(rule.floor[channel]),
             };
-            let score =
-                -freedom * sigma.ln() - 0.5 * sums.log_determinant - 0.5 * sums.squares / (sigma * sigma);
+            let score = problem.shapes[shape].log_prior()
+                - freedom * sigma.ln()
+                - 0.5 * sums.log_determinant
+                - 0.5 * sums.squares / (sigma * sigma);
             if score > best {
                 best = score;
                 state.shape[channel] = shape;

@@ -97,10 +97,14 @@ fn sparse(
     }
     let Some((fitted, score)) = current.filter(|(_, score)| improves(seen, score)) else { return Ok(None) };
     let terms: Vec<&Term> = chosen.iter().map(|&t| &spec.terms[t]).collect();
-    let coefficients = estimates(problem, &fitted, &terms.iter().map(|t| t.parameter).collect::<Vec<_>>(), &[], None);
+    let coefficients =
+        estimates(problem, &fitted, &terms.iter().map(|t| t.parameter).collect::<Vec<_>>(), &[], None);
     let adds_to = terms[0].adds_to.clone();
-    let sum: Vec<String> =
-        terms.iter().zip(&coefficients).map(|(t, c)| format!("{:.4e} {} * {}", c.value, c.unit, t.formula)).collect();
+    let sum: Vec<String> = terms
+        .iter()
+        .zip(&coefficients)
+        .map(|(t, c)| format!("{:.4e} {} * {}", c.value, c.unit, t.formula))
+        .collect();
     let mut variables: Vec<String> = terms.iter().flat_map(|t| t.variables.clone()).collect();
     variables.sort();
     variables.dedup();
@@ -195,7 +199,9 @@ impl<'a> Extended<'a> {
                     let (yc, ys) = (dot(y, &c), dot(y, &s));
                     let determinant = cc * ss - cs * cs;
                     if determinant > 1e-6 * cc * ss {
-                        total += (yc * yc * ss - 2.0 * yc * ys * cs + ys * ys * cc) / determinant / (sigma * sigma);
+                        total += (yc * yc * ss - 2.0 * yc * ys * cs + ys * ys * cc)
+                            / determinant
+                            / (sigma * sigma);
                     }
                 }
             }
@@ -204,9 +210,11 @@ impl<'a> Extended<'a> {
         let lowest = std::f64::consts::TAU * 1.5 / span.max(f64::MIN_POSITIVE);
         let highest = std::f64::consts::PI / problem.step;
         let steps = (((highest - lowest) * span).max(0.0) as usize).clamp(8, 4000);
-        let omegas: Vec<f64> = (0..=steps).map(|k| lowest + (highest - lowest) * k as f64 / steps as f64).collect();
+        let omegas: Vec<f64> =
+            (0..=steps).map(|k| lowest + (highest - lowest) * k as f64 / steps as f64).collect();
         let powers: Vec<f64> = omegas.par_iter().map(|w| power(*w)).collect();
-        let start = (0..omegas.len()).max_by(|&a, &b| powers[a].total_cmp(&powers[b])).map_or(lowest, |k| omegas[k]);
+        let start =
+            (0..omegas.len()).max_by(|&a, &b| powers[a].total_cmp(&powers[b])).map_or(lowest, |k| omegas[k]);
         let mut parameters = vec![Parameter {
             name: "omega".into(),
             unit: "rad".into(),
@@ -334,10 +342,8 @@ fn extended(
     if !improves(seen, &score) {
         return Ok(None);
     }
-    let added: Vec<usize> = (0..wide.shared.index.len())
-        .skip(model.inner_shared)
-        .map(|slot| wide.shared.index[slot])
-        .collect();
+    let added: Vec<usize> =
+        (0..wide.shared.index.len()).skip(model.inner_shared).map(|slot| wide.shared.index[slot]).collect();
     let coefficients: Vec<Estimate> = estimates(&wide, &fitted, &added, &[], None);
     let along = match model.noise_along {
         Some(v) => (problem.recording.variables[v].name.clone(), problem.recording.variables[v].unit.clone()),
@@ -377,7 +383,8 @@ fn extended(
             )
         }
         Added::Smooth { channel, variable, centre, half_width } => {
-            let (quantity, v) = (&problem.recording.channels[*channel], &problem.recording.variables[*variable]);
+            let (quantity, v) =
+                (&problem.recording.channels[*channel], &problem.recording.variables[*variable]);
             (
                 format!(
                     "{} += an empirical curve of {}: sum of c_k x^k, x = ({} - {centre:.6e}) / {half_width:.6e}",

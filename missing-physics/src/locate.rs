@@ -45,7 +45,9 @@ pub(crate) fn locate(
                 .map(|b| {
                     let inside = |r: usize, i: usize| bin(value(problem, variable, r, i), &edges) == b;
                     (0..problem.rows.len())
-                        .map(|r| problem.rows[r].valid[channel].iter().filter(|&&i| inside(r, i)).count() as f64)
+                        .map(|r| {
+                            problem.rows[r].valid[channel].iter().filter(|&&i| inside(r, i)).count() as f64
+                        })
                         .sum()
                 })
                 .collect();

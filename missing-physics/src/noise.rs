@@ -20,12 +20,25 @@ pub struct Shape {
 impl Shape {
     /// White noise.
     pub const WHITE: Self = Self { correlated: 0.0, length_steps: 0.0, smooth: false };
+
+    /// Log prior weight against white noise: colour has to show, and a faint slow part (which would swallow any faint
+    /// slow effect) has to show most.
+    pub fn log_prior(&self) -> f64 {
+        if self.correlated <= 0.0 {
+            0.0
+        } else if self.correlated >= 1.0 && !self.smooth {
+            -1.0
+        } else {
+            -2.0
+        }
+    }
 }
 
 /// The shapes among which the data choose; white first.
 pub fn family() -> Vec<Shape> {
     let mut shapes = vec![Shape::WHITE];
-    let rough = |phi: f64, correlated: f64| Shape { correlated, length_steps: -1.0 / phi.ln(), smooth: false };
+    let rough =
+        |phi: f64, correlated: f64| Shape { correlated, length_steps: -1.0 / phi.ln(), smooth: false };
     for phi in [0.2, 0.4, 0.6, 0.75, 0.86, 0.93, 0.97, 0.99] {
         shapes.push(rough(phi, 1.0));
     }
@@ -195,8 +208,9 @@ pub fn rough_sigma(positions: &[f64], values: &[f64]) -> Option<f64> {
 pub fn spikes(positions: &[f64], values: &[f64], limit: f64) -> Vec<Spike> {
     let Some(sigma) = rough_sigma(positions, values).filter(|s| *s > 0.0) else { return Vec::new() };
     let n = values.len();
-    let score: Vec<f64> =
-        (0..n).map(|i| if i < 2 || i + 2 >= n { 0.0 } else { departure(positions, values, i) / sigma }).collect();
+    let score: Vec<f64> = (0..n)
+        .map(|i| if i < 2 || i + 2 >= n { 0.0 } else { departure(positions, values, i) / sigma })
+        .collect();
     (2..n - 2)
         .filter(|&i| score[i].abs() > limit)
         // A spike disturbs its neighbours' scores with the opposite sign and less; it is the largest of them.
@@ -274,7 +288,11 @@ mod tests {
             } else {
                 (-gap).exp()
             };
-            let white = if i == j { (1.0 - shape.correlated).max(if shape.smooth { 1e-6 } else { 0.0 }) } else { 0.0 };
+            let white = if i == j {
+                (1.0 - shape.correlated).max(if shape.smooth { 1e-6 } else { 0.0 })
+            } else {
+                0.0
+            };
             shape.correlated * kernel + white
         })
     }
@@ -282,8 +300,12 @@ mod tests {
     /// The filter is the Cholesky factor of the covariance: same quadratic form, same determinant, uneven rows.
     #[test]
     fn whitening_agrees_with_the_dense_covariance() {
-        let positions: Vec<f64> =
-            (0..40).scan(0.0, |t, i| { *t += 0.1 * (1.0 + 0.5 * f64::from(i % 3)); Some(*t) }).collect();
+        let positions: Vec<f64> = (0..40)
+            .scan(0.0, |t, i| {
+                *t += 0.1 * (1.0 + 0.5 * f64::from(i % 3));
+                Some(*t)
+            })
+            .collect();
         let values: Vec<f64> = (0..40).map(|i| (f64::from(i) * 0.7).sin() + 0.1 * f64::from(i % 5)).collect();
         for shape in family().into_iter().skip(1) {
             let dense = covariance(&positions, 0.15, shape).cholesky().expect("positive definite");
@@ -307,7 +329,8 @@ mod tests {
     fn a_spike_is_found_and_a_jump_is_not() {
         let positions: Vec<f64> = (0..60).map(|i| f64::from(i) * 0.02).collect();
         let noise = |i: usize| 0.01 * ((i as f64 * 12.9898).sin() * 43758.5453).fract();
-        let mut values: Vec<f64> = positions.iter().enumerate().map(|(i, t)| 4.9 * t * t + noise(i)).collect();
+        let mut values: Vec<f64> =
+            positions.iter().enumerate().map(|(i, t)| 4.9 * t * t + noise(i)).collect();
         values[30] += 0.3;
         let found = spikes(&positions, &values, 6.0);
         assert_eq!(found.iter().map(|s| s.index).collect::<Vec<_>>(), vec![30]);

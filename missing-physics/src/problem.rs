@@ -43,8 +43,10 @@ pub(crate) struct RunRows {
 
 impl ParameterTable {
     fn new(spec: &Spec, scope: Scope) -> Self {
-        let index: Vec<usize> = (0..spec.parameters.len()).filter(|&i| spec.parameters[i].scope == scope).collect();
-        let column = |f: fn(&crate::model::Parameter) -> f64| index.iter().map(|&i| f(&spec.parameters[i])).collect();
+        let index: Vec<usize> =
+            (0..spec.parameters.len()).filter(|&i| spec.parameters[i].scope == scope).collect();
+        let column =
+            |f: fn(&crate::model::Parameter) -> f64| index.iter().map(|&i| f(&spec.parameters[i])).collect();
         Self {
             start: column(|p| p.start),
             lower: column(|p| p.lower),
@@ -81,7 +83,11 @@ impl<'a> Problem<'a> {
                 let mut start = own.start.clone();
                 model.start(run, &mut start);
                 for (i, value) in start.iter_mut().enumerate() {
-                    *value = if value.is_finite() { value.clamp(own.lower[i], own.upper[i]) } else { own.start[i] };
+                    *value = if value.is_finite() {
+                        value.clamp(own.lower[i], own.upper[i])
+                    } else {
+                        own.start[i]
+                    };
                 }
                 start
             })
@@ -147,7 +153,8 @@ impl<'a> Problem<'a> {
         for &m in set {
             let mechanism = &spec.mechanisms[m];
             mechanism.parameters.iter().for_each(|&p| free[p] = true);
-            let needless = set.iter().any(|&o| o != m && mechanism.companions_unless.contains(&spec.mechanisms[o].id));
+            let needless =
+                set.iter().any(|&o| o != m && mechanism.companions_unless.contains(&spec.mechanisms[o].id));
             if !needless {
                 mechanism.companions.iter().for_each(|&p| free[p] = true);
             }

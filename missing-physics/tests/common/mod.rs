@@ -1,0 +1,129 @@
+//! A small model of a thrown ball (height only), and worlds made without it.
+
+use missing_physics::data::{Recording, Run};
+use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal, Uniform};
+
+/// Height of a ball with linear drag (closed form), another gravity and a camera of another scale.
+pub(crate) struct Ball(Spec);
+
+const G: f64 = 9.80665;
+
+impl Default for Ball {
+    fn default() -> Self {
+        let parameter = |name: &str, scope, lower: f64, upper: f64, scale| Parameter {
+            name: name.into(),
+            unit: String::new(),
+            scope,
+            start: 0.0,
+            lower,
+            upper,
+            scale,
+        };
+        let mechanism = |id: &str, parameter: usize| Mechanism {
+            id: id.into(),
+            name: id.replace('-', " "),
+            parameters: vec![parameter],
+            ..Default::default()
+        };
+        Self(Spec {
+            baseline: "ballistic flight".into(),
+            parameters: vec![
+                parameter("rate_per_s", Scope::Shared, 0.0, 20.0, 0.1),
+                parameter("acceleration_m_s2", Scope::Shared, -0.5, 0.5, 0.2),
+                parameter("scale", Scope::Shared, -0.5, 0.5, 0.01),
+                parameter("z0_m", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0),
+                parameter("vz0_m_s", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0),
+            ],
+            mechanisms: vec![
+                mechanism("linear-drag", 0),
+                mechanism("buoyancy", 1),
+                mechanism("camera-scale", 2),
+            ],
+            terms: vec![],
+        })
+    }
+}
+
+impl Model for Ball {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        let (r, g) = (shared[0], G - shared[1]);
+        for (z, t) in out.iter_mut().zip(&run.inputs[0]) {
+            // (1 - exp(-x)) / x and its next term, by series where x is small.
+            let x = r * t;
+            let first = if x < 1e-4 { 1.0 - x / 2.0 + x * x / 6.0 } else { -(-x).exp_m1() / x };
+            let second = if x < 1e-3 { 0.5 - x / 6.0 + x * x / 24.0 } else { (1.0 - first) / x };
+            *z = (1.0 + shared[2]) * (own[0] + own[1] * t * first - g * t * t * second);
+        }
+        Ok(())
+    }
+}
+
+/// How a world is made.
+#[derive(Clone, Copy)]
+pub(crate) struct World {
+    pub(crate) runs: usize,
+    pub(crate) rows: usize,
+    pub(crate) sigma: f64,
+    /// Correlation of neighbouring rows' noise.
+    pub(crate) phi: f64,
+    /// Smallest step of a reading.
+    pub(crate) digit: f64,
+    pub(crate) linear_drag: f64,
+    /// A part of the weight that the ball loses.
+    pub(crate) lift_m_s2: f64,
+}
+
+impl World {
+    pub(crate) const NULL: Self =
+        Self { runs: 4, rows: 40, sigma: 0.005, phi: 0.0, digit: 0.0, linear_drag: 0.0, lift_m_s2: 0.0 };
+
+    /// Integrates Newton's law in small steps and reads it with noise.
+    pub(crate) fn draw(&self, seed: u64) -> Recording {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let speed = Uniform::new(2.0, 6.0).unwrap();
+        let height = Uniform::new(0.5, 1.5).unwrap();
+        let dt = 1.0 / 30.0;
+        let runs = (0..self.runs)
+            .map(|r| {
+                let (mut z, mut v) = (height.sample(&mut rng), speed.sample(&mut rng));
+                let (mut times, mut heights) = (Vec::new(), Vec::new());
+                let mut noise: f64 = StandardNormal.sample(&mut rng);
+                for i in 0..self.rows {
+                    let reading = z + self.sigma * noise;
+                    heights.push(if self.digit > 0.0 {
+                        (reading / self.digit).round() * self.digit
+                    } else {
+                        reading
+                    });
+                    times.push(i as f64 * dt);
+                    let white: f64 = StandardNormal.sample(&mut rng);
+                    noise = self.phi * noise + (1.0 - self.phi * self.phi).sqrt() * white;
+                    const STEPS: usize = 200;
+                    let h = dt / STEPS as f64;
+                    for _ in 0..STEPS {
+                        let a = |v: f64| -G + self.lift_m_s2 - self.linear_drag * v;
+                        let middle = v + 0.5 * h * a(v);
+                        z += h * middle;
+                        v += h * a(middle);
+                    }
+                }
+                Run { label: format!("{}", r + 1), inputs: vec![times], outputs: vec![heights], kind: 0 }
+            })
+            .collect();
+        Recording {
+            channels: vec![Quantity::new("z_m", "m")],
+            variables: vec![Quantity::new("t_s", "s")],
+            runs,
+            noise_along: Some(0),
+            calibration: vec![None],
+            resolution: vec![self.digit],
+        }
+    }
+}

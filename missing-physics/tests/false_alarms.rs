@@ -1,0 +1,52 @@
+//! The promised rate of false alarms, on worlds in which nothing is wrong.
+
+mod common;
+
+use common::{Ball, World};
+use missing_physics::diagnosis::Verdict;
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+const WORLDS: u64 = 300;
+
+/// Counts p-values at or below a level and compares the count with the binomial law of that level, at 1 in 1,000.
+fn holds(world: World) {
+    let model = Ball::default();
+    let options = Options { replicates: 199, ..Options::default() };
+    let p: Vec<f64> = (0..WORLDS)
+        .map(|seed| {
+            let options = Options { seed, ..options.clone() };
+            let answer = diagnose(&model, &world.draw(1000 + seed), &[], &options, &Silent).unwrap();
+            assert_eq!(answer.verdict == Verdict::Adequate, answer.p_value > 0.05);
+            answer.p_value
+        })
+        .collect();
+    for level in [0.01, 0.05, 0.2, 0.5] {
+        let alarms = p.iter().filter(|p| **p <= level + 1e-12).count() as u64;
+        let law = Binomial::new(level, WORLDS).unwrap();
+        println!("level {level}: {alarms} alarms in {WORLDS} worlds");
+        assert!(law.cdf(alarms) > 5e-4, "too few alarms at {level}: {alarms}");
+        assert!(alarms == 0 || law.sf(alarms - 1) > 5e-4, "too many alarms at {level}: {alarms}");
+    }
+}
+
+#[test]
+fn white_noise() {
+    holds(World::NULL);
+}
+
+#[test]
+fn coloured_noise() {
+    holds(World { phi: 0.7, ..World::NULL });
+}
+
+#[test]
+fn quantised_noise() {
+    holds(World { digit: 0.01, ..World::NULL });
+}
+
+#[test]
+fn faintly_coloured_noise() {
+    holds(World { phi: 0.3, ..World::NULL });
+}
