@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::adequacy::{draw, residuals};
 use crate::bank::Bank;
 use crate::data::Recording;
-use crate::fit::{Fit, NoiseRule, NoiseState, covariance, fit, own_prior_width, solve};
+use crate::fit::{Fit, NoiseRule, NoiseState, UNDETERMINED, covariance, fit, own_prior_width, solve};
 use crate::linalg::{cholesky, log_determinant};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
@@ -93,14 +93,16 @@ fn evidence(
     let name = |slot: usize| problem.spec().parameters[problem.shared.index[slot]].name.clone();
     let added: Vec<usize> = (0..selection.shared.len()).filter(|&i| selection.added_shared[i]).collect();
     let bound = added.iter().map(|&i| selection.shared[i]).find(|slot| fit.at_bound.contains(slot));
-    let Some(covariance) = covariance(&fit.information) else {
+    let covariance = covariance(&fit.information);
+    if added.iter().any(|&i| !covariance[(i, i)].is_finite()) {
         return (f64::NEG_INFINITY, Some("these data do not determine it".into()));
-    };
+    }
     let mut factor = fit.information.clone();
-    let kept = cholesky(&mut factor, 0.0);
+    let kept = cholesky(&mut factor, UNDETERMINED);
     let two_pi = std::f64::consts::TAU.ln();
     let mut value =
-        fit.log_likelihood + 0.5 * (selection.shared.len() as f64 * two_pi - log_determinant(&factor, &kept));
+        fit.log_likelihood
+        + 0.5 * (kept.iter().filter(|k| **k).count() as f64 * two_pi - log_determinant(&factor, &kept));
     for (i, added) in selection.added_own.iter().enumerate() {
         if *added {
             value -= fit.own.len() as f64 * own_prior_width(problem, selection, i).ln();

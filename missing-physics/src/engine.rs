@@ -11,7 +11,7 @@ use crate::diagnosis::{
 };
 use crate::estimate::estimates;
 use crate::experiment;
-use crate::fit::{Fit, NoiseRule, fit};
+use crate::fit::{Fit, NoiseRule, NoiseState, fit, solve};
 use crate::law;
 use crate::locate::locate;
 use crate::model::{Experiment, Model, PredictError};
@@ -110,6 +110,12 @@ pub fn diagnose(
     tell("fitting the baseline", 0.0)?;
     let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
     let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
+    // What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
+    let white = NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(&problem, &rule, &start) };
+    let plain = Candidate {
+        fit: solve(&problem, &selection, &white, &start.shared, &start.own)?,
+        ..baseline.clone()
+    };
     let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
     tell("adequacy of the baseline", 0.0)?;
     let test = |c: &Candidate, stream: u64| {
@@ -120,11 +126,11 @@ pub fn diagnose(
     let adequacy = test(&baseline, 1)?;
     tell("adequacy of the baseline", 1.0)?;
 
-    let mut work = Work { problem: &problem, rule: &rule, baseline: &baseline, outliers, rows, unknowns };
+    let mut work = Work { problem: &problem, rule: &rule, baseline: &baseline, plain: &plain.fit, outliers, rows, unknowns };
     if adequacy.p_value > options.alpha {
         let base_score = held_out(&problem, &baseline)?;
         let mut diagnosis = work.skeleton(&adequacy, Verdict::Adequate, &baseline.fit)?;
-        diagnosis.before = work.errors(&baseline.fit, &base_score)?;
+        diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
         diagnosis.after = diagnosis.before.clone();
         return Ok(diagnosis);
     }
@@ -176,7 +182,7 @@ pub fn diagnose(
 
     let final_fit = explained.map_or(&baseline.fit, |(c, _)| &c.fit);
     let mut diagnosis = work.skeleton(&adequacy, Verdict::Unexplained, final_fit)?;
-    diagnosis.before = work.errors(&baseline.fit, &base_score)?;
+    diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
     diagnosis.after = diagnosis.before.clone();
     work.mechanisms(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best.map(|b| b.0));
     work.sets(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best);
@@ -184,7 +190,7 @@ pub fn diagnose(
         Some((c, _)) => c.fit.noise.sigma.clone(),
         None => rough_sigmas(&problem, &rule, &baseline.fit),
     };
-    diagnosis.location = locate(&problem, &baseline.selection, &baseline.fit, &sigma)?;
+    diagnosis.location = locate(&problem, &baseline.selection, &plain.fit, &sigma)?;
 
     if let Some((chosen, p)) = explained {
         diagnosis.final_p_value = Some(p);
@@ -361,6 +367,7 @@ struct Work<'a> {
     problem: &'a Problem<'a>,
     rule: &'a NoiseRule,
     baseline: &'a Candidate,
+    plain: &'a Fit,
     outliers: Vec<Outlier>,
     rows: usize,
     unknowns: usize,
@@ -421,7 +428,7 @@ impl Work<'_> {
             remarks,
             curves: Vec::new(),
         };
-        let before = law::predictions(self.problem, &self.baseline.fit)?;
+        let before = law::predictions(self.problem, self.plain)?;
         diagnosis.curves = recording
             .runs
             .iter()

@@ -35,7 +35,7 @@ pub(crate) fn estimates(
             }
             let value = candidate.fit.shared[slot];
             let mut ci95 = [f64::NAN; 2];
-            if let (Some(covariance), Some(i)) = (&covariance, place(slot)) {
+            if let Some(i) = place(slot).filter(|&i| covariance[(i, i)].is_finite()) {
                 let half = Z95 * covariance[(i, i)].max(0.0).sqrt();
                 ci95 = [value - half, value + half];
                 if profile.is_some() {
@@ -48,13 +48,17 @@ pub(crate) fn estimates(
         .collect();
     for quantity in derived {
         let value = (quantity.value)(&candidate.fit.shared);
-        let mut half = f64::NAN;
-        if let Some(covariance) = &covariance {
+        let determined: Vec<bool> =
+            (0..selection.shared.len()).map(|i| covariance[(i, i)].is_finite()).collect();
+        let half = {
             let gradient: Vec<f64> = selection
                 .shared
                 .iter()
                 .enumerate()
                 .map(|(i, &slot)| {
+                    if !determined[i] {
+                        return 0.0;
+                    }
                     let step = 1e-4 * covariance[(i, i)].max(0.0).sqrt();
                     let mut shifted = candidate.fit.shared.clone();
                     shifted[slot] += step;
@@ -65,10 +69,11 @@ pub(crate) fn estimates(
                 .collect();
             let variance: f64 = (0..gradient.len())
                 .flat_map(|i| (0..gradient.len()).map(move |j| (i, j)))
+                .filter(|&(i, j)| determined[i] && determined[j])
                 .map(|(i, j)| gradient[i] * gradient[j] * covariance[(i, j)])
                 .sum();
-            half = Z95 * variance.max(0.0).sqrt();
-        }
+            Z95 * variance.max(0.0).sqrt()
+        };
         estimates.push(Estimate {
             name: quantity.name.clone(),
             unit: quantity.unit.clone(),

@@ -441,21 +441,25 @@ pub(crate) fn fit(
     Ok(best)
 }
 
-/// The covariance of the free shared parameters; `None` where the data do not determine one of them.
-pub(crate) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// A parameter with less than this share of its own information left, the others being free, is not determined.
+pub(crate) const UNDETERMINED: f64 = 1e-13;
+
+/// The covariance of the free shared parameters; infinite variance where the data do not determine one of them.
+pub(crate) fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     let n = information.nrows();
     let mut factor = information.clone();
-    let kept = cholesky(&mut factor, 1e-13);
-    if kept.iter().any(|k| !k) {
-        return None;
-    }
+    let kept = cholesky(&mut factor, UNDETERMINED);
     let mut inverse = DMatrix::zeros(n, n);
     for j in 0..n {
+        if !kept[j] {
+            inverse[(j, j)] = f64::INFINITY;
+            continue;
+        }
         let mut column = vec![0.0; n];
         column[j] = 1.0;
         forward(&factor, &kept, &mut column);
         backward(&factor, &kept, &mut column);
         inverse.column_mut(j).copy_from_slice(&column);
     }
-    Some(inverse)
+    inverse
 }

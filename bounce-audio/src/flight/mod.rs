@@ -1,0 +1,213 @@
+//! A ball in flight: gravity, drag, lift, wind.
+
+mod integrate;
+
+use num_dual::DualNum;
+
+/// Why there is no flight.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum FlightError {
+    /// A coefficient or the state at the start is not a finite number.
+    #[error("{name} is {value}, expected a finite number")]
+    NotFinite {
+        /// Which one.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A drag is below zero: it would push.
+    #[error("{name} is {value}, expected zero or more")]
+    Negative {
+        /// Which one.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The times do not rise from zero on.
+    #[error("time {index} is {value} s, expected finite times of zero or more that do not fall")]
+    Times {
+        /// Index of the time.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// The integration needs more steps than it is allowed: drag or lift are too strong for these speeds.
+    #[error("the flight cannot be followed beyond {reached_s} s: its acceleration changes too fast")]
+    TooStiff {
+        /// Time reached in seconds.
+        reached_s: f64,
+    },
+    /// `out` has another length than `times`.
+    #[error("{expected} times need as many states, got {got}")]
+    Length {
+        /// Number of times.
+        expected: usize,
+        /// Length of the output.
+        got: usize,
+    },
+}
+
+/// Position in m and velocity in m/s in a frame whose z points up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State<T> {
+    /// Position in m.
+    pub position: [T; 3],
+    /// Velocity in m/s.
+    pub velocity: [T; 3],
+}
+
+/// What acts on the ball, each as an acceleration: generic over `f64` and dual numbers, so that derivatives are exact.
+///
+/// `a = g + constant - (quadratic |u| + cubic |u|^2 + linear) u + lift x v - stiffness (p - anchor)`, `u = v - wind`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flight<T> {
+    /// Gravity, downwards along -z, in m/s^2.
+    pub gravity_m_s2: f64,
+    /// Quadratic drag in 1/m, zero or more.
+    pub quadratic_per_m: T,
+    /// Linear drag in 1/s, zero or more.
+    pub linear_per_s: T,
+    /// Cubic drag in s/m^2.
+    pub cubic_s_per_m2: T,
+    /// Constant acceleration in m/s^2 (buoyancy is its z).
+    pub constant_m_s2: [T; 3],
+    /// Lift in 1/s: the acceleration is `lift x v`.
+    pub lift_per_s: [T; 3],
+    /// Velocity of the air in m/s.
+    pub wind_m_s: [T; 3],
+    /// Acceleration per distance from where the flight began, along each axis, in 1/s^2.
+    pub stiffness_per_s2: [T; 3],
+}
+
+impl<T: DualNum<Primitive = f64, Real = f64> + Copy> Flight<T> {
+    /// Free fall: gravity alone.
+    pub fn ballistic(gravity_m_s2: f64) -> Self {
+        let (zero, none) = (T::from(0.0), [T::from(0.0); 3]);
+        Self {
+            gravity_m_s2,
+            quadratic_per_m: zero,
+            linear_per_s: zero,
+            cubic_s_per_m2: zero,
+            constant_m_s2: none,
+            lift_per_s: none,
+            wind_m_s: none,
+            stiffness_per_s2: none,
+        }
+    }
+
+    /// Acceleration in m/s^2 at a state, the flight having begun at `origin`.
+    pub fn acceleration(&self, state: &State<T>, origin: &[T; 3]) -> [T; 3] {
+        let v = &state.velocity;
+        let mut u = *v;
+        for (u, w) in u.iter_mut().zip(&self.wind_m_s) {
+            *u -= *w;
+        }
+        let square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+        // The root's derivative is infinite at rest, where drag vanishes with its derivative.
+        let speed = if square.re() > 0.0 { square.sqrt() } else { T::from(0.0) };
+        let drag = self.quadratic_per_m * speed + self.cubic_s_per_m2 * square + self.linear_per_s;
+        let l = &self.lift_per_s;
+        let lift = [l[1] * v[2] - l[2] * v[1], l[2] * v[0] - l[0] * v[2], l[0] * v[1] - l[1] * v[0]];
+        let mut a = self.constant_m_s2;
+        for i in 0..3 {
+            a[i] += lift[i] - drag * u[i] - self.stiffness_per_s2[i] * (state.position[i] - origin[i]);
+        }
+        a[2] -= T::from(self.gravity_m_s2);
+        a
+    }
+
+    /// The states at rising times (s, from the start on), to a relative error of 1e-9.
+    ///
+    /// Free fall and linear drag are closed forms, everything else is integrated.
+    ///
+    /// # Errors
+    /// [`FlightError`]; `out` is then unspecified.
+    pub fn states(&self, start: &State<T>, times_s: &[f64], out: &mut [State<T>]) -> Result<(), FlightError> {
+        self.check(start, times_s, out.len())?;
+        let zero = |v: &T| v.is_zero() && v.re() == 0.0;
+        let still = zero(&self.quadratic_per_m)
+            && zero(&self.cubic_s_per_m2)
+            && self.lift_per_s.iter().chain(&self.stiffness_per_s2).all(zero);
+        if still {
+            for (state, &t) in out.iter_mut().zip(times_s) {
+                *state = self.linear(start, t);
+            }
+            return Ok(());
+        }
+        integrate::states(self, start, times_s, out)
+    }
+
+    fn check(&self, start: &State<T>, times_s: &[f64], got: usize) -> Result<(), FlightError> {
+        if got != times_s.len() {
+            return Err(FlightError::Length { expected: times_s.len(), got });
+        }
+        let vectors = [
+            ("constant_m_s2", &self.constant_m_s2),
+            ("lift_per_s", &self.lift_per_s),
+            ("wind_m_s", &self.wind_m_s),
+            ("stiffness_per_s2", &self.stiffness_per_s2),
+            ("position", &start.position),
+            ("velocity", &start.velocity),
+        ];
+        let scalars = [
+            ("quadratic_per_m", self.quadratic_per_m.re()),
+            ("linear_per_s", self.linear_per_s.re()),
+            ("cubic_s_per_m2", self.cubic_s_per_m2.re()),
+            ("gravity_m_s2", self.gravity_m_s2),
+        ];
+        let all = scalars.into_iter().chain(vectors.iter().flat_map(|(n, v)| v.iter().map(move |x| (*n, x.re()))));
+        for (name, value) in all {
+            if !value.is_finite() {
+                return Err(FlightError::NotFinite { name, value });
+            }
+        }
+        for (name, value) in &scalars[..2] {
+            if *value < 0.0 {
+                return Err(FlightError::Negative { name, value: *value });
+            }
+        }
+        let mut last = 0.0;
+        for (index, &value) in times_s.iter().enumerate() {
+            if !(value >= last && value.is_finite()) {
+                return Err(FlightError::Times { index, value });
+            }
+            last = value;
+        }
+        Ok(())
+    }
+
+    /// Linear drag and constant forces at time `t`.
+    fn linear(&self, start: &State<T>, t: f64) -> State<T> {
+        // With x = r t: v = v0 - x f(x) u0 + t f(x) a, p = p0 + t v0 + t^2 g(x) (a - r u0),
+        // f(x) = (1 - e^-x) / x, g(x) = (1 - f(x)) / x; both have series at 0.
+        let x = self.linear_per_s * t;
+        let (f, g) = if x.re() < 1e-2 {
+            let (mut f, mut g) = (T::from(0.0), T::from(0.0));
+            for n in (1..=8).rev() {
+                // Horner: f = 1 - x/2 (1 - x/3 (...)), g = 1/2 - x/6 + x^2/24 - ...
+                f = (T::from(1.0) - x * f) * (1.0 / f64::from(n + 1));
+                g = (T::from(1.0) - x * g) * (1.0 / f64::from(n + 2));
+            }
+            (T::from(1.0) - x * f, (T::from(1.0) - x * g) * 0.5)
+        } else {
+            let f = -(-x).exp_m1() / x;
+            (f, (T::from(1.0) - f) / x)
+        };
+        let mut state = *start;
+        for i in 0..3 {
+            let down = if i == 2 { self.gravity_m_s2 } else { 0.0 };
+            let pull = self.constant_m_s2[i] - T::from(down)
+                - self.linear_per_s * (start.velocity[i] - self.wind_m_s[i]);
+            state.velocity[i] += pull * f * t;
+            state.position[i] += start.velocity[i] * t + pull * g * (t * t);
+        }
+        state
+    }
+}
+
+/// Quadratic drag in 1/m of a sphere: `k = rho Cd A / (2 m)`, from its drag coefficient, diameter (m), mass (kg) and the
+/// air's density (kg/m^3).
+pub fn drag_per_m(drag_coefficient: f64, diameter_m: f64, mass_kg: f64, air_density_kg_m3: f64) -> f64 {
+    let area = 0.25 * std::f64::consts::PI * diameter_m * diameter_m;
+    0.5 * air_density_kg_m3 * drag_coefficient * area / mass_kg
+}
