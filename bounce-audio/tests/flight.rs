@@ -104,7 +104,8 @@ fn dual_numbers_agree_with_differences() {
         D::new(value, Derivative::some(e))
     };
     let mut flight: Flight<D> = Flight::ballistic(G);
-    (flight.quadratic_per_m, flight.wind_m_s[0], flight.lift_per_s[1]) = (var(0.02, 0), var(1.0, 1), var(0.3, 2));
+    (flight.quadratic_per_m, flight.wind_m_s[0], flight.lift_per_s[1]) =
+        (var(0.02, 0), var(1.0, 1), var(0.3, 2));
     let s = thrown();
     let mut start = State { position: s.position.map(D::from), velocity: s.velocity.map(D::from) };
     start.velocity[0] = var(6.0, 3);

@@ -100,8 +100,7 @@ fn evidence(
     let mut factor = fit.information.clone();
     let kept = cholesky(&mut factor, UNDETERMINED);
     let two_pi = std::f64::consts::TAU.ln();
-    let mut value =
-        fit.log_likelihood
+    let mut value = fit.log_likelihood
         + 0.5 * (kept.iter().filter(|k| **k).count() as f64 * two_pi - log_determinant(&factor, &kept));
     for (i, added) in selection.added_own.iter().enumerate() {
         if *added {

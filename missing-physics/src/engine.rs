@@ -111,7 +111,8 @@ pub fn diagnose(
     let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
     let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
     // What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
-    let white = NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(&problem, &rule, &start) };
+    let white =
+        NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(&problem, &rule, &start) };
     let plain = Candidate {
         fit: solve(&problem, &selection, &white, &start.shared, &start.own)?,
         ..baseline.clone()
@@ -126,9 +127,16 @@ pub fn diagnose(
     let adequacy = test(&baseline, 1)?;
     tell("adequacy of the baseline", 1.0)?;
 
-    let mut work = Work { problem: &problem, rule: &rule, baseline: &baseline, plain: &plain.fit, outliers, rows, unknowns };
+    let mut work = Work {
+        problem: &problem,
+        rule: &rule,
+        baseline: &baseline,
+        plain: &plain.fit,
+        outliers,
+        rows,
+        unknowns,
+    };
     if adequacy.p_value > options.alpha {
-        let base_score = held_out(&problem, &baseline)?;
         let mut diagnosis = work.skeleton(&adequacy, Verdict::Adequate, &baseline.fit)?;
         diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
         diagnosis.after = diagnosis.before.clone();

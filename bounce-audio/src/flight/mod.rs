@@ -155,7 +155,8 @@ impl<T: DualNum<Primitive = f64, Real = f64> + Copy> Flight<T> {
             ("cubic_s_per_m2", self.cubic_s_per_m2.re()),
             ("gravity_m_s2", self.gravity_m_s2),
         ];
-        let all = scalars.into_iter().chain(vectors.iter().flat_map(|(n, v)| v.iter().map(move |x| (*n, x.re()))));
+        let all =
+            scalars.into_iter().chain(vectors.iter().flat_map(|(n, v)| v.iter().map(move |x| (*n, x.re()))));
         for (name, value) in all {
             if !value.is_finite() {
                 return Err(FlightError::NotFinite { name, value });
@@ -196,7 +197,8 @@ impl<T: DualNum<Primitive = f64, Real = f64> + Copy> Flight<T> {
         let mut state = *start;
         for i in 0..3 {
             let down = if i == 2 { self.gravity_m_s2 } else { 0.0 };
-            let pull = self.constant_m_s2[i] - T::from(down)
+            let pull = self.constant_m_s2[i]
+                - T::from(down)
                 - self.linear_per_s * (start.velocity[i] - self.wind_m_s[i]);
             state.velocity[i] += pull * f * t;
             state.position[i] += start.velocity[i] * t + pull * g * (t * t);

@@ -1,0 +1,106 @@
+//! The domains: what each reads, and the full model that it puts before the engine.
+
+pub mod trajectory;
+
+use missing_physics::data::Recording;
+use missing_physics::model::{Experiment, Model, Spec};
+
+use crate::recording::{Header, ReadError};
+
+/// A recording that was read, with the model of its set-up.
+pub struct Loaded {
+    /// The data.
+    pub recording: Recording,
+    /// The full model.
+    pub model: Box<dyn Model + Send>,
+    /// What the rig could do next.
+    pub experiments: Vec<Experiment>,
+    /// What such data cannot determine, one sentence each.
+    pub undetermined: Vec<String>,
+}
+
+impl std::fmt::Debug for Loaded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Loaded").field("recording", &self.recording).finish_non_exhaustive()
+    }
+}
+
+/// A template for a new recording.
+#[derive(Debug, Clone, Copy)]
+pub struct Template {
+    /// Contents of `recording.toml`.
+    pub header: &'static str,
+    /// Name and contents of the data file.
+    pub data: (&'static str, &'static str),
+}
+
+/// One domain of RECORDINGS: its files, its physics.
+pub trait Domain: Sync {
+    /// Identifier (`trajectory`).
+    fn id(&self) -> &'static str;
+    /// What it is, in one sentence.
+    fn summary(&self) -> &'static str;
+    /// The files, columns and keys that it reads, a line each.
+    fn reads(&self) -> &'static [(&'static str, &'static str)];
+    /// The fullest model of the domain, for `domains`.
+    fn spec(&self) -> Spec;
+    /// A recording to begin from.
+    fn template(&self) -> Template;
+    /// Reads the recording that a header describes.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    fn load(&self, header: &Header) -> Result<Loaded, ReadError>;
+}
+
+/// All domains of this version.
+pub fn all() -> &'static [&'static dyn Domain] {
+    &[&trajectory::Trajectory]
+}
+
+/// Domains of the format that this version does not have yet.
+const LATER: [&str; 6] = ["liquid-tilt", "slosh", "bounce", "indentation", "dough-roll", "grain-pour"];
+
+/// The domain of an identifier.
+///
+/// # Errors
+/// A sentence that names the domains there are.
+pub fn find(id: &str) -> Result<&'static dyn Domain, String> {
+    let known: Vec<&str> = all().iter().map(|d| d.id()).collect();
+    match all().iter().find(|d| d.id() == id) {
+        Some(domain) => Ok(*domain),
+        None if LATER.contains(&id) => Err(format!(
+            "domain \"{id}\" is not available in this version, expected one of: {}",
+            known.join(", ")
+        )),
+        None => Err(format!(
+            "unknown domain {}, expected one of: {}",
+            crate::recording::quoted(id),
+            known.join(", ")
+        )),
+    }
+}
+
+/// Reads the recording in a folder.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn load(folder: &std::path::Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
+    let header = Header::read(folder)?;
+    let known: Vec<&str> = all().iter().map(|d| d.id()).collect();
+    let expected = format!("one of: {}", known.join(", "));
+    let id = header.root().text("domain", &expected)?;
+    let domain = find(id).map_err(|_| ReadError::Value {
+        file: header.file.clone(),
+        key: "domain".into(),
+        got: crate::recording::quoted(id),
+        expected: if LATER.contains(&id) {
+            format!("{expected} (the others are not in this version yet)")
+        } else {
+            expected
+        },
+    })?;
+    let loaded = domain.load(&header)?;
+    header.finish()?;
+    Ok((domain, loaded))
+}

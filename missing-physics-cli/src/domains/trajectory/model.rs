@@ -1,0 +1,274 @@
+//! The full model of a filmed or felt flight: physics from `bounce-audio`, the camera's errors, and all parameters.
+
+use bounce_audio::flight::{Flight, State};
+use missing_physics::data::Run;
+use missing_physics::model::{Model, PredictError, Scope, Spec};
+use num_dual::{Derivative, DualNum, DualSVec64};
+
+use super::spec;
+
+/// What was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axes {
+    /// Height alone.
+    Height,
+    /// All three coordinates.
+    Space,
+    /// The specific force along z, by an accelerometer on board.
+    Accelerometer,
+}
+
+/// What is known of the set-up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup {
+    /// What was measured.
+    pub axes: Axes,
+    /// Mass in kg.
+    pub mass_kg: Option<f64>,
+    /// Diameter in m.
+    pub diameter_m: Option<f64>,
+    /// Gravity in m/s^2.
+    pub gravity_m_s2: f64,
+    /// Density of the air in kg/m^3.
+    pub air_density_kg_m3: f64,
+    /// Whether the spin is known (inputs 1 to 3).
+    pub spin: bool,
+}
+
+/// A run of this kind films a rod of known length: the z channel reads its ends.
+pub const ROD: u32 = 1;
+
+/// Derivatives are taken this many at a time.
+const CHUNK: usize = 8;
+type Dual = DualSVec64<CHUNK>;
+
+/// The flight's parameters by meaning; each knows where it stands among the shared parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Quadratic,
+    Linear,
+    Buoyancy,
+    LiftX,
+    LiftY,
+    LiftZ,
+    LiftCoefficient,
+    WindX,
+    WindY,
+    CameraScale,
+    TiltX,
+    TiltY,
+    ClockRate,
+    Cubic,
+    PushX,
+    PushY,
+    StiffX,
+    StiffY,
+    StiffZ,
+}
+
+/// The model of the domain `trajectory`.
+#[derive(Debug)]
+pub struct TrajectoryModel {
+    setup: Setup,
+    spec: Spec,
+    roles: Vec<Role>,
+    /// Quadratic drag in 1/m for one unit of the drag's parameter.
+    drag_unit: f64,
+}
+
+impl TrajectoryModel {
+    /// The model of a set-up.
+    pub fn new(setup: Setup) -> Self {
+        let drag_unit = match (setup.mass_kg, setup.diameter_m) {
+            (Some(m), Some(d)) => bounce_audio::flight::drag_per_m(1.0, d, m, setup.air_density_kg_m3),
+            _ => 1.0,
+        };
+        let (spec, roles) = spec::build(&setup, drag_unit);
+        Self { setup, spec, roles, drag_unit }
+    }
+
+    /// What was measured.
+    pub fn axes(&self) -> Axes {
+        self.setup.axes
+    }
+
+    /// Number of own parameters of a run.
+    pub fn own_count(&self) -> usize {
+        self.spec.count(Scope::PerRun)
+    }
+
+    fn fly<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+        &self,
+        run: &Run,
+        shared: &[T],
+        own: &[T],
+        out: &mut [T],
+    ) -> Result<(), String> {
+        let zero = T::from(0.0);
+        let mut flight = Flight::ballistic(self.setup.gravity_m_s2);
+        let (mut scale, mut rate, mut tilt) = (zero, zero, [zero; 2]);
+        for (role, value) in self.roles.iter().zip(shared) {
+            match role {
+                Role::Quadratic => flight.quadratic_per_m = *value * self.drag_unit,
+                Role::Linear => flight.linear_per_s = *value,
+                Role::Cubic => flight.cubic_s_per_m2 = *value,
+                Role::Buoyancy => flight.constant_m_s2[2] = *value,
+                Role::PushX => flight.constant_m_s2[0] = *value,
+                Role::PushY => flight.constant_m_s2[1] = *value,
+                Role::LiftX => flight.lift_per_s[0] = *value,
+                Role::LiftY => flight.lift_per_s[1] = *value,
+                Role::LiftZ => flight.lift_per_s[2] = *value,
+                Role::LiftCoefficient => {
+                    for (i, lift) in flight.lift_per_s.iter_mut().enumerate() {
+                        let spin = run.inputs.get(1 + i).and_then(|c| c.first()).copied().unwrap_or(0.0);
+                        *lift = *value * spin;
+                    }
+                }
+                Role::WindX => flight.wind_m_s[0] = *value,
+                Role::WindY => flight.wind_m_s[1] = *value,
+                Role::StiffX => flight.stiffness_per_s2[0] = *value,
+                Role::StiffY => flight.stiffness_per_s2[1] = *value,
+                Role::StiffZ => flight.stiffness_per_s2[2] = *value,
+                Role::CameraScale => scale = *value,
+                Role::TiltX => tilt[0] = *value,
+                Role::TiltY => tilt[1] = *value,
+                Role::ClockRate => rate = *value,
+            }
+        }
+        let times = &run.inputs[0];
+        let n = times.len();
+        let scale = scale + 1.0;
+        if run.kind == ROD {
+            // The ends of a rod of one metre, upright: no flight, no clock.
+            let last = out.len() - n;
+            for (i, z) in out[last..].iter_mut().enumerate() {
+                *z = own[self.height_slot()] + scale * (i as f64);
+            }
+            return Ok(());
+        }
+        let start = match self.setup.axes {
+            Axes::Height => State { position: [zero, zero, own[0]], velocity: [zero, zero, own[1]] },
+            Axes::Space => State { position: [own[0], own[1], own[2]], velocity: [own[3], own[4], own[5]] },
+            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, own[1]] },
+        };
+        let begin = times.first().copied().unwrap_or(0.0);
+        let elapsed: Vec<f64> = times.iter().map(|t| t - begin).collect();
+        // A stated time is (1 + rate) times the true one. Rather than integrate to times that are dual numbers, go to the
+        // true times and move along the tangent: exact in value and first derivative.
+        let slow = (rate + 1.0).recip();
+        let true_times: Vec<f64> = elapsed.iter().map(|t| t * slow.re()).collect();
+        let mut states = vec![start; n];
+        flight.states(&start, &true_times, &mut states).map_err(|e| e.to_string())?;
+        let infinitesimal = slow - slow.re();
+        for (i, state) in states.iter().enumerate() {
+            let a = flight.acceleration(state, &start.position);
+            let shift = infinitesimal * elapsed[i];
+            let mut p = state.position;
+            for (p, v) in p.iter_mut().zip(&state.velocity) {
+                *p += *v * shift;
+            }
+            match self.setup.axes {
+                Axes::Height => out[i] = scale * p[2],
+                // Specific force: what is left of the acceleration once gravity is taken away, plus the sensor's offset.
+                Axes::Accelerometer => out[i] = a[2] + self.setup.gravity_m_s2 + own[0],
+                Axes::Space => {
+                    let p = tilted(p, tilt);
+                    for c in 0..3 {
+                        out[c * n + i] = scale * p[c];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn height_slot(&self) -> usize {
+        if self.setup.axes == Axes::Space { 2 } else { 0 }
+    }
+}
+
+/// Turns positions by the camera's tilt: about x, then about y, both right-handed.
+fn tilted<T: DualNum<Primitive = f64, Real = f64> + Copy>(p: [T; 3], [about_x, about_y]: [T; 2]) -> [T; 3] {
+    let (sx, cx, sy, cy) = (about_x.sin(), about_x.cos(), about_y.sin(), about_y.cos());
+    let (x, y, z) = (p[0], cx * p[1] - sx * p[2], sx * p[1] + cx * p[2]);
+    [cy * x + sy * z, y, cy * z - sy * x]
+}
+
+impl Model for TrajectoryModel {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        self.fly(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+    }
+
+    fn start(&self, run: &Run, own: &mut [f64]) {
+        let Some(times) = run.inputs.first() else { return };
+        let begin = times.first().copied().unwrap_or(0.0);
+        if self.setup.axes == Axes::Accelerometer {
+            let finite = run.outputs[0].iter().filter(|v| v.is_finite());
+            let (sum, n) = finite.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+            own[0] = if n > 0.0 { sum / n } else { 0.0 };
+            return;
+        }
+        let channels = run.outputs.len();
+        for (c, column) in run.outputs.iter().enumerate() {
+            let down = if c + 1 == channels { 0.5 * self.setup.gravity_m_s2 } else { 0.0 };
+            let rows = times.iter().zip(column).filter(|(_, z)| z.is_finite());
+            let points: Vec<(f64, f64)> =
+                rows.map(|(t, z)| (t - begin, z + down * (t - begin).powi(2))).collect();
+            let n = points.len() as f64;
+            if n < 2.0 {
+                continue;
+            }
+            let (tm, zm) = points.iter().fold((0.0, 0.0), |(a, b), (t, z)| (a + t / n, b + z / n));
+            let spread: f64 = points.iter().map(|(t, _)| (t - tm).powi(2)).sum();
+            let speed = if spread > 0.0 {
+                points.iter().map(|(t, z)| (t - tm) * (z - zm)).sum::<f64>() / spread
+            } else {
+                0.0
+            };
+            own[c] = zm - speed * tm;
+            own[channels + c] = speed;
+        }
+    }
+
+    fn jacobian(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        own: &[f64],
+        shared_free: &[usize],
+        own_free: &[usize],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), PredictError> {
+        let rows = out.len();
+        let free: Vec<(bool, usize)> =
+            shared_free.iter().map(|&s| (true, s)).chain(own_free.iter().map(|&s| (false, s))).collect();
+        if free.is_empty() {
+            return self.predict(run, shared, own, out);
+        }
+        let mut dual_out = vec![Dual::from(0.0); rows];
+        for (chunk, columns) in free.chunks(CHUNK).zip(jacobian.chunks_mut((CHUNK * rows).max(1))) {
+            let mut dual_shared: Vec<Dual> = shared.iter().map(|v| Dual::from(*v)).collect();
+            let mut dual_own: Vec<Dual> = own.iter().map(|v| Dual::from(*v)).collect();
+            for (i, &(is_shared, slot)) in chunk.iter().enumerate() {
+                let target = if is_shared { &mut dual_shared[slot] } else { &mut dual_own[slot] };
+                let mut unit = nalgebra::SVector::<f64, CHUNK>::zeros();
+                unit[i] = 1.0;
+                *target = Dual::new(target.re, Derivative::some(unit));
+            }
+            self.fly(run, &dual_shared, &dual_own, &mut dual_out)
+                .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+            for (row, value) in dual_out.iter().enumerate() {
+                out[row] = value.re;
+                for i in 0..chunk.len() {
+                    columns[i * rows + row] = value.eps.0.map_or(0.0, |e| e[i]);
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,165 @@
+//! `recording.toml`, read with a memory of which keys were asked for.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use super::{ReadError, one_line, quoted, read_text};
+
+/// A parsed `recording.toml`.
+#[derive(Debug)]
+pub struct Header {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The file, as errors name it.
+    pub file: String,
+    root: Table,
+    asked: RefCell<BTreeSet<String>>,
+}
+
+/// One section of a header (the root, or `[rig]`).
+#[derive(Debug, Clone)]
+pub struct Section<'a> {
+    header: &'a Header,
+    table: Option<&'a Table>,
+    path: String,
+}
+
+impl Header {
+    /// Reads the header of a recording's folder and checks `format`.
+    ///
+    /// # Errors
+    /// [`ReadError`] where the file is missing, is not TOML, or is of another format.
+    pub fn read(folder: &Path) -> Result<Self, ReadError> {
+        let path = folder.join("recording.toml");
+        let file = path.display().to_string();
+        let text = read_text(&path)?;
+        let root: Table = text.parse().map_err(|e: toml::de::Error| {
+            let at = e.span().map_or(0, |s| s.start.min(text.len()));
+            let row = text.as_bytes()[..at].iter().filter(|b| **b == b'\n').count() + 1;
+            ReadError::Toml { file: file.clone(), row, why: one_line(e.message()) }
+        })?;
+        let header = Self { folder: folder.into(), file, root, asked: RefCell::default() };
+        match header.root().value("format") {
+            Some(Value::Integer(1)) => Ok(header),
+            Some(other) => Err(header.wrong("format", other, "1")),
+            None => Err(header.missing("format", "1")),
+        }
+    }
+
+    /// The keys outside any section.
+    pub fn root(&self) -> Section<'_> {
+        Section { header: self, table: Some(&self.root), path: String::new() }
+    }
+
+    /// A section; empty where the file has none.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`] where the key holds something else.
+    pub fn section(&self, name: &str) -> Result<Section<'_>, ReadError> {
+        match self.root().value(name) {
+            None => Ok(Section { header: self, table: None, path: format!("{name}.") }),
+            Some(Value::Table(table)) => {
+                Ok(Section { header: self, table: Some(table), path: format!("{name}.") })
+            }
+            Some(other) => Err(self.wrong(name, other, "a section")),
+        }
+    }
+
+    /// Complains of the first key that nobody has asked for.
+    ///
+    /// # Errors
+    /// [`ReadError::UnknownKey`].
+    pub fn finish(&self) -> Result<(), ReadError> {
+        let asked = self.asked.borrow();
+        let mut unknown = None;
+        visit(&self.root, "", &mut |key| {
+            if !asked.contains(&key) && unknown.is_none() {
+                unknown = Some(key);
+            }
+        });
+        match unknown {
+            None => Ok(()),
+            Some(key) => {
+                let expected: Vec<&str> = asked.iter().map(String::as_str).collect();
+                Err(ReadError::UnknownKey {
+                    file: self.file.clone(),
+                    key: one_line(&key),
+                    expected: expected.join(", "),
+                })
+            }
+        }
+    }
+
+    fn wrong(&self, key: &str, got: &Value, expected: &str) -> ReadError {
+        let got = match got {
+            Value::String(s) => quoted(s),
+            Value::Table(_) => "a section".into(),
+            Value::Array(_) => "a list".into(),
+            other => one_line(&other.to_string()),
+        };
+        ReadError::Value { file: self.file.clone(), key: key.into(), got, expected: expected.into() }
+    }
+
+    fn missing(&self, key: &str, expected: &str) -> ReadError {
+        ReadError::MissingKey { file: self.file.clone(), key: key.into(), expected: expected.into() }
+    }
+}
+
+/// Visits the full name of every key that holds no section.
+fn visit(table: &Table, path: &str, seen: &mut impl FnMut(String)) {
+    for (key, value) in table {
+        match value {
+            Value::Table(inner) if !inner.is_empty() => visit(inner, &format!("{path}{key}."), seen),
+            Value::Table(_) => {}
+            _ => seen(format!("{path}{key}")),
+        }
+    }
+}
+
+impl<'a> Section<'a> {
+    fn value(&self, key: &str) -> Option<&'a Value> {
+        self.header.asked.borrow_mut().insert(format!("{}{key}", self.path));
+        self.table.and_then(|t| t.get(key))
+    }
+
+    /// The names of the keys in the section.
+    pub fn keys(&self) -> Vec<String> {
+        self.table.map(|t| t.keys().cloned().collect()).unwrap_or_default()
+    }
+
+    /// A number within `[lower, upper]`, if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`].
+    pub fn number(&self, key: &str, lower: f64, upper: f64) -> Result<Option<f64>, ReadError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let number = match value {
+            Value::Float(v) => Some(*v),
+            Value::Integer(v) => Some(*v as f64),
+            _ => None,
+        };
+        match number {
+            Some(v) if v >= lower && v <= upper => Ok(Some(v)),
+            _ => {
+                let expected = format!("a number from {lower} to {upper}");
+                Err(self.header.wrong(&format!("{}{key}", self.path), value, &expected))
+            }
+        }
+    }
+
+    /// A text.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingKey`], [`ReadError::Value`].
+    pub fn text(&self, key: &str, expected: &str) -> Result<&'a str, ReadError> {
+        let name = format!("{}{key}", self.path);
+        match self.value(key) {
+            Some(Value::String(text)) => Ok(text),
+            Some(other) => Err(self.header.wrong(&name, other, expected)),
+            None => Err(self.header.missing(&name, expected)),
+        }
+    }
+}

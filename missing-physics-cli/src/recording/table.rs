@@ -1,0 +1,168 @@
+//! CSV tables with named columns, read strictly.
+
+use std::path::Path;
+
+use super::{LARGEST_FILE, ReadError, one_line, quoted, read_text};
+
+/// Numbers beyond this are mistakes of unit or format.
+const LARGEST_NUMBER: f64 = 1e12;
+
+/// A column that a table may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Column {
+    /// Name, with its unit as a suffix.
+    pub name: &'static str,
+    /// What it holds, for a person (`height in metres`).
+    pub what: &'static str,
+    /// Whether it holds labels rather than numbers.
+    pub label: bool,
+}
+
+/// A column's cells.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Labels.
+    Labels(Vec<String>),
+    /// Finite numbers.
+    Numbers(Vec<f64>),
+}
+
+/// A table as it was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// The file, as errors name it.
+    pub file: String,
+    /// Names in the order of the file.
+    pub names: Vec<&'static str>,
+    /// Cells by column, in the same order.
+    pub columns: Vec<Values>,
+    /// The line on which each row stands, from 1.
+    pub lines: Vec<u64>,
+}
+
+impl Table {
+    /// Reads a table whose columns are all among `known`.
+    ///
+    /// # Errors
+    /// [`ReadError`]: the first thing that is wrong, from the top.
+    pub fn read(path: &Path, known: &[Column]) -> Result<Self, ReadError> {
+        let file = path.display().to_string();
+        let text = read_text(path)?;
+        let mut reader =
+            csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+        let mut record = csv::StringRecord::new();
+        let read = |reader: &mut csv::Reader<&[u8]>, record: &mut csv::StringRecord| {
+            reader
+                .read_record(record)
+                .map_err(|e| ReadError::Open { file: file.clone(), why: one_line(&e.to_string()) })
+        };
+        let row = format!("a first row with column names, such as {}", list(known));
+        if !read(&mut reader, &mut record)? {
+            return Err(ReadError::TooFewRows { file, what: "the file".into(), got: 0, expected: row });
+        }
+        let mut chosen: Vec<Column> = Vec::with_capacity(record.len());
+        for name in &record {
+            let name = name.trim();
+            let Some(column) = known.iter().find(|c| c.name == name) else {
+                return Err(ReadError::UnknownColumn {
+                    file,
+                    column: quoted(name),
+                    expected: meant(name, known),
+                });
+            };
+            if chosen.iter().any(|c| c.name == name) {
+                return Err(ReadError::DuplicateColumn { file, column: name.into() });
+            }
+            chosen.push(*column);
+        }
+        let mut columns: Vec<Values> = chosen
+            .iter()
+            .map(|c| if c.label { Values::Labels(Vec::new()) } else { Values::Numbers(Vec::new()) })
+            .collect();
+        let mut lines = Vec::new();
+        while read(&mut reader, &mut record)? {
+            let line = record.position().map_or(0, csv::Position::line);
+            if record.len() != chosen.len() {
+                return Err(ReadError::Ragged { file, row: line, got: record.len(), expected: chosen.len() });
+            }
+            for ((cell, column), values) in record.iter().zip(&chosen).zip(&mut columns) {
+                let cell = cell.trim();
+                let wrong = |expected: &str| ReadError::Cell {
+                    file: file.clone(),
+                    row: line,
+                    column: column.name.into(),
+                    got: if cell.is_empty() { "an empty cell".into() } else { quoted(cell) },
+                    expected: expected.into(),
+                };
+                match values {
+                    Values::Labels(_) if cell.is_empty() => return Err(wrong("a label")),
+                    Values::Labels(labels) => labels.push(cell.to_owned()),
+                    Values::Numbers(numbers) => match cell.parse::<f64>() {
+                        Ok(v) if v.is_finite() && v.abs() <= LARGEST_NUMBER => numbers.push(v),
+                        Ok(v) if v.is_finite() => {
+                            return Err(wrong(&format!("{} of at most 1e12", column.what)));
+                        }
+                        _ => return Err(wrong(&format!("a number: {}", column.what))),
+                    },
+                }
+            }
+            lines.push(line);
+        }
+        debug_assert!(text.len() as u64 <= LARGEST_FILE);
+        Ok(Self { file, names: chosen.iter().map(|c| c.name).collect(), columns, lines })
+    }
+
+    /// A column of numbers, if the table has it.
+    pub fn numbers(&self, name: &str) -> Option<&[f64]> {
+        let at = self.names.iter().position(|n| *n == name)?;
+        match &self.columns[at] {
+            Values::Numbers(numbers) => Some(numbers),
+            Values::Labels(_) => None,
+        }
+    }
+
+    /// A column of labels.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumn`].
+    pub fn labels(&self, name: &str, expected: &str) -> Result<&[String], ReadError> {
+        let at = self.names.iter().position(|n| *n == name);
+        match at.map(|at| &self.columns[at]) {
+            Some(Values::Labels(labels)) => Ok(labels),
+            _ => Err(self.missing(name, expected)),
+        }
+    }
+
+    /// The error for a column that should be there.
+    pub fn missing(&self, name: &str, expected: &str) -> ReadError {
+        ReadError::MissingColumn { file: self.file.clone(), column: name.into(), expected: expected.into() }
+    }
+
+    /// The rows of each run, in the order in which the runs begin.
+    pub fn by_run(labels: &[String]) -> Vec<(String, Vec<usize>)> {
+        let mut places = std::collections::HashMap::new();
+        let mut runs: Vec<(String, Vec<usize>)> = Vec::new();
+        for (row, label) in labels.iter().enumerate() {
+            let at = *places.entry(label.as_str()).or_insert_with(|| {
+                runs.push((label.clone(), Vec::new()));
+                runs.len() - 1
+            });
+            runs[at].1.push(row);
+        }
+        runs
+    }
+}
+
+fn list(known: &[Column]) -> String {
+    known.iter().map(|c| c.name).collect::<Vec<_>>().join(", ")
+}
+
+/// The column that was meant, where only the unit differs; else all known ones.
+fn meant(name: &str, known: &[Column]) -> String {
+    let stem = |n: &str| n.split('_').next().unwrap_or_default().to_ascii_lowercase();
+    let close = known.iter().find(|c| !c.label && stem(c.name) == stem(name) && name.len() <= 40);
+    match close {
+        Some(column) => format!("{} ({})", column.name, column.what),
+        None => format!("one of: {}", list(known)),
+    }
+}
