@@ -157,8 +157,11 @@ pub fn diagnose(
     // The chosen set has been selected to fit: only a clear failure (a fifth of alpha) speaks against it.
     let enough = options.alpha / 5.0;
     let mut best: Option<(&Candidate, f64)> = None;
+    let mut failing = String::new();
     if let Some(&first) = physical.first().filter(|c| !c.set.is_empty()) {
-        let mut current = (first, test(first, 2)?.p_value);
+        let tested = test(first, 2)?;
+        failing = tested.tests.first().map_or_else(String::new, |t| t.name.clone());
+        let mut current = (first, tested.p_value);
         loop {
             let simpler = physical.iter().find(|c| {
                 !c.set.is_empty()
@@ -235,6 +238,12 @@ pub fn diagnose(
             diagnosis.verdict = Verdict::Explained;
         }
     } else {
+        if let Some((closest, p)) = best {
+            diagnosis.remarks.push(format!(
+                "the closest explanation is {}, but it leaves a misfit of its own (p = {p:.3}; {failing})",
+                work.names(&closest.set)
+            ));
+        }
         tell("looking for a law in the residual", 0.0)?;
         if let Some(found) = law::find(&problem, &rule, &baseline, &base_score)? {
             diagnosis.after = work.errors_of(&found.predictions, &found.held_out);

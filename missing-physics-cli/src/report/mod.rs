@@ -1,23 +1,23 @@
-//! stub
-use missing_physics::diagnosis::Diagnosis;
-/// Where.
+//! A diagnosis as text for a person, as JSON for a program, and as one HTML page.
+
+mod html;
+mod json;
+mod number;
+mod plots;
+mod svg;
+mod text;
+
+pub use html::html;
+pub use json::json;
+pub use text::text;
+
+/// What a report says of the recording beside the diagnosis.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReportContext {
-    /// d
+    /// Identifier of the domain.
     pub domain: String,
-    /// r
+    /// The folder, as it was given.
     pub recording: String,
-    /// t
+    /// Title of the page.
     pub title: String,
-}
-/// t
-pub fn text(d: &Diagnosis, _c: &ReportContext) -> String {
-    format!("{} {:?} {:?}\n", d.verdict.word(), d.chosen, d.confused_with)
-}
-/// t
-pub fn json(_d: &Diagnosis, _c: &ReportContext) -> String {
-    String::new()
-}
-/// t
-pub fn html(_d: &Diagnosis, _c: &ReportContext) -> String {
-    String::new()
 }

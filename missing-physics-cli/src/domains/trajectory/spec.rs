@@ -52,8 +52,16 @@ impl Builder {
         &mut self.spec.mechanisms[at]
     }
 
-    fn term(&mut self, role: Role, name: &str, unit: &str, scale: f64, formula: &str, variables: &[&str]) {
-        let parameter = self.shared(role, name, unit, [f64::NEG_INFINITY, f64::INFINITY], scale);
+    fn term(
+        &mut self,
+        role: Role,
+        (name, unit): (&str, &str),
+        lower: f64,
+        scale: f64,
+        formula: &str,
+        variables: &[&str],
+    ) {
+        let parameter = self.shared(role, name, unit, [lower, f64::INFINITY], scale);
         self.spec.terms.push(Term {
             parameter,
             formula: formula.into(),
@@ -108,15 +116,15 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
         in_space(&mut b, setup.spin, drag);
     }
     let inf = [f64::NEG_INFINITY, f64::INFINITY];
-    b.term(Role::Cubic, "cubic_drag_s_per_m2", "s/m^2", 1e-3, "-|v|^2 v", &["v"]);
+    b.term(Role::Cubic, ("cubic_drag_s_per_m2", "s/m^2"), 0.0, 1e-3, "-|v|^2 v", &["v"]);
     if !felt {
-        b.term(Role::StiffZ, "stiffness_z_per_s2", "1/s^2", 0.1, "-(z - z(0))", &["z_m"]);
+        b.term(Role::StiffZ, ("stiffness_z_per_s2", "1/s^2"), f64::NEG_INFINITY, 0.1, "-(z - z(0))", &["z_m"]);
     }
     if space {
-        b.term(Role::PushX, "push_x_m_s2", "m/s^2", 0.1, "e_x", &[]);
-        b.term(Role::PushY, "push_y_m_s2", "m/s^2", 0.1, "e_y", &[]);
-        b.term(Role::StiffX, "stiffness_x_per_s2", "1/s^2", 0.1, "-(x - x(0))", &["x_m"]);
-        b.term(Role::StiffY, "stiffness_y_per_s2", "1/s^2", 0.1, "-(y - y(0))", &["y_m"]);
+        b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_x", &[]);
+        b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_y", &[]);
+        b.term(Role::StiffX, ("stiffness_x_per_s2", "1/s^2"), f64::NEG_INFINITY, 0.1, "-(x - x(0))", &["x_m"]);
+        b.term(Role::StiffY, ("stiffness_y_per_s2", "1/s^2"), f64::NEG_INFINITY, 0.1, "-(y - y(0))", &["y_m"]);
     }
     match setup.axes {
         Axes::Height => {

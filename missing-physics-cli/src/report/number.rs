@@ -1,0 +1,90 @@
+//! Numbers for a person.
+
+use missing_physics::diagnosis::{Diagnosis, Estimate};
+
+/// A number with so many significant digits, without an exponent where that reads well.
+pub(super) fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !value.is_finite() {
+        return "unknown".into();
+    }
+    let digits = digits.max(1);
+    // Rounding may add a digit (9.99 -> 10.0): take the exponent after it.
+    let rounded = format!("{value:.*e}", digits - 1);
+    let exponent: i32 = rounded.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
+    if !(-4..6).contains(&exponent) {
+        return rounded;
+    }
+    let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+    let shown: f64 = rounded.parse().unwrap_or(value);
+    format!("{shown:.decimals$}")
+}
+
+/// Value and interval with digits that the interval's width supports.
+pub(super) fn estimate(e: &Estimate) -> String {
+    let unit = if e.unit.is_empty() { String::new() } else { format!(" {}", e.unit) };
+    let width = e.ci95[1] - e.ci95[0];
+    if !width.is_finite() || width <= 0.0 {
+        return format!("{} = {}{unit}", e.name, significant(e.value, 3));
+    }
+    // Two digits of the half width.
+    let lowest = (0.5 * width).log10().floor() as i32 - 1;
+    let show = |v: f64| {
+        let size = v.abs().max(0.5 * width).log10().floor() as i32;
+        let v = if v.abs() < 0.5 * 10f64.powi(lowest) { 0.0 } else { v };
+        let own = if v == 0.0 { size } else { v.abs().log10().floor() as i32 };
+        significant(v, (own - lowest + 1).clamp(1, 12) as usize)
+    };
+    format!("{} = {}{unit} (95 %: {} to {})", e.name, show(e.value), show(e.ci95[0]), show(e.ci95[1]))
+}
+
+/// The p-value of a diagnosis; at the bootstrap's floor it is a bound.
+pub(super) fn p_value(d: &Diagnosis) -> String {
+    if d.p_value <= d.p_floor * 1.000_001 {
+        format!("p <= {}", significant(d.p_floor, 1))
+    } else {
+        format!("p = {}", significant(d.p_value, 2))
+    }
+}
+
+/// A probability with two decimals, never "1.00" or "0.00" where it is not.
+pub(super) fn probability(p: f64) -> String {
+    match p {
+        p if p > 0.995 && p < 1.0 => ">0.99".into(),
+        p if p < 0.005 && p > 0.0 => "<0.01".into(),
+        p => format!("{:.2}", p.max(0.0)),
+    }
+}
+
+/// Words joined with commas and a last "and".
+pub(super) fn listed(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_follow_the_interval() {
+        let e = |value, low, high| Estimate { name: "k_per_m".into(), unit: "1/m".into(), value, ci95: [low, high] };
+        assert_eq!(estimate(&e(0.044_31, 0.040_2, 0.048_4)), "k_per_m = 0.0443 1/m (95 %: 0.0402 to 0.0484)");
+        assert_eq!(estimate(&e(0.0001, -0.01, 0.0102)), "k_per_m = 0 1/m (95 %: -0.010 to 0.010)");
+        assert_eq!(estimate(&e(5.0, f64::NAN, f64::NAN)), "k_per_m = 5.00 1/m");
+    }
+
+    #[test]
+    fn significant_digits() {
+        assert_eq!(significant(9.996, 3), "10.0");
+        assert_eq!(significant(0.000_012_34, 2), "1.2e-5");
+        assert_eq!(significant(-1234.5, 2), "-1200");
+        assert_eq!(significant(f64::NAN, 2), "unknown");
+        assert_eq!(significant(0.0, 2), "0");
+    }
+}

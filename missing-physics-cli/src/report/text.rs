@@ -1,0 +1,209 @@
+//! The report for a person at a terminal.
+
+use std::fmt::Write as _;
+
+use missing_physics::diagnosis::{Diagnosis, Location, MechanismReport, Verdict};
+
+use super::ReportContext;
+use super::number::{estimate, listed, p_value, probability, significant};
+
+const WIDTH: usize = 100;
+const INDENT: usize = 9;
+
+/// The whole report as text.
+pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
+    let mut page = Page(String::new());
+    page.0.push_str(&headline(d));
+    page.0.push_str("\n\n");
+    for place in d.location.iter().take(3) {
+        page.entry("where", &where_sentence(d, place));
+    }
+    for line in what(d) {
+        page.entry("what", &line);
+    }
+    if let Some(law) = &d.law {
+        page.entry("law", &format!("{} ({})", law.formula, law_kind(law.kind)));
+        for coefficient in law.coefficients.iter().filter(|_| law.kind != "smooth") {
+            page.entry("law", &estimate(coefficient));
+        }
+    }
+    for line in better(d) {
+        page.entry("better", &line);
+    }
+    if d.verdict == Verdict::Adequate {
+        for noise in &d.noise {
+            page.entry("noise", &noise_sentence(d, noise));
+        }
+    }
+    for line in d.undetermined.iter().chain(&d.remarks) {
+        page.entry("unsure", line);
+    }
+    for o in d.outliers.iter().take(5) {
+        let line = format!("row {} of run {} ({}) was set aside: {:.0} sigma off its neighbours", o.row + 1, o.run, o.channel, o.z.abs());
+        page.entry("outlier", &line);
+    }
+    if d.outliers.len() > 5 {
+        page.entry("outlier", &format!("and {} more rows", d.outliers.len() - 5));
+    }
+    if let Some(next) = &d.next_experiment {
+        let line = format!(
+            "{}: separates {} (expected log Bayes factor {})",
+            next.words,
+            listed(&next.separates),
+            significant(next.expected_log_bayes_factor, 2)
+        );
+        page.entry("next", &line);
+    }
+    page.0
+}
+
+/// The verdict in one sentence.
+pub(super) fn headline(d: &Diagnosis) -> String {
+    let p = p_value(d);
+    match d.verdict {
+        Verdict::Adequate => format!("The simulation explains this recording to within its noise ({p})."),
+        Verdict::Explained => format!("The simulation does not explain this recording ({p}); {} does.", named(d, &d.chosen)),
+        Verdict::Ambiguous => {
+            let sets: Vec<String> =
+                std::iter::once(&d.chosen).chain(&d.confused_with).map(|s| named(d, s)).collect();
+            format!("The simulation does not explain this recording ({p}); {} explain it equally well.", listed(&sets))
+        }
+        Verdict::Unexplained if d.law.is_some() => {
+            format!("Something is wrong here ({p}) that no known mechanism describes; the residual follows a law.")
+        }
+        Verdict::Unexplained => {
+            format!("Something is wrong here ({p}) that no known mechanism describes, and no law is supported.")
+        }
+    }
+}
+
+fn named(d: &Diagnosis, set: &[String]) -> String {
+    let name = |id: &String| d.mechanisms.iter().find(|m| m.id == *id).map_or_else(|| id.clone(), |m| m.name.clone());
+    set.iter().map(name).collect::<Vec<_>>().join(" together with ")
+}
+
+/// What kind of law it is, in words.
+pub(super) fn law_kind(kind: &str) -> &str {
+    match kind {
+        "sparse" => "a few terms",
+        "periodic" => "an oscillation",
+        _ => "a smooth curve without a formula",
+    }
+}
+
+/// Where the baseline misses, in one sentence.
+pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
+    let unit = |name: &str| {
+        let known = d.channels.iter().chain(&d.variables).find(|(n, _)| n == name);
+        known.map(|(_, u)| u.clone()).unwrap_or_default()
+    };
+    let total = d.curves.len();
+    let runs = match l.runs.len() {
+        0 => "no run alone".into(),
+        n if n == total && total == 1 => "the only run".into(),
+        n if n == total && total == 2 => "both runs".into(),
+        n if n == total => format!("all {n} runs"),
+        1 => format!("run {}", l.runs[0]),
+        n if n <= 6 => format!("runs {}", listed(&l.runs)),
+        n => format!("{n} of {total} runs"),
+    };
+    let interval = match (&l.variable, l.from, l.to) {
+        (Some(v), Some(from), Some(to)) => {
+            format!(", {v} from {} to {} {}", significant(from, 3), significant(to, 3), unit(v))
+        }
+        _ => String::new(),
+    };
+    format!(
+        "{}, {runs}{interval}: measured less simulated is {} {unit} on average, at most {} {unit} ({:.0} sigma, {:.0} % of the misfit)",
+        l.channel,
+        significant(l.mean_residual, 2),
+        significant(l.largest_residual, 2),
+        l.z,
+        100.0 * l.share,
+        unit = unit(&l.channel),
+    )
+}
+
+fn what(d: &Diagnosis) -> Vec<String> {
+    if d.verdict == Verdict::Adequate {
+        return Vec::new();
+    }
+    let said = |m: &&MechanismReport| {
+        let in_answer = d.chosen.contains(&m.id) || d.confused_with.iter().flatten().any(|id| *id == m.id);
+        in_answer || (m.probability > 0.05 && d.verdict != Verdict::Unexplained)
+    };
+    d.mechanisms
+        .iter()
+        .filter(said)
+        .map(|m| {
+            let parameters: Vec<String> = m.parameters.iter().map(estimate).collect();
+            format!("{}: {}; probability {}", m.name, parameters.join(", "), probability(m.probability))
+        })
+        .collect()
+}
+
+fn better(d: &Diagnosis) -> Vec<String> {
+    if d.chosen.is_empty() && d.law.is_none() {
+        return Vec::new();
+    }
+    let unit = |name: &str| d.channels.iter().find(|(n, _)| n == name).map(|(_, u)| u.clone()).unwrap_or_default();
+    let unseen = if d.curves.len() > 1 { "runs left out" } else { "the part left out" };
+    d.before
+        .iter()
+        .zip(&d.after)
+        .map(|(before, after)| {
+            let noise = d.noise.iter().find(|n| n.channel == before.channel);
+            let noise = noise.map_or_else(String::new, |n| format!(" (noise {} {})", significant(n.sigma, 2), unit(&n.channel)));
+            format!(
+                "{}: error on {unseen} {} -> {} {}{noise}",
+                before.channel,
+                significant(before.heldout_rmse, 3),
+                significant(after.heldout_rmse, 3),
+                unit(&before.channel),
+            )
+        })
+        .collect()
+}
+
+/// A channel's noise, in one sentence.
+pub(super) fn noise_sentence(d: &Diagnosis, n: &missing_physics::diagnosis::ChannelNoise) -> String {
+    let unit = d.channels.iter().find(|(c, _)| *c == n.channel).map(|(_, u)| u.clone()).unwrap_or_default();
+    let colour = if n.correlated_share > 0.0 {
+        let along = d.variables.first().map_or(("rows", ""), |(_, u)| ("", u.as_str()));
+        format!(
+            ", {:.0} % of its variance correlated over {} {}{}: a slow misfit of that size would not be seen",
+            100.0 * n.correlated_share,
+            significant(n.correlation_length, 2),
+            along.1,
+            along.0
+        )
+    } else {
+        ", white".into()
+    };
+    format!("{}: {} {unit}{colour} (from {})", n.channel, significant(n.sigma, 2), n.source.word())
+}
+
+struct Page(String);
+
+impl Page {
+    /// A labelled paragraph, wrapped; the label stands only at the first of its kind.
+    fn entry(&mut self, label: &str, text: &str) {
+        let again = self.0.lines().rev().find(|l| !l.starts_with(' ')).is_some_and(|l| l.starts_with(label));
+        let mut line = format!("{:INDENT$}", if again { "" } else { label });
+        let mut empty = true;
+        for word in text.split_whitespace() {
+            if !empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+                // Writing to a string cannot fail.
+                let _ = writeln!(self.0, "{line}");
+                line = " ".repeat(INDENT + 2);
+                empty = true;
+            }
+            if !empty {
+                line.push(' ');
+            }
+            line.push_str(word);
+            empty = false;
+        }
+        let _ = writeln!(self.0, "{line}");
+    }
+}
