@@ -1,1 +1,86 @@
-//! x
+//! The charts of a diagnosis.
+
+use std::fmt::Write as _;
+
+use missing_physics::diagnosis::{Diagnosis, Verdict};
+
+use super::number::probability;
+use super::svg::{Chart, Series, escape};
+
+/// Runs drawn; more say no more.
+const MOST_RUNS: usize = 4;
+
+/// For each channel: data with both fits, and residuals before and after.
+pub(super) fn channels(d: &Diagnosis) -> String {
+    let mut html = String::new();
+    let changed = d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Ambiguous);
+    for (c, (channel, unit)) in d.channels.iter().enumerate() {
+        let place = d.location.iter().find(|l| l.channel == *channel);
+        // Plotted along the variable of the located interval, else along the first.
+        let variable = place.and_then(|l| d.variables.iter().position(|(n, _)| Some(n) == l.variable.as_ref())).unwrap_or(0);
+        let shaded = place.and_then(|l| Some((l.from?, l.to?))).filter(|_| !d.variables.is_empty());
+        let axis = d.variables.get(variable).map_or_else(|| "row".to_owned(), |(n, _)| n.clone());
+        let sigma = d.noise.iter().find(|n| n.channel == *channel).map(|n| 2.0 * n.sigma);
+        // Writing to a string cannot fail.
+        let _ = write!(html, "<h3>{}</h3><div class=\"charts\">", escape(channel));
+        for curves in d.curves.iter().take(MOST_RUNS) {
+            let rows: Vec<f64> = match curves.inputs.get(variable) {
+                Some(column) => column.clone(),
+                None => (0..curves.measured[c].len()).map(|i| i as f64).collect(),
+            };
+            let left = |fit: &[f64]| -> Vec<f64> { curves.measured[c].iter().zip(fit).map(|(m, p)| m - p).collect() };
+            let (before, after) = (left(&curves.before[c]), left(&curves.after[c]));
+            let mut series = vec![
+                Series { class: "data", x: &rows, y: &curves.measured[c], points: true },
+                Series { class: "before", x: &rows, y: &curves.before[c], points: false },
+            ];
+            let mut residuals = vec![Series { class: "before", x: &rows, y: &before, points: true }];
+            if changed {
+                series.push(Series { class: "after", x: &rows, y: &curves.after[c], points: false });
+                residuals.push(Series { class: "after", x: &rows, y: &after, points: true });
+            }
+            let run = &curves.run;
+            let data = Chart {
+                title: format!("run {run}: measured and simulated"),
+                x_label: axis.clone(),
+                y_label: channel.clone(),
+                series,
+                shaded: None,
+                band: None,
+            };
+            let left = Chart {
+                title: format!("run {run}: measured less simulated"),
+                x_label: axis.clone(),
+                y_label: format!("residual in {unit}"),
+                series: residuals,
+                shaded,
+                band: sigma,
+            };
+            let _ = write!(html, "<figure>{}</figure><figure>{}</figure>", data.render(), left.render());
+        }
+        html.push_str("</div>");
+        if d.curves.len() > MOST_RUNS {
+            let _ = write!(html, "<p class=\"note\">The first {MOST_RUNS} of {} runs are drawn.</p>", d.curves.len());
+        }
+    }
+    html
+}
+
+/// Probabilities of the mechanisms as bars.
+pub(super) fn probabilities(d: &Diagnosis) -> String {
+    let mut html = String::from("<table class=\"bars\">");
+    for m in &d.mechanisms {
+        let p = m.probability.clamp(0.0, 1.0);
+        let class = if d.chosen.contains(&m.id) { "bar chosen" } else { "bar" };
+        let why = m.ruled_out.as_ref().map_or_else(String::new, |r| format!(" <span class=\"note\">alone: {}</span>", escape(r)));
+        let _ = write!(
+            html,
+            "<tr><th scope=\"row\">{}</th><td class=\"track\"><div class=\"{class}\" style=\"width:{:.1}%\"></div></td><td>{}{why}</td></tr>",
+            escape(&m.name),
+            100.0 * p,
+            escape(&probability(p))
+        );
+    }
+    html.push_str("</table>");
+    html
+}
