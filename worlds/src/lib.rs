@@ -1,1 +1,5 @@
-//! Worlds.
+#![doc = include_str!("../README.md")]
+
+pub mod bundled;
+pub mod flight;
+pub mod noise;

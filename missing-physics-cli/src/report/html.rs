@@ -38,7 +38,11 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
         escape(&headline(d))
     );
     let _ = write!(page, "<p>Baseline: {}.</p>", escape(&d.baseline));
-    section(&mut page, "Where it misses", &list(&d.location.iter().map(|l| where_sentence(d, l)).collect::<Vec<_>>()));
+    section(
+        &mut page,
+        "Where it misses",
+        &list(&d.location.iter().map(|l| where_sentence(d, l)).collect::<Vec<_>>()),
+    );
     if d.verdict != Verdict::Adequate {
         section(&mut page, "How probable each mechanism is", &plots::probabilities(d));
         section(&mut page, "What was left out", &parameters(d));
@@ -93,10 +97,20 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     let outliers: Vec<String> = d
         .outliers
         .iter()
-        .map(|o| format!("run {}, row {}, {}: {:.0} sigma off its neighbours", o.run, o.row + 1, o.channel, o.z.abs()))
+        .map(|o| {
+            format!(
+                "run {}, row {}, {}: {:.0} sigma off its neighbours",
+                o.run,
+                o.row + 1,
+                o.channel,
+                o.z.abs()
+            )
+        })
         .collect();
     section(&mut page, "Rows set aside", &list(&outliers));
-    let mut tests = String::from("<details><summary>The tests behind the p-value</summary><table><tr><th>test</th><th>statistic</th><th>its own p</th></tr>");
+    let mut tests = String::from(
+        "<details><summary>The tests behind the p-value</summary><table><tr><th>test</th><th>statistic</th><th>its own p</th></tr>",
+    );
     for t in &d.tests {
         let _ = write!(
             tests,
@@ -129,7 +143,8 @@ fn list(lines: &[String]) -> String {
 
 fn parameters(d: &Diagnosis) -> String {
     let said = |id: &String| d.chosen.contains(id) || d.confused_with.iter().flatten().any(|o| o == id);
-    let mut table = String::from("<table><tr><th>mechanism</th><th>equation</th><th>parameters</th><th>source</th></tr>");
+    let mut table =
+        String::from("<table><tr><th>mechanism</th><th>equation</th><th>parameters</th><th>source</th></tr>");
     let mut any = false;
     for m in d.mechanisms.iter().filter(|m| said(&m.id)) {
         any = true;
@@ -148,9 +163,12 @@ fn parameters(d: &Diagnosis) -> String {
 }
 
 fn errors(d: &Diagnosis) -> String {
-    let mut table = String::from("<table><tr><th>channel</th><th>baseline, all data</th><th>now, all data</th><th>baseline, unseen data</th><th>now, unseen data</th></tr>");
+    let mut table = String::from(
+        "<table><tr><th>channel</th><th>baseline, all data</th><th>now, all data</th><th>baseline, unseen data</th><th>now, unseen data</th></tr>",
+    );
     for (before, after) in d.before.iter().zip(&d.after) {
-        let unit = d.channels.iter().find(|(n, _)| *n == before.channel).map(|(_, u)| u.clone()).unwrap_or_default();
+        let unit =
+            d.channels.iter().find(|(n, _)| *n == before.channel).map(|(_, u)| u.clone()).unwrap_or_default();
         let cell = |v: f64| format!("<td class=\"num\">{} {}</td>", significant(v, 3), escape(&unit));
         let _ = write!(
             table,

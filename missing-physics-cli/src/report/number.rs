@@ -73,7 +73,12 @@ mod tests {
 
     #[test]
     fn digits_follow_the_interval() {
-        let e = |value, low, high| Estimate { name: "k_per_m".into(), unit: "1/m".into(), value, ci95: [low, high] };
+        let e = |value, low, high| Estimate {
+            name: "k_per_m".into(),
+            unit: "1/m".into(),
+            value,
+            ci95: [low, high],
+        };
         assert_eq!(estimate(&e(0.044_31, 0.040_2, 0.048_4)), "k_per_m = 0.0443 1/m (95 %: 0.0402 to 0.0484)");
         assert_eq!(estimate(&e(0.0001, -0.01, 0.0102)), "k_per_m = 0 1/m (95 %: -0.010 to 0.010)");
         assert_eq!(estimate(&e(5.0, f64::NAN, f64::NAN)), "k_per_m = 5.00 1/m");

@@ -17,7 +17,9 @@ pub(super) fn channels(d: &Diagnosis) -> String {
     for (c, (channel, unit)) in d.channels.iter().enumerate() {
         let place = d.location.iter().find(|l| l.channel == *channel);
         // Plotted along the variable of the located interval, else along the first.
-        let variable = place.and_then(|l| d.variables.iter().position(|(n, _)| Some(n) == l.variable.as_ref())).unwrap_or(0);
+        let variable = place
+            .and_then(|l| d.variables.iter().position(|(n, _)| Some(n) == l.variable.as_ref()))
+            .unwrap_or(0);
         let shaded = place.and_then(|l| Some((l.from?, l.to?))).filter(|_| !d.variables.is_empty());
         let axis = d.variables.get(variable).map_or_else(|| "row".to_owned(), |(n, _)| n.clone());
         let sigma = d.noise.iter().find(|n| n.channel == *channel).map(|n| 2.0 * n.sigma);
@@ -28,7 +30,9 @@ pub(super) fn channels(d: &Diagnosis) -> String {
                 Some(column) => column.clone(),
                 None => (0..curves.measured[c].len()).map(|i| i as f64).collect(),
             };
-            let left = |fit: &[f64]| -> Vec<f64> { curves.measured[c].iter().zip(fit).map(|(m, p)| m - p).collect() };
+            let left = |fit: &[f64]| -> Vec<f64> {
+                curves.measured[c].iter().zip(fit).map(|(m, p)| m - p).collect()
+            };
             let (before, after) = (left(&curves.before[c]), left(&curves.after[c]));
             let mut series = vec![
                 Series { class: "data", x: &rows, y: &curves.measured[c], points: true },
@@ -60,7 +64,11 @@ pub(super) fn channels(d: &Diagnosis) -> String {
         }
         html.push_str("</div>");
         if d.curves.len() > MOST_RUNS {
-            let _ = write!(html, "<p class=\"note\">The first {MOST_RUNS} of {} runs are drawn.</p>", d.curves.len());
+            let _ = write!(
+                html,
+                "<p class=\"note\">The first {MOST_RUNS} of {} runs are drawn.</p>",
+                d.curves.len()
+            );
         }
     }
     html
@@ -72,7 +80,10 @@ pub(super) fn probabilities(d: &Diagnosis) -> String {
     for m in &d.mechanisms {
         let p = m.probability.clamp(0.0, 1.0);
         let class = if d.chosen.contains(&m.id) { "bar chosen" } else { "bar" };
-        let why = m.ruled_out.as_ref().map_or_else(String::new, |r| format!(" <span class=\"note\">alone: {}</span>", escape(r)));
+        let why = m
+            .ruled_out
+            .as_ref()
+            .map_or_else(String::new, |r| format!(" <span class=\"note\">alone: {}</span>", escape(r)));
         let _ = write!(
             html,
             "<tr><th scope=\"row\">{}</th><td class=\"track\"><div class=\"{class}\" style=\"width:{:.1}%\"></div></td><td>{}{why}</td></tr>",

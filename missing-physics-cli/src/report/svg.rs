@@ -73,12 +73,20 @@ impl Chart<'_> {
         if let Some((from, to)) = self.shaded {
             let (a, b) = (px(from.clamp(x0, x1)), px(to.clamp(x0, x1)));
             let height = HEIGHT - TOP - BOTTOM;
-            let _ = write!(svg, "<rect class=\"shade\" x=\"{a:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{height}\"/>", (b - a).max(1.0));
+            let _ = write!(
+                svg,
+                "<rect class=\"shade\" x=\"{a:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{height}\"/>",
+                (b - a).max(1.0)
+            );
         }
         if let Some(band) = self.band.filter(|b| b.is_finite()) {
             let (a, b) = (py(band.min(y1)), py((-band).max(y0)));
             let width = WIDTH - LEFT - RIGHT;
-            let _ = write!(svg, "<rect class=\"band\" x=\"{LEFT}\" y=\"{a:.1}\" width=\"{width}\" height=\"{:.1}\"/>", b - a);
+            let _ = write!(
+                svg,
+                "<rect class=\"band\" x=\"{LEFT}\" y=\"{a:.1}\" width=\"{width}\" height=\"{:.1}\"/>",
+                b - a
+            );
         }
         for tick in ticks(x0, x1) {
             let x = px(tick.0);
@@ -103,7 +111,8 @@ impl Chart<'_> {
         }
         for series in &self.series {
             let stride = series.x.len().div_ceil(MOST_POINTS).max(1);
-            let rows = series.x.iter().zip(series.y).step_by(stride).filter(|(x, y)| x.is_finite() && y.is_finite());
+            let rows =
+                series.x.iter().zip(series.y).step_by(stride).filter(|(x, y)| x.is_finite() && y.is_finite());
             let class = series.class;
             if series.points {
                 let _ = write!(svg, "<g class=\"{class}\">");
@@ -146,7 +155,8 @@ fn widened((low, high): (f64, f64), room: f64) -> (f64, f64) {
 fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let raw = (high - low) / 5.0;
     let power = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= raw).unwrap_or(10.0 * power);
+    let step =
+        [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= raw).unwrap_or(10.0 * power);
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     let first = (low / step).ceil() as i64;
     (0..12)
@@ -154,7 +164,8 @@ fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
         .take_while(|v| *v <= high + 1e-9 * step)
         .map(|v| {
             let v = if v.abs() < 1e-9 * step { 0.0 } else { v };
-            let label = if decimals > 5 || v.abs() >= 1e6 { format!("{v:.1e}") } else { format!("{v:.decimals$}") };
+            let label =
+                if decimals > 5 || v.abs() >= 1e6 { format!("{v:.1e}") } else { format!("{v:.decimals$}") };
             (v, label)
         })
         .collect()

@@ -39,7 +39,13 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
         page.entry("unsure", line);
     }
     for o in d.outliers.iter().take(5) {
-        let line = format!("row {} of run {} ({}) was set aside: {:.0} sigma off its neighbours", o.row + 1, o.run, o.channel, o.z.abs());
+        let line = format!(
+            "row {} of run {} ({}) was set aside: {:.0} sigma off its neighbours",
+            o.row + 1,
+            o.run,
+            o.channel,
+            o.z.abs()
+        );
         page.entry("outlier", &line);
     }
     if d.outliers.len() > 5 {
@@ -62,23 +68,34 @@ pub(super) fn headline(d: &Diagnosis) -> String {
     let p = p_value(d);
     match d.verdict {
         Verdict::Adequate => format!("The simulation explains this recording to within its noise ({p})."),
-        Verdict::Explained => format!("The simulation does not explain this recording ({p}); {} does.", named(d, &d.chosen)),
+        Verdict::Explained => {
+            format!("The simulation does not explain this recording ({p}); {} does.", named(d, &d.chosen))
+        }
         Verdict::Ambiguous => {
             let sets: Vec<String> =
                 std::iter::once(&d.chosen).chain(&d.confused_with).map(|s| named(d, s)).collect();
-            format!("The simulation does not explain this recording ({p}); {} explain it equally well.", listed(&sets))
+            format!(
+                "The simulation does not explain this recording ({p}); {} explain it equally well.",
+                listed(&sets)
+            )
         }
         Verdict::Unexplained if d.law.is_some() => {
-            format!("Something is wrong here ({p}) that no known mechanism describes; the residual follows a law.")
+            format!(
+                "Something is wrong here ({p}) that no known mechanism describes; the residual follows a law."
+            )
         }
         Verdict::Unexplained => {
-            format!("Something is wrong here ({p}) that no known mechanism describes, and no law is supported.")
+            format!(
+                "Something is wrong here ({p}) that no known mechanism describes, and no law is supported."
+            )
         }
     }
 }
 
 fn named(d: &Diagnosis, set: &[String]) -> String {
-    let name = |id: &String| d.mechanisms.iter().find(|m| m.id == *id).map_or_else(|| id.clone(), |m| m.name.clone());
+    let name = |id: &String| {
+        d.mechanisms.iter().find(|m| m.id == *id).map_or_else(|| id.clone(), |m| m.name.clone())
+    };
     set.iter().map(name).collect::<Vec<_>>().join(" together with ")
 }
 
@@ -146,14 +163,17 @@ fn better(d: &Diagnosis) -> Vec<String> {
     if d.chosen.is_empty() && d.law.is_none() {
         return Vec::new();
     }
-    let unit = |name: &str| d.channels.iter().find(|(n, _)| n == name).map(|(_, u)| u.clone()).unwrap_or_default();
+    let unit =
+        |name: &str| d.channels.iter().find(|(n, _)| n == name).map(|(_, u)| u.clone()).unwrap_or_default();
     let unseen = if d.curves.len() > 1 { "runs left out" } else { "the part left out" };
     d.before
         .iter()
         .zip(&d.after)
         .map(|(before, after)| {
             let noise = d.noise.iter().find(|n| n.channel == before.channel);
-            let noise = noise.map_or_else(String::new, |n| format!(" (noise {} {})", significant(n.sigma, 2), unit(&n.channel)));
+            let noise = noise.map_or_else(String::new, |n| {
+                format!(" (noise {} {})", significant(n.sigma, 2), unit(&n.channel))
+            });
             format!(
                 "{}: error on {unseen} {} -> {} {}{noise}",
                 before.channel,

@@ -118,13 +118,34 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
     let inf = [f64::NEG_INFINITY, f64::INFINITY];
     b.term(Role::Cubic, ("cubic_drag_s_per_m2", "s/m^2"), 0.0, 1e-3, "-|v|^2 v", &["v"]);
     if !felt {
-        b.term(Role::StiffZ, ("stiffness_z_per_s2", "1/s^2"), f64::NEG_INFINITY, 0.1, "-(z - z(0))", &["z_m"]);
+        b.term(
+            Role::StiffZ,
+            ("stiffness_z_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(z - z(0))",
+            &["z_m"],
+        );
     }
     if space {
         b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_x", &[]);
         b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_y", &[]);
-        b.term(Role::StiffX, ("stiffness_x_per_s2", "1/s^2"), f64::NEG_INFINITY, 0.1, "-(x - x(0))", &["x_m"]);
-        b.term(Role::StiffY, ("stiffness_y_per_s2", "1/s^2"), f64::NEG_INFINITY, 0.1, "-(y - y(0))", &["y_m"]);
+        b.term(
+            Role::StiffX,
+            ("stiffness_x_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(x - x(0))",
+            &["x_m"],
+        );
+        b.term(
+            Role::StiffY,
+            ("stiffness_y_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(y - y(0))",
+            &["y_m"],
+        );
     }
     match setup.axes {
         Axes::Height => {

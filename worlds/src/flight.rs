@@ -1,0 +1,284 @@
+//! Thrown and dropped balls.
+
+use std::fmt::Write as _;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Uniform};
+
+use crate::noise::Noise;
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// Height alone.
+    Height,
+    /// All coordinates.
+    Space,
+    /// The specific force along z, on board.
+    Felt,
+}
+
+/// Everything that may act beside gravity; all zero is a vacuum and a true camera.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effects {
+    /// Quadratic drag in 1/m.
+    pub quadratic_per_m: f64,
+    /// Linear drag in 1/s.
+    pub linear_per_s: f64,
+    /// Constant acceleration upwards in m/s^2.
+    pub lift_m_s2: f64,
+    /// `a = magnus x v`, in 1/s.
+    pub magnus_per_s: [f64; 3],
+    /// Velocity of the air in m/s.
+    pub wind_m_s: [f64; 2],
+    /// Positions are read this much too large, relative to 1.
+    pub camera_scale: f64,
+    /// Rotation of the readings about x, then y, in rad.
+    pub camera_tilt_rad: [f64; 2],
+    /// Stated times are this much too long, relative to 1.
+    pub clock_rate: f64,
+    /// Unlisted: amplitude in m and frequency in Hz of a swinging mast, its phase new in each run.
+    pub mast: [f64; 2],
+    /// Unlisted: the drag falls to this share above a speed in m/s (share, speed); (0, 0) for none.
+    pub drag_crisis: [f64; 2],
+    /// Unlisted: a cord that pulls back towards the start, in 1/s^2.
+    pub cord_per_s2: f64,
+}
+
+/// How flights are recorded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlightWorld {
+    /// What is measured.
+    pub seen: Seen,
+    /// Number of runs.
+    pub runs: usize,
+    /// Fewest and most rows of a run.
+    pub rows: [usize; 2],
+    /// Frames in a second.
+    pub frame_hz: f64,
+    /// Range of speeds at the start in m/s.
+    pub speed_m_s: [f64; 2],
+    /// Range of angles above level at the start, in rad.
+    pub elevation_rad: [f64; 2],
+    /// What acts.
+    pub effects: Effects,
+    /// Noise of every channel.
+    pub noise: Noise,
+}
+
+/// One recorded run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnRun {
+    /// Label.
+    pub label: String,
+    /// Stated times.
+    pub t_s: Vec<f64>,
+    /// Readings, one column a channel.
+    pub channels: Vec<Vec<f64>>,
+}
+
+/// A recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drawn {
+    /// Names of the channels.
+    pub names: &'static [&'static str],
+    /// The runs.
+    pub runs: Vec<DrawnRun>,
+}
+
+const G: f64 = 9.80665;
+/// Steps of the integration in each frame.
+const STEPS: usize = 40;
+
+impl FlightWorld {
+    /// Five throws, filmed at 60 Hz for about a second.
+    pub fn thrown(seen: Seen) -> Self {
+        Self {
+            seen,
+            runs: 5,
+            rows: [40, 70],
+            frame_hz: 60.0,
+            speed_m_s: [4.0, 9.0],
+            elevation_rad: [0.5, 1.3],
+            effects: Effects::default(),
+            noise: Noise::white(0.001),
+        }
+    }
+
+    /// Drops from rest, the ball let go just before the first frame.
+    pub fn dropped(runs: usize, rows: [usize; 2], frame_hz: f64) -> Self {
+        Self {
+            runs,
+            rows,
+            frame_hz,
+            speed_m_s: [0.0, 0.3],
+            elevation_rad: [-1.6, -1.5],
+            ..Self::thrown(Seen::Height)
+        }
+    }
+
+    /// Draws a recording; the same seed gives the same bits.
+    pub fn draw(&self, seed: u64) -> Drawn {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut between = |[low, high]: [f64; 2]| {
+            Uniform::new_inclusive(low, high.max(low)).map_or(low, |u| u.sample(&mut rng))
+        };
+        let plans: Vec<([f64; 6], usize, f64)> = (0..self.runs)
+            .map(|_| {
+                let speed = between(self.speed_m_s);
+                let (sin, cos) = between(self.elevation_rad).sin_cos();
+                let (east, north) = between([-0.6, 0.6]).sin_cos();
+                let place = [between([-0.1, 0.1]), between([-0.1, 0.1]), between([1.0, 1.6])];
+                let velocity = [speed * cos * north, speed * cos * east, speed * sin];
+                let rows = between([self.rows[0] as f64, self.rows[1] as f64]).round() as usize;
+                let [x, y, z] = place;
+                let [u, v, w] = velocity;
+                ([x, y, z, u, v, w], rows, between([0.0, std::f64::consts::TAU]))
+            })
+            .collect();
+        let names: &[&str] = match self.seen {
+            Seen::Height => &["z_m"],
+            Seen::Space => &["x_m", "y_m", "z_m"],
+            Seen::Felt => &["accel_z_m_s2"],
+        };
+        let runs = plans
+            .into_iter()
+            .enumerate()
+            .map(|(r, (start, rows, phase))| {
+                let (t_s, mut channels) = self.fly(start, rows, phase);
+                for column in &mut channels {
+                    self.noise.apply(column, &mut rng);
+                }
+                DrawnRun { label: format!("{}", r + 1), t_s, channels }
+            })
+            .collect();
+        Drawn { names, runs }
+    }
+
+    /// One flight as the camera would see it without noise.
+    fn fly(&self, start: [f64; 6], rows: usize, phase: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let e = &self.effects;
+        let origin = [start[0], start[1], start[2]];
+        let force = |y: &[f64; 6]| -> [f64; 3] {
+            let air = [y[3] - e.wind_m_s[0], y[4] - e.wind_m_s[1], y[5]];
+            let speed = (air[0].powi(2) + air[1].powi(2) + air[2].powi(2)).sqrt();
+            let share =
+                if e.drag_crisis[1] > 0.0 && speed > e.drag_crisis[1] { e.drag_crisis[0] } else { 1.0 };
+            let drag = share * e.quadratic_per_m * speed + e.linear_per_s;
+            let [lx, ly, lz] = e.magnus_per_s;
+            [
+                ly * y[5] - lz * y[4] - drag * air[0] - e.cord_per_s2 * (y[0] - origin[0]),
+                lz * y[3] - lx * y[5] - drag * air[1] - e.cord_per_s2 * (y[1] - origin[1]),
+                lx * y[4] - ly * y[3] - drag * air[2] - e.cord_per_s2 * (y[2] - origin[2]) + e.lift_m_s2 - G,
+            ]
+        };
+        let rate = |y: &[f64; 6]| {
+            let f = force(y);
+            [y[3], y[4], y[5], f[0], f[1], f[2]]
+        };
+        let moved =
+            |y: &[f64; 6], k: &[f64; 6], h: f64| -> [f64; 6] { std::array::from_fn(|i| y[i] + h * k[i]) };
+        // The clock states (1 + rate) times the true time: frames are that much closer together.
+        let frame = 1.0 / self.frame_hz;
+        let h = frame / (1.0 + e.clock_rate) / STEPS as f64;
+        let mut y = start;
+        let mut t_s = Vec::with_capacity(rows);
+        let mut channels = vec![Vec::with_capacity(rows); if self.seen == Seen::Space { 3 } else { 1 }];
+        for i in 0..rows {
+            let t = i as f64 * frame;
+            t_s.push(t);
+            let swing = e.mast[0] * (std::f64::consts::TAU * e.mast[1] * t + phase).sin();
+            let seen = self.read(&y, swing);
+            match self.seen {
+                Seen::Height => channels[0].push(seen[2]),
+                Seen::Space => channels.iter_mut().zip(seen).for_each(|(c, v)| c.push(v)),
+                // Specific force with an offset that every run has of its own.
+                Seen::Felt => channels[0].push(force(&y)[2] + G + 0.05 * phase.cos()),
+            }
+            for _ in 0..STEPS {
+                let k1 = rate(&y);
+                let k2 = rate(&moved(&y, &k1, 0.5 * h));
+                let k3 = rate(&moved(&y, &k2, 0.5 * h));
+                let k4 = rate(&moved(&y, &k3, h));
+                for i in 0..6 {
+                    y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+                }
+            }
+        }
+        (t_s, channels)
+    }
+
+    /// The camera's reading of a position.
+    fn read(&self, y: &[f64; 6], swing: f64) -> [f64; 3] {
+        let e = &self.effects;
+        let [about_x, about_y] = e.camera_tilt_rad;
+        let turned =
+            [y[0], y[1] * about_x.cos() - y[2] * about_x.sin(), y[1] * about_x.sin() + y[2] * about_x.cos()];
+        let turned = [
+            turned[0] * about_y.cos() + turned[2] * about_y.sin(),
+            turned[1],
+            turned[2] * about_y.cos() - turned[0] * about_y.sin(),
+        ];
+        let scale = 1.0 + e.camera_scale;
+        [scale * turned[0] + swing, scale * turned[1] + 0.3 * swing, scale * turned[2]]
+    }
+}
+
+impl Drawn {
+    /// The table of the recording's format.
+    pub fn csv(&self, decimals: usize) -> String {
+        let mut text = format!("run,t_s,{}\n", self.names.join(","));
+        for run in &self.runs {
+            for (i, t) in run.t_s.iter().enumerate() {
+                let cells: Vec<String> =
+                    run.channels.iter().map(|c| format!("{:.decimals$}", c[i])).collect();
+                // Writing to a string cannot fail.
+                let _ = writeln!(text, "{},{t:.5},{}", run.label, cells.join(","));
+            }
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vacuum_gives_parabolas() {
+        let world = FlightWorld { noise: Noise::white(0.0), ..FlightWorld::thrown(Seen::Space) };
+        for run in world.draw(1).runs {
+            for (column, g) in run.channels.iter().zip([0.0, 0.0, G]) {
+                for i in 2..column.len() {
+                    let bend = column[i] - 2.0 * column[i - 1] + column[i - 2];
+                    approx::assert_abs_diff_eq!(bend, -g / 3600.0, epsilon = 1e-12);
+                }
+            }
+        }
+    }
+
+    /// A drop from rest under quadratic drag falls vt^2/g ln cosh(g t / vt).
+    #[test]
+    fn drag_follows_the_closed_form() {
+        let effects = Effects { quadratic_per_m: 0.03, ..Effects::default() };
+        let still = FlightWorld {
+            speed_m_s: [0.0, 0.0],
+            noise: Noise::white(0.0),
+            effects,
+            ..FlightWorld::dropped(1, [60, 60], 30.0)
+        };
+        let run = &still.draw(2).runs[0];
+        for (t, z) in run.t_s.iter().zip(&run.channels[0]) {
+            let fallen = ((G * 0.03_f64).sqrt() * t).cosh().ln() / 0.03;
+            approx::assert_abs_diff_eq!(run.channels[0][0] - z, fallen, epsilon = 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits() {
+        let world = FlightWorld::thrown(Seen::Space);
+        assert_eq!(world.draw(5), world.draw(5));
+        assert_ne!(world.draw(5), world.draw(6));
+    }
+}

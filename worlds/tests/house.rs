@@ -1,0 +1,88 @@
+//! Rules of the whole workspace: which crate may know which, and what is bundled.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Normal dependencies on crates of this workspace, by crate.
+fn arrows() -> BTreeMap<String, Vec<String>> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    let names: Vec<&str> = packages.iter().map(|p| p["name"].as_str().unwrap()).collect();
+    packages
+        .iter()
+        .map(|p| {
+            let dependencies = p["dependencies"].as_array().unwrap();
+            let ours = dependencies
+                .iter()
+                .filter(|d| d["kind"].is_null())
+                .filter_map(|d| d["name"].as_str())
+                .filter(|n| names.contains(n));
+            (p["name"].as_str().unwrap().to_owned(), ours.map(str::to_owned).collect())
+        })
+        .collect()
+}
+
+#[test]
+fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
+    const SHARED: [&str; 3] = ["hw-traits", "hertz-contact", "bayes-sim"];
+    const CHAPTERS: [&str; 6] =
+        ["liquid-haptics", "granular-infer", "bounce-audio", "softcell", "stretch", "dough-mbrl"];
+    let arrows = arrows();
+    assert!(arrows.contains_key("missing-physics") && arrows.contains_key("worlds"), "{arrows:?}");
+    for (from, to) in &arrows {
+        let allowed: Vec<&str> = match from.as_str() {
+            "missing-physics" | "worlds" => vec![],
+            name if SHARED.contains(&name) => vec![],
+            name if CHAPTERS.contains(&name) => SHARED.to_vec(),
+            "missing-physics-cli" => CHAPTERS.into_iter().chain(SHARED).chain(["missing-physics"]).collect(),
+            // Examples and benches look at everything, and nothing looks at them.
+            "examples" | "benches" => arrows.keys().map(String::as_str).collect(),
+            other => panic!("{other} has no place on the map: add it to DESIGN's arrows and here"),
+        };
+        for name in to {
+            assert!(allowed.contains(&name.as_str()), "{from} may not depend on {name}");
+            assert!(!["examples", "benches"].contains(&name.as_str()), "{from} may not depend on {name}");
+        }
+    }
+}
+
+#[test]
+fn source_files_fit_on_a_few_screens() {
+    fn visit(folder: &Path, seen: &mut usize) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() && name != "target" && !name.starts_with('.') {
+                visit(&path, seen);
+            } else if name.ends_with(".rs") {
+                let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+                assert!(lines <= 700, "{} has {lines} lines", path.display());
+                *seen += 1;
+            }
+        }
+    }
+    let mut seen = 0;
+    visit(&root(), &mut seen);
+    assert!(seen > 20);
+}
+
+#[test]
+fn bundled_recordings_are_what_the_example_makes() {
+    for recording in worlds::bundled::all() {
+        let folder = root().join("recordings").join(recording.name);
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_default();
+        assert!(read("recording.toml") == recording.header, "{}: run the example `bundled`", recording.name);
+        assert!(read("data.csv") == recording.data, "{}: run the example `bundled`", recording.name);
+        assert!(read("README.md") == recording.readme, "{}: run the example `bundled`", recording.name);
+    }
+}
