@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 use crate::bank::{Bank, Reading};
 use crate::diagnosis::TestOutcome;
-use crate::fit::{Fit, NoiseRule};
+use crate::fit::{Fit, NoiseRule, estimate_noise};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
@@ -41,10 +41,10 @@ pub(crate) fn test(
     let observed = residuals(problem, fit)?;
     // The noise of the null worlds is that of the fitted model; shapes that such worlds never choose, nor these data
     // under any alternative, need not be tried again for each of them.
-    let truth: Vec<(usize, f64)> =
-        fit.noise.shape.iter().copied().zip(fit.noise.sigma.iter().copied()).collect();
+    let noise = estimate_noise(problem, selection, rule, &fit.shared, &fit.own)?;
+    let truth: Vec<(usize, f64)> = noise.shape.iter().copied().zip(noise.sigma.iter().copied()).collect();
     let mut wanted: Vec<bool> = vec![false; problem.shapes.len()];
-    fit.noise.shape.iter().for_each(|&s| wanted[s] = true);
+    noise.shape.iter().for_each(|&s| wanted[s] = true);
     wanted[0] = true;
     let pilots: Vec<Reading> = (0..12u64)
         .into_par_iter()

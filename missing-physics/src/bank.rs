@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 
 use crate::fit::{Fit, NoiseRule, NoiseState, whitened_columns};
-use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, log_determinant};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, determined, dot, forward, log_determinant};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
@@ -31,6 +31,8 @@ pub(crate) const DEGREE: usize = 5;
 struct Block {
     /// Raw (unwhitened) columns over the measured rows.
     raw: Vec<Vec<f64>>,
+    /// The model's own columns that this channel determines.
+    mine: Vec<usize>,
     /// Per shape in play: whitened columns and their Gram matrix.
     shapes: Vec<Whitened>,
 }
@@ -38,6 +40,10 @@ struct Block {
 struct Whitened {
     columns: Vec<Vec<f64>>,
     gram: DMatrix<f64>,
+    /// The own columns' Cholesky factor and kept pivots.
+    own: (DMatrix<f64>, Vec<bool>),
+    /// The own columns' share of every other column: forward-solved products.
+    borders: Vec<Vec<f64>>,
     /// Log determinant of the noise and of the own columns.
     log_determinant: f64,
 }
@@ -58,10 +64,21 @@ pub(crate) struct Bank<'a> {
     freedom: Vec<f64>,
 }
 
-/// Products of a data vector with every block's columns.
+/// Products of a data vector with one block's columns under one shape.
+struct Product {
+    /// With each column.
+    with: Vec<f64>,
+    /// The own columns' share, forward-solved.
+    own: Vec<f64>,
+    /// Sum of squares that the own columns leave.
+    left: f64,
+    /// Sum of squares.
+    total: f64,
+}
+
+/// Products of a data vector with every block's columns, `[run][channel][shape]`.
 struct Products {
-    /// `[run][channel][shape]`: products, and the sum of squares.
-    values: Vec<Vec<Vec<(Vec<f64>, f64)>>>,
+    values: Vec<Vec<Vec<Product>>>,
 }
 
 /// What a data vector says of the model and its alternatives.
@@ -169,17 +186,21 @@ impl<'a> Bank<'a> {
                 }
                 curves.fill(problem, run, channel, &mut raw[base..]);
                 start += n;
-                row.push(Block { raw, shapes: Vec::new() });
+                row.push(Block { raw, mine: Vec::new(), shapes: Vec::new() });
+            }
+            let squares: Vec<Vec<f64>> =
+                row.iter().map(|b| b.raw[..n_own].iter().map(|c| dot(c, c)).collect()).collect();
+            let largest: Vec<f64> =
+                (0..n_own).map(|k| squares.iter().map(|s| s[k]).fold(0.0, f64::max)).collect();
+            for (block, here) in row.iter_mut().zip(&squares) {
+                block.mine = determined(here, &largest);
             }
             blocks.push(row);
         }
         let counted: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let freedom = (0..problem.channels())
             .map(|c| {
-                let used: usize = blocks
-                    .iter()
-                    .map(|row| cholesky(&mut gram(&row[c].raw[..n_own]), 1e-9).iter().filter(|k| **k).count())
-                    .sum();
+                let used: usize = blocks.iter().map(|row| row[c].mine.len()).sum();
                 let rows = problem.count(c) as f64;
                 (rows - used as f64 - n_shared as f64 * rows / counted.max(1) as f64).max(1.0)
             })
@@ -202,7 +223,7 @@ impl<'a> Bank<'a> {
     /// Puts the given shapes of the family in play, and no others.
     pub(crate) fn play(&mut self, shapes: &[usize]) {
         self.in_play = shapes.to_vec();
-        let (problem, n_own) = (self.problem, self.n_own);
+        let problem = self.problem;
         for (run, row) in self.blocks.iter_mut().enumerate() {
             for (channel, block) in row.iter_mut().enumerate() {
                 block.shapes = shapes
@@ -211,10 +232,20 @@ impl<'a> Bank<'a> {
                         let whitener = problem.whitener(run, channel, shape);
                         let mut columns = block.raw.clone();
                         columns.iter_mut().for_each(|c| whitener.whiten(c));
-                        let mut own = gram(&columns[..n_own]);
+                        let gram = gram(&columns);
+                        let mut own = DMatrix::from_fn(block.mine.len(), block.mine.len(), |i, j| {
+                            gram[(block.mine[i], block.mine[j])]
+                        });
                         let kept = cholesky(&mut own, 1e-9);
                         let log_determinant = whitener.log_determinant + log_determinant(&own, &kept);
-                        Whitened { gram: gram(&columns), columns, log_determinant }
+                        let borders = (0..columns.len())
+                            .map(|j| {
+                                let mut border: Vec<f64> = block.mine.iter().map(|&i| gram[(i, j)]).collect();
+                                forward(&own, &kept, &mut border);
+                                border
+                            })
+                            .collect();
+                        Whitened { gram, own: (own, kept), borders, columns, log_determinant }
                     })
                     .collect();
             }
@@ -249,7 +280,11 @@ impl<'a> Bank<'a> {
                             .map(|(shape, &index)| {
                                 let mut y = raw.clone();
                                 self.problem.whitener(run, channel, index).whiten(&mut y);
-                                (shape.columns.iter().map(|c| dot(c, &y)).collect(), dot(&y, &y))
+                                let with: Vec<f64> = shape.columns.iter().map(|c| dot(c, &y)).collect();
+                                let mut own: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
+                                forward(&shape.own.0, &shape.own.1, &mut own);
+                                let total = dot(&y, &y);
+                                Product { with, left: total - dot(&own, &own), own, total }
                             })
                             .collect()
                     })
@@ -279,7 +314,7 @@ impl<'a> Bank<'a> {
                 let weight = 1.0 / (sigma * sigma);
                 let gram = &block.shapes[shape].gram;
                 for (i, &a) in ids.iter().enumerate() {
-                    b[i] += weight * value[shape].0[a];
+                    b[i] += weight * value[shape].with[a];
                     for (j, &c) in ids.iter().enumerate().take(i + 1) {
                         normal[(i, j)] += weight * gram[(a, c)];
                     }
@@ -346,15 +381,17 @@ impl<'a> Bank<'a> {
     ) -> (f64, f64) {
         let (mut squares, mut log_determinant) = (0.0, 0.0);
         for ((row, values), x) in self.blocks.iter().zip(&products.values).zip(coefficients) {
+            // The own coefficients are fitted anew under each shape; the others are given.
             let block = &row[channel].shapes[shape];
-            let (b, total) = &values[channel][shape];
-            let mut form = *total;
-            for (i, &a) in ids.iter().enumerate() {
-                let mut inner = -2.0 * b[a];
-                for (j, &c) in ids.iter().enumerate() {
-                    inner += block.gram[(a, c)] * x[j];
+            let product = &values[channel][shape];
+            let mut form = product.left;
+            let others = || ids.iter().zip(x).filter(|(a, _)| !row[channel].mine.contains(a));
+            for (&a, xa) in others() {
+                let mut inner = -2.0 * (product.with[a] - dot(&block.borders[a], &product.own));
+                for (&c, xc) in others() {
+                    inner += (block.gram[(a, c)] - dot(&block.borders[a], &block.borders[c])) * xc;
                 }
-                form += x[i] * inner;
+                form += xa * inner;
             }
             squares += form.max(0.0);
             log_determinant += block.log_determinant;
@@ -419,7 +456,7 @@ impl<'a> Bank<'a> {
         let shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
         let start: Vec<(usize, f64)> = (0..self.problem.channels())
             .map(|c| {
-                let squares: f64 = products.values.iter().map(|row| row[c][0].1).sum();
+                let squares: f64 = products.values.iter().map(|row| row[c][0].total).sum();
                 (0, self.channel_score(c, squares, 0.0).1)
             })
             .collect();

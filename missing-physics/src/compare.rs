@@ -78,7 +78,8 @@ pub(crate) fn candidate(
         );
     };
     let fit = fit(problem, &selection, rule, (&first.shared, &first.own), Some(&first.noise))?;
-    let (evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
+    let (mut evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
+    evidence += fit.noise.shape.iter().map(|&shape| rule.log_prior(problem, shape)).sum::<f64>();
     Ok(Candidate { set: set.to_vec(), selection, fit, evidence, ruled_out })
 }
 

@@ -75,7 +75,7 @@ const SPIKE_LIMIT: f64 = 7.0;
 /// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
 const RIVAL_GAP: f64 = 3.0;
 /// A richer set must beat an adequate simpler one by this log evidence.
-const EARNED: f64 = 2.0;
+const EARNED: f64 = 3.0;
 /// Below this mean number of rows in a run, correlation along a run is not looked for.
 const ROWS_FOR_COLOUR: usize = 8;
 
@@ -144,7 +144,9 @@ pub fn diagnose(
     }
 
     tell("comparing mechanisms", 0.0)?;
-    let all = search(&problem, &rule, baseline.clone(), &everything, &|done| {
+    let competing = rule.competing();
+    let among = candidate(&problem, &competing, &[], &[], &baseline.fit, &[])?;
+    let all = search(&problem, &competing, among, &everything, &|done| {
         observer.progress(Progress { stage: "comparing mechanisms", done })
     })
     .ok_or(DiagnoseError::Stopped)?;
@@ -165,8 +167,9 @@ pub fn diagnose(
         loop {
             let simpler = physical.iter().find(|c| {
                 !c.set.is_empty()
-                    && c.set.len() < current.0.set.len()
-                    && c.set.iter().all(|m| current.0.set.contains(m))
+                    && c.selection.shared.len() + c.selection.own.len()
+                        < current.0.selection.shared.len() + current.0.selection.own.len()
+                    && nested(c, current.0)
                     && c.evidence > current.0.evidence - EARNED
             });
             let Some(&simpler) = simpler else { break };
@@ -217,14 +220,14 @@ pub fn diagnose(
                 && !c.set.is_empty()
                 && c.evidence > chosen.evidence - RIVAL_GAP
                 && !nested(chosen, c)
-                && !rivals_subset(c, chosen)
+                && !nested(c, chosen)
         }));
         keep_minimal(&mut rivals);
         rivals.truncate(6);
         if rivals.len() > 1 {
             diagnosis.verdict = Verdict::Ambiguous;
             diagnosis.confused_with = rivals[1..].iter().map(|c| work.ids(&c.set)).collect();
-            let matrix = confusion(&problem, &rule, &rivals, 100, options.seed)?;
+            let matrix = confusion(&problem, &competing, &rivals, 100, options.seed)?;
             diagnosis.confusion =
                 Some(Confusion { sets: rivals.iter().map(|c| work.ids(&c.set)).collect(), matrix });
             tell("choosing the next experiment", 0.0)?;
@@ -245,7 +248,7 @@ pub fn diagnose(
             ));
         }
         tell("looking for a law in the residual", 0.0)?;
-        if let Some(found) = law::find(&problem, &rule, &baseline, &base_score)? {
+        if let Some(found) = law::find(&problem, &competing, &baseline, &base_score)? {
             diagnosis.after = work.errors_of(&found.predictions, &found.held_out);
             for (run, curves) in diagnosis.curves.iter_mut().enumerate() {
                 curves.after.clone_from(&found.predictions[run]);
@@ -256,11 +259,6 @@ pub fn diagnose(
     }
     tell("done", 1.0)?;
     Ok(diagnosis)
-}
-
-/// Whether `c` frees only parameters that `chosen` frees too: a simpler set that had its chance.
-fn rivals_subset(c: &Candidate, chosen: &Candidate) -> bool {
-    nested(c, chosen)
 }
 
 /// Drops rivals that only add to another rival.
@@ -346,6 +344,7 @@ fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         (0..problem.channels()).map(|c| recording.calibration.get(c).copied().flatten()).collect();
     NoiseRule {
         fixed_sigma,
+        against_colour: 0.0,
         allowed: if long { (0..problem.shapes.len()).collect() } else { vec![0] },
         floor,
     }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::data::Run;
-use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, log_determinant};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, determined, dot, forward, log_determinant};
 use crate::model::{Model, PredictError};
 use crate::problem::{Problem, Selection};
 
@@ -313,7 +313,6 @@ pub(crate) fn solve(
         log_likelihood -= 0.5 * e.log_determinant;
     }
     for channel in 0..problem.channels() {
-        log_likelihood += problem.shapes[noise.shape[channel]].log_prior();
         log_likelihood -= problem.count(channel) as f64 * noise.sigma[channel].ln();
         for run in 0..problem.rows.len() {
             log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
@@ -339,8 +338,24 @@ pub(crate) struct NoiseRule {
     pub(crate) fixed_sigma: Vec<Option<f64>>,
     /// The shapes that are allowed.
     pub(crate) allowed: Vec<usize>,
+    /// Further log prior weight against correlated noise. Where mechanisms compete, colour that only some of them need is
+    /// one more thing that they assume; it cancels where all of them need it.
+    pub(crate) against_colour: f64,
     /// The smallest sigma that is believed, by channel (a reading has a last digit).
     pub(crate) floor: Vec<f64>,
+}
+
+impl NoiseRule {
+    /// Log prior weight of a shape.
+    pub(crate) fn log_prior(&self, problem: &Problem<'_>, shape: usize) -> f64 {
+        let weight = problem.shapes[shape].log_prior();
+        if weight < 0.0 { weight - self.against_colour } else { weight }
+    }
+
+    /// The same rule for mechanisms that compete.
+    pub(crate) fn competing(&self) -> Self {
+        Self { against_colour: 6.0, ..self.clone() }
+    }
 }
 
 /// The likeliest noise of each channel given a fit's residuals (restricted to what the own parameters leave).
@@ -359,6 +374,8 @@ pub(crate) fn estimate_noise(
     for (run, values) in own.iter().enumerate() {
         raw.push(whitened_columns(problem, selection, &white, run, shared, values)?);
     }
+    let own_columns: Vec<Vec<Vec<usize>>> =
+        (0..own.len()).map(|run| channel_columns(problem, run, &raw[run][..selection.own.len()])).collect();
     for channel in 0..channels {
         let mut best = f64::NEG_INFINITY;
         for &shape in &rule.allowed {
@@ -367,8 +384,11 @@ pub(crate) fn estimate_noise(
                 let start: usize = (0..channel).map(|c| problem.rows[run].valid[c].len()).sum();
                 let end = start + problem.rows[run].valid[channel].len();
                 let whitener = problem.whitener(run, channel, shape);
-                let n_own = selection.own.len();
-                let whitened: Vec<Vec<f64>> = (0..n_own)
+                let mine = &own_columns[run][channel];
+                let n_own = mine.len();
+                let whitened: Vec<Vec<f64>> = mine
+                    .iter()
+                    .copied()
                     .chain([columns.len() - 1])
                     .map(|k| {
                         let mut column = columns[k][start..end].to_vec();
@@ -377,9 +397,12 @@ pub(crate) fn estimate_noise(
                     })
                     .collect();
                 let residual = &whitened[n_own];
-                sums.squares += dot(residual, residual);
                 let mut own_gram = gram(&whitened[..n_own]);
                 let kept = cholesky(&mut own_gram, 1e-9);
+                // The own parameters are fitted anew under each shape: what they were under another one is no evidence.
+                let mut right: Vec<f64> = whitened[..n_own].iter().map(|c| dot(c, residual)).collect();
+                forward(&own_gram, &kept, &mut right);
+                sums.squares += (dot(residual, residual) - dot(&right, &right)).max(0.0);
                 sums.log_determinant += whitener.log_determinant + log_determinant(&own_gram, &kept);
                 sums.used += kept.iter().filter(|k| **k).count();
                 sums.rows += end - start;
@@ -391,7 +414,7 @@ pub(crate) fn estimate_noise(
                 Some(sigma) => sigma,
                 None => (sums.squares / freedom).sqrt().max(rule.floor[channel]),
             };
-            let score = problem.shapes[shape].log_prior()
+            let score = rule.log_prior(problem, shape)
                 - freedom * sigma.ln()
                 - 0.5 * sums.log_determinant
                 - 0.5 * sums.squares / (sigma * sigma);
@@ -403,6 +426,23 @@ pub(crate) fn estimate_noise(
         }
     }
     Ok(state)
+}
+
+/// For each channel, which of a run's own columns (all channels one after the other) it determines.
+fn channel_columns(problem: &Problem<'_>, run: usize, columns: &[Vec<f64>]) -> Vec<Vec<usize>> {
+    let mut start = 0;
+    let squares: Vec<Vec<f64>> = problem.rows[run]
+        .valid
+        .iter()
+        .map(|rows| {
+            let part = start..start + rows.len();
+            start = part.end;
+            columns.iter().map(|c| dot(&c[part.clone()], &c[part.clone()])).collect()
+        })
+        .collect();
+    let largest: Vec<f64> =
+        (0..columns.len()).map(|k| squares.iter().map(|s| s[k]).fold(0.0, f64::max)).collect();
+    squares.iter().map(|here| determined(here, &largest)).collect()
 }
 
 #[derive(Default)]

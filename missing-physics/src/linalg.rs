@@ -91,6 +91,12 @@ pub(crate) fn log_determinant(factor: &DMatrix<f64>, kept: &[bool]) -> f64 {
     (0..kept.len()).filter(|&i| kept[i]).map(|i| 2.0 * factor[(i, i)].ln()).sum()
 }
 
+/// The columns that a channel determines: those whose sum of squares in it (`here`) is not small beside the largest over
+/// all channels (`largest`).
+pub(crate) fn determined(here: &[f64], largest: &[f64]) -> Vec<usize> {
+    (0..here.len()).filter(|&k| here[k] > 0.0 && here[k] >= 0.01 * largest[k]).collect()
+}
+
 /// Pivots below this share of their diagonal count as not determined.
 pub(crate) const RANK_FLOOR: f64 = 1e-11;
 
