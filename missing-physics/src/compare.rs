@@ -44,6 +44,16 @@ pub(crate) fn candidate(
     let selection = problem.select(set, terms);
     let added: Vec<usize> =
         selection.shared.iter().zip(&selection.added_shared).filter(|(_, a)| **a).map(|(s, _)| *s).collect();
+    // What the neighbour had on and this set does not is off again.
+    let mut near = near.clone();
+    for slot in (0..near.shared.len()).filter(|s| !selection.shared.contains(s)) {
+        near.shared[slot] = problem.shared.start[slot];
+    }
+    for (run, own) in near.own.iter_mut().enumerate() {
+        for slot in (0..own.len()).filter(|s| !selection.own.contains(s)) {
+            own[slot] = problem.own_start[run][slot];
+        }
+    }
     let mut starts: Vec<Vec<f64>> = Vec::new();
     if !hints.is_empty() {
         let mut start = near.shared.clone();
