@@ -1,0 +1,48 @@
+//! How often the tool sees something where there is nothing.
+//!
+//! Null worlds with white, coloured and quantised noise; every run's start is fitted. The rate must lie inside the 95 %
+//! binomial band of the promised one, at 5 % and at 1 %.
+//!
+//! `cargo run --release -p examples --example 01_false_alarms` (2,000 worlds; `--small`: 60)
+#![allow(clippy::print_stdout, reason = "printing is what an example is for")]
+
+use statrs::distribution::{Binomial, DiscreteCDF};
+use worlds::flight::{FlightWorld, Seen};
+use worlds::noise::Noise;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let count = if examples::small() { 10 } else { 334 };
+    let space = FlightWorld::thrown(Seen::Space);
+    let height = FlightWorld::thrown(Seen::Height);
+    let with = |world: FlightWorld, noise: Noise| FlightWorld { noise, ..world };
+    let kinds = [
+        ("height, white noise", with(height, Noise::white(0.002))),
+        ("height, correlated by 0.6", with(height, Noise { correlation: 0.6, ..Noise::white(0.002) })),
+        ("height, read to 5 mm", with(height, Noise { digit: 0.005, ..Noise::white(0.002) })),
+        ("space, white noise", space),
+        ("space, correlated by 0.8", with(space, Noise { correlation: 0.8, ..Noise::white(0.001) })),
+        ("space, read to 2 mm", with(space, Noise { digit: 0.002, ..Noise::white(0.001) })),
+    ];
+    let mut all = Vec::new();
+    println!("{:28} {:>7} {:>8} {:>8}", "null worlds", "number", "at 5 %", "at 1 %");
+    for (k, (name, world)) in kinds.iter().enumerate() {
+        let answers = examples::diagnose_many(name, world, count, 10_000 * (k as u64 + 1), 399)?;
+        let p: Vec<f64> = answers.iter().map(|d| d.p_value).collect();
+        let at = |level: f64| p.iter().filter(|p| **p <= level).count();
+        println!("{name:28} {:>7} {:>8} {:>8}", p.len(), at(0.05), at(0.01));
+        all.extend(p);
+    }
+    let n = all.len() as u64;
+    for level in [0.05, 0.01] {
+        let alarms = all.iter().filter(|p| **p <= level).count();
+        let law = Binomial::new(level, n)?;
+        let (low, high) = (law.inverse_cdf(0.025), law.inverse_cdf(0.975));
+        let inside = if (low..=high).contains(&(alarms as u64)) { "inside" } else { "OUTSIDE" };
+        println!(
+            "all: {:.2} % of {n} worlds at {} %: {alarms} alarms, {inside} the 95 % band {low} to {high}",
+            100.0 * alarms as f64 / n as f64,
+            100.0 * level
+        );
+    }
+    Ok(())
+}

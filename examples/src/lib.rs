@@ -1,0 +1,76 @@
+//! What the examples share: worlds put before the engine, many at a time, with a progress bar.
+
+use indicatif::{ParallelProgressIterator, ProgressStyle};
+use missing_physics::data::{Recording, Run};
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::engine::{DiagnoseError, Options, diagnose};
+use missing_physics::model::Quantity;
+use missing_physics::observer::Silent;
+use missing_physics_cli::domains::trajectory::model::{Axes, Setup, TrajectoryModel};
+use rayon::prelude::*;
+use worlds::flight::{FlightWorld, Seen};
+
+/// Whether the example was called with `--small`.
+pub fn small() -> bool {
+    std::env::args().any(|a| a == "--small")
+}
+
+/// The model of a flight of which nothing is known but gravity.
+pub fn model(seen: Seen) -> TrajectoryModel {
+    let axes = match seen {
+        Seen::Height => Axes::Height,
+        Seen::Space => Axes::Space,
+        Seen::Felt => Axes::Accelerometer,
+    };
+    TrajectoryModel::new(Setup {
+        axes,
+        mass_kg: None,
+        diameter_m: None,
+        gravity_m_s2: 9.80665,
+        air_density_kg_m3: 1.2,
+        spin: false,
+    })
+}
+
+/// A drawn world as the engine sees it.
+pub fn recording(world: &FlightWorld, seed: u64) -> Recording {
+    let drawn = world.draw(seed);
+    let unit = if world.seen == Seen::Felt { "m/s^2" } else { "m" };
+    Recording {
+        channels: drawn.names.iter().map(|n| Quantity::new(*n, unit)).collect(),
+        variables: vec![Quantity::new("t_s", "s")],
+        runs: drawn
+            .runs
+            .into_iter()
+            .map(|r| Run { label: r.label, inputs: vec![r.t_s], outputs: r.channels, kind: 0 })
+            .collect(),
+        noise_along: Some(0),
+        calibration: vec![None; drawn.names.len()],
+        resolution: vec![world.noise.digit; drawn.names.len()],
+    }
+}
+
+/// Diagnoses `count` draws of a world, in parallel, each with its own seed; in order.
+///
+/// # Errors
+/// The first [`DiagnoseError`].
+pub fn diagnose_many(
+    name: &str,
+    world: &FlightWorld,
+    count: u64,
+    first_seed: u64,
+    replicates: usize,
+) -> Result<Vec<Diagnosis>, DiagnoseError> {
+    let model = model(world.seen);
+    let style = ProgressStyle::with_template("{msg:40} {bar:30} {pos}/{len} {eta}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = indicatif::ProgressBar::new(count).with_style(style).with_message(name.to_owned());
+    (first_seed..first_seed + count)
+        .into_par_iter()
+        .progress_with(bar)
+        .map(|seed| {
+            let options = Options { seed, replicates, ..Options::default() };
+            diagnose(&model, &recording(world, seed), &[], &options, &Silent)
+        })
+        .collect()
+}
