@@ -15,11 +15,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let kinds = [
         ("quadratic-drag", "k_per_m", 0.012, of(base, Effects { quadratic_per_m: 0.012, ..none })),
         ("quadratic-drag", "k_per_m", 0.02, of(drop, Effects { quadratic_per_m: 0.02, ..none })),
-        ("magnus-lift", "lift_y_per_s", 0.05, of(base, Effects { magnus_per_s: [0.01, 0.05, -0.02], ..none })),
+        (
+            "magnus-lift",
+            "lift_y_per_s",
+            0.05,
+            of(base, Effects { magnus_per_s: [0.01, 0.05, -0.02], ..none }),
+        ),
         ("camera-tilt", "about_x_rad", 0.006, of(base, Effects { camera_tilt_rad: [0.006, -0.002], ..none })),
     ];
     let (mut named_all, mut covered_all, mut n) = (0, 0, 0);
-    println!("{:16} {:14} {:>8} {:>14} {:>20}", "hidden", "parameter", "named", "in the answer", "interval holds it");
+    println!(
+        "{:16} {:14} {:>8} {:>14} {:>20}",
+        "hidden", "parameter", "named", "in the answer", "interval holds it"
+    );
     for (k, (id, parameter, truth, world)) in kinds.iter().enumerate() {
         let answers = examples::diagnose_many(id, world, count, 2_000_000 + 10_000 * k as u64, 199)?;
         let is = |set: &Vec<String>| set.len() == 1 && set[0] == *id;
@@ -41,6 +49,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         covered_all += covered;
         n += answers.len();
     }
-    println!("all {n} worlds: {named_all} named; the interval holds the truth in {:.1} %", 100.0 * covered_all as f64 / named_all.max(1) as f64);
+    println!(
+        "all {n} worlds: {named_all} named; the interval holds the truth in {:.1} %",
+        100.0 * covered_all as f64 / named_all.max(1) as f64
+    );
     Ok(())
 }

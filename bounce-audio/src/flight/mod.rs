@@ -118,23 +118,40 @@ impl<T: DualNum<Primitive = f64, Real = f64> + Copy> Flight<T> {
 
     /// The states at rising times (s, from the start on), to a relative error of 1e-9.
     ///
-    /// Free fall and linear drag are closed forms, everything else is integrated.
+    /// Plain numbers for which only linear drag and constant forces act take the closed form; everything else is
+    /// integrated. A dual number is integrated always, since a coefficient of zero may have a derivative.
     ///
     /// # Errors
     /// [`FlightError`]; `out` is then unspecified.
     pub fn states(&self, start: &State<T>, times_s: &[f64], out: &mut [State<T>]) -> Result<(), FlightError> {
-        self.check(start, times_s, out.len())?;
-        let zero = |v: &T| v.is_zero() && v.re() == 0.0;
-        let still = zero(&self.quadratic_per_m)
+        let zero = |v: &T| v.re() == 0.0;
+        let closed = T::NDERIV == 0
+            && zero(&self.quadratic_per_m)
             && zero(&self.cubic_s_per_m2)
             && self.lift_per_s.iter().chain(&self.stiffness_per_s2).all(zero);
-        if still {
-            for (state, &t) in out.iter_mut().zip(times_s) {
-                *state = self.linear(start, t);
-            }
-            return Ok(());
+        if closed {
+            return self.states_in_linear_drag(start, times_s, out);
         }
+        self.check(start, times_s, out.len())?;
         integrate::states(self, start, times_s, out)
+    }
+
+    /// The states in closed form, under gravity, linear drag, wind and constant forces alone; whatever else is set is
+    /// left out.
+    ///
+    /// # Errors
+    /// [`FlightError`].
+    pub fn states_in_linear_drag(
+        &self,
+        start: &State<T>,
+        times_s: &[f64],
+        out: &mut [State<T>],
+    ) -> Result<(), FlightError> {
+        self.check(start, times_s, out.len())?;
+        for (state, &t) in out.iter_mut().zip(times_s) {
+            *state = self.linear(start, t);
+        }
+        Ok(())
     }
 
     fn check(&self, start: &State<T>, times_s: &[f64], got: usize) -> Result<(), FlightError> {

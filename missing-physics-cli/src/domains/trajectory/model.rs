@@ -66,6 +66,17 @@ pub(super) enum Role {
     StiffZ,
 }
 
+impl Role {
+    /// Whether a flight with it on still has a closed form.
+    fn keeps_closed_form(self) -> bool {
+        use Role::{Cubic, LiftCoefficient, LiftX, LiftY, LiftZ, Quadratic, StiffX, StiffY, StiffZ};
+        !matches!(
+            self,
+            Quadratic | Cubic | LiftX | LiftY | LiftZ | LiftCoefficient | StiffX | StiffY | StiffZ
+        )
+    }
+}
+
 /// The model of the domain `trajectory`.
 #[derive(Debug)]
 pub struct TrajectoryModel {
@@ -102,12 +113,16 @@ impl TrajectoryModel {
         run: &Run,
         shared: &[T],
         own: &[T],
+        moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String> {
         let zero = T::from(0.0);
         let mut flight = Flight::ballistic(self.setup.gravity_m_s2);
         let (mut scale, mut rate, mut tilt) = (zero, zero, [zero; 2]);
-        for (role, value) in self.roles.iter().zip(shared) {
+        // The closed form will do where nothing else is on, nor asked for its derivative.
+        let mut closed = true;
+        for (slot, (role, value)) in self.roles.iter().zip(shared).enumerate() {
+            closed &= role.keeps_closed_form() || (value.re() == 0.0 && !moving.contains(&slot));
             match role {
                 Role::Quadratic => flight.quadratic_per_m = *value * self.drag_unit,
                 Role::Linear => flight.linear_per_s = *value,
@@ -158,7 +173,12 @@ impl TrajectoryModel {
         let slow = (rate + 1.0).recip();
         let true_times: Vec<f64> = elapsed.iter().map(|t| t * slow.re()).collect();
         let mut states = vec![start; n];
-        flight.states(&start, &true_times, &mut states).map_err(|e| e.to_string())?;
+        if closed {
+            flight.states_in_linear_drag(&start, &true_times, &mut states)
+        } else {
+            flight.states(&start, &true_times, &mut states)
+        }
+        .map_err(|e| e.to_string())?;
         let infinitesimal = slow - slow.re();
         for (i, state) in states.iter().enumerate() {
             let a = flight.acceleration(state, &start.position);
@@ -200,7 +220,7 @@ impl Model for TrajectoryModel {
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.fly(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+        self.fly(run, shared, own, &[], out).map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
     fn start(&self, run: &Run, own: &mut [f64]) {
@@ -260,7 +280,8 @@ impl Model for TrajectoryModel {
                 unit[i] = 1.0;
                 *target = Dual::new(target.re, Derivative::some(unit));
             }
-            self.fly(run, &dual_shared, &dual_own, &mut dual_out)
+            let moving: Vec<usize> = chunk.iter().filter(|c| c.0).map(|c| c.1).collect();
+            self.fly(run, &dual_shared, &dual_own, &moving, &mut dual_out)
                 .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
             for (row, value) in dual_out.iter().enumerate() {
                 out[row] = value.re;
@@ -270,5 +291,90 @@ impl Model for TrajectoryModel {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use missing_physics::fit::finite_differences;
+
+    fn run(channels: usize, spin: bool) -> Run {
+        let t: Vec<f64> = (0..12).map(|i| 0.3 + 0.07 * f64::from(i)).collect();
+        let mut inputs = vec![t.clone()];
+        if spin {
+            inputs.extend([10.0, -20.0, 5.0].map(|s| vec![s; t.len()]));
+        }
+        Run { label: "1".into(), inputs, outputs: vec![vec![0.0; t.len()]; channels], kind: 0 }
+    }
+
+    /// Derivatives against central differences, everything off and everything on, for all that can be measured.
+    #[test]
+    fn derivatives_agree_with_differences() {
+        for (axes, spin) in
+            [(Axes::Height, false), (Axes::Space, false), (Axes::Space, true), (Axes::Accelerometer, false)]
+        {
+            let model = TrajectoryModel::new(Setup {
+                axes,
+                mass_kg: Some(0.05),
+                diameter_m: Some(0.06),
+                gravity_m_s2: 9.8,
+                air_density_kg_m3: 1.2,
+                spin,
+            });
+            let channels = if axes == Axes::Space { 3 } else { 1 };
+            let run = run(channels, spin);
+            let n_shared = model.spec().count(Scope::Shared);
+            let own: Vec<f64> = (0..model.own_count()).map(|i| 1.0 + 0.7 * i as f64).collect();
+            for on in [0.0, 1.0] {
+                let shared: Vec<f64> = model.spec().parameters[..n_shared]
+                    .iter()
+                    .map(|p| (on * 0.3 * p.scale).min(p.upper))
+                    .collect();
+                let (sf, of): (Vec<usize>, Vec<usize>) = ((0..n_shared).collect(), (0..own.len()).collect());
+                let rows = channels * run.len();
+                let mut out = vec![0.0; rows];
+                let (mut exact, mut rough) =
+                    (vec![0.0; rows * (sf.len() + of.len())], vec![0.0; rows * (sf.len() + of.len())]);
+                model.jacobian(&run, &shared, &own, &sf, &of, &mut out, &mut exact).unwrap();
+                // Steps away from the bound at zero: drags are differenced on one side there.
+                let inner: Vec<f64> = shared.clone();
+                finite_differences(&model, &run, &inner, &own, &sf, &of, &mut out, &mut rough).unwrap();
+                for k in 0..sf.len() + of.len() {
+                    let (a, b) = (&exact[k * rows..(k + 1) * rows], &rough[k * rows..(k + 1) * rows]);
+                    let size = a.iter().fold(1e-3, |m: f64, v| m.max(v.abs()));
+                    for (a, b) in a.iter().zip(b) {
+                        assert!((a - b).abs() < 2e-4 * size, "{axes:?} column {k} (on: {on}): {a} and {b}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_start_of_a_parabola_is_found() {
+        let setup = Setup {
+            axes: Axes::Space,
+            mass_kg: None,
+            diameter_m: None,
+            gravity_m_s2: 9.8,
+            air_density_kg_m3: 1.2,
+            spin: false,
+        };
+        let model = TrajectoryModel::new(setup);
+        let mut run = run(3, false);
+        let truth = [0.1, -0.2, 1.5, 3.0, 0.4, 5.0];
+        let shared = vec![0.0; model.spec().count(Scope::Shared)];
+        let mut out = vec![0.0; 36];
+        model.predict(&run, &shared, &truth, &mut out).unwrap();
+        for c in 0..3 {
+            run.outputs[c].copy_from_slice(&out[12 * c..12 * (c + 1)]);
+        }
+        run.outputs[1][4] = f64::NAN;
+        let mut own = [0.0; 6];
+        model.start(&run, &mut own);
+        for (a, b) in own.iter().zip(truth) {
+            assert!((a - b).abs() < 1e-9, "{own:?}");
+        }
     }
 }
