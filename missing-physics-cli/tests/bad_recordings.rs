@@ -1,0 +1,237 @@
+//! Every way in which a recording can be wrong ends with one line that says file, row, column, what and what is expected.
+
+use std::process::Command;
+
+use missing_physics_cli::domains;
+use proptest::prelude::*;
+
+const HEADER: &str = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n";
+const COLUMNS: &str = "run, t_s, x_m, y_m, z_m, accel_z_m_s2, spin_x_rad_s, spin_y_rad_s, spin_z_rad_s";
+
+fn good() -> String {
+    let mut csv = String::from("run,t_s,z_m\n");
+    for run in ["a", "b"] {
+        for i in 0..8 {
+            let t = f64::from(i) * 0.1;
+            csv.push_str(&format!("{run},{t:.1},{:.3}\n", 3.0 - 4.9 * t * t));
+        }
+    }
+    csv
+}
+
+fn folder(header: &str, csv: &[u8]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+    std::fs::write(folder.path().join("data.csv"), csv).unwrap();
+    folder
+}
+
+/// What the reader says, without the folder's name; "fine" where it reads.
+fn said(header: &str, csv: &[u8]) -> String {
+    let folder = folder(header, csv);
+    match domains::load(folder.path()) {
+        Ok(_) => "fine".into(),
+        Err(error) => error.to_string().replace(&format!("{}/", folder.path().display()), ""),
+    }
+}
+
+#[test]
+fn every_rule_of_the_header_has_its_line() {
+    let one = "expected one of: trajectory";
+    let cases: Vec<(String, String)> = vec![
+        (HEADER.into(), "fine".into()),
+        ("format = 2\n".into(), "key format is 2, expected 1".into()),
+        ("domain = \"trajectory\"\n".into(), "key format is missing, expected 1".into()),
+        ("format = 1\n".into(), format!("key domain is missing, {one}")),
+        ("format = 1\ndomain = 3\n".into(), format!("key domain is 3, {one}")),
+        ("format = 1\ndomain = \"flight\"\n".into(), format!("key domain is \"flight\", {one}")),
+        (
+            "format = 1\ndomain = \"slosh\"\n".into(),
+            format!("key domain is \"slosh\", {one} (the others are not in this version yet)"),
+        ),
+        (
+            "format = 1\ndomain = \"trajectory\"\n".into(),
+            "key data is missing, expected the name of a CSV file".into(),
+        ),
+        (
+            HEADER.replace("data.csv", "../data.csv"),
+            "key data is \"../data.csv\", expected a file in the recording's folder".into(),
+        ),
+        (
+            HEADER.replace("data.csv", "/etc/passwd"),
+            "key data is \"/etc/passwd\", expected a file in the recording's folder".into(),
+        ),
+        (
+            format!("{HEADER}mass = 3\n"),
+            "unknown key mass, expected one of: data, domain, format, noise, noise.z_m, rig, rig.air_density_kg_m3, \
+             rig.diameter_m, rig.gravity_m_s2, rig.mass_kg"
+                .into(),
+        ),
+        (
+            format!("{HEADER}[rig]\nmass_kg = -1\n"),
+            "key rig.mass_kg is -1, expected a number from 0.000000001 to 1000000".into(),
+        ),
+        (
+            format!("{HEADER}[rig]\nmass_kg = \"heavy\"\n"),
+            "key rig.mass_kg is \"heavy\", expected a number from 0.000000001 to 1000000".into(),
+        ),
+        (
+            format!("{HEADER}[rig]\ngravity_m_s2 = nan\n"),
+            "key rig.gravity_m_s2 is nan, expected a number from 0 to 100".into(),
+        ),
+        (format!("{HEADER}rig = 3\n"), "key rig is 3, expected a section".into()),
+    ];
+    for (header, expected) in cases {
+        let got = said(&header, good().as_bytes());
+        assert_eq!(got.strip_prefix("recording.toml: ").unwrap_or(&got), expected);
+    }
+    assert_eq!(said("format = \n", b"").split(':').next(), Some("recording.toml, row 1"));
+    let away = HEADER.replace("data.csv", "none.csv");
+    assert_eq!(said(&away, b""), "none.csv: no such file");
+}
+
+#[test]
+fn every_rule_of_the_table_has_its_line() {
+    let csv = good();
+    let with = |from: &str, to: &str| csv.replacen(from, to, 1);
+    let cell = "a,0.1,2.951";
+    let cases: Vec<(String, String)> = vec![
+        (format!("\u{feff}{}", csv.replace('\n', "\r\n")), "fine".into()),
+        (with("a,0.1,", "\"a\",0.1,"), "fine".into()),
+        (
+            String::new(),
+            format!(": the file has 0 rows, expected a first row with column names, such as {COLUMNS}"),
+        ),
+        ("run,t_s,z_m\n".into(), ": the file has 0 rows, expected runs of at least 4 rows".into()),
+        (with("z_m", "z_mm"), ", row 1: unknown column \"z_mm\", expected z_m (height in metres)".into()),
+        (with("t_s", "time"), format!(", row 1: unknown column \"time\", expected one of: {COLUMNS}")),
+        (with("run,t_s,z_m", "run,z_m,z_m"), ", row 1: column z_m stands twice, expected once".into()),
+        (
+            with("run,t_s,z_m", "run,x_m,z_m"),
+            ", row 1: column t_s is missing, expected time in seconds".into(),
+        ),
+        (
+            with("run,t_s,z_m", "x_m,t_s,z_m"),
+            ", row 2, column x_m: \"a\", expected a number: position in metres".into(),
+        ),
+        (
+            with("run,t_s,z_m", "run,t_s,x_m"),
+            ", row 1: column z_m is missing, expected height in metres (or accel_z_m_s2)".into(),
+        ),
+        (
+            with(cell, "a,0.1,high"),
+            ", row 3, column z_m: \"high\", expected a number: height in metres".into(),
+        ),
+        (
+            with(cell, "a,0.1,"),
+            ", row 3, column z_m: an empty cell, expected a number: height in metres".into(),
+        ),
+        (with(cell, "a,0.1,NaN"), ", row 3, column z_m: \"NaN\", expected a number: height in metres".into()),
+        (with(cell, "a,0.1,inf"), ", row 3, column z_m: \"inf\", expected a number: height in metres".into()),
+        (
+            with(cell, "a,0.1,1e300"),
+            ", row 3, column z_m: \"1e300\", expected height in metres of at most 1e12".into(),
+        ),
+        (with(cell, ",0.1,2.951"), ", row 3, column run: an empty cell, expected a label".into()),
+        (with(cell, "a,0.1"), ", row 3: 2 cells, expected 3".into()),
+        (
+            with("a,0.2,", "a,0.1,"),
+            ", row 4, column t_s: 0.1, expected more than 0.1, the time before it".into(),
+        ),
+        (
+            with("a,0.2,", "a,0.05,"),
+            ", row 4, column t_s: 0.05, expected more than 0.1, the time before it".into(),
+        ),
+        (with("b,0.7,", "c,0.7,"), ": run \"c\" has 1 rows, expected at least 4".into()),
+        (
+            with("run,t_s,z_m", "run,t_s,spin_x_rad_s").replace("z_m", "z"),
+            ", row 1: column z_m is missing, expected height in metres (or accel_z_m_s2)".into(),
+        ),
+    ];
+    for (csv, expected) in cases {
+        let got = said(HEADER, csv.as_bytes());
+        assert_eq!(got.strip_prefix("data.csv").unwrap_or(&got), expected);
+    }
+    assert_eq!(said(HEADER, b"run,t_s,z_m\na,0,\xff\n"), "data.csv: byte 16 is not UTF-8 text");
+}
+
+#[test]
+fn rows_of_different_runs_may_be_mixed() {
+    let csv = good();
+    let lines: Vec<&str> = csv.lines().collect();
+    let mut mixed = vec![lines[0]];
+    for i in 0..8 {
+        mixed.extend([lines[1 + i], lines[9 + i]]);
+    }
+    let read = |csv: &str| domains::load(folder(HEADER, csv.as_bytes()).path()).unwrap().1.recording;
+    assert_eq!(read(&mixed.join("\n")), read(&csv));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// However a good recording is mutilated, it is read or refused with one line.
+    #[test]
+    fn a_mutilated_recording_is_read_or_refused_with_one_line(
+        cuts in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..4u8), 1..6),
+        in_header in any::<bool>(),
+    ) {
+        let (mut header, mut csv) = (HEADER.as_bytes().to_vec(), good().into_bytes());
+        let target = if in_header { &mut header } else { &mut csv };
+        for (at, byte, how) in cuts {
+            if target.is_empty() { break; }
+            let at = at.index(target.len());
+            match how {
+                0 => target[at] = byte,
+                1 => target.insert(at, byte),
+                2 => { target.remove(at); }
+                _ => target.truncate(at),
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("recording.toml"), &header).unwrap();
+        std::fs::write(folder.path().join("data.csv"), &csv).unwrap();
+        if let Err(error) = domains::load(folder.path()) {
+            let line = error.to_string();
+            prop_assert!(!line.contains('\n') && line.len() < 1000, "{line}");
+        }
+    }
+}
+
+fn tool(arguments: &[&str]) -> (i32, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_missing-physics")).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn a_bad_recording_leaves_with_2_one_line_and_no_report() {
+    let bad = folder(HEADER, b"run,t_s,z_m\na,0,x\n");
+    let report = bad.path().join("report.json");
+    let (status, out, err) =
+        tool(&["diagnose", bad.path().to_str().unwrap(), "--json", report.to_str().unwrap()]);
+    assert_eq!((status, out.as_str()), (2, ""));
+    assert_eq!(err.lines().count(), 1, "{err}");
+    assert!(!report.exists());
+    let good = folder(HEADER, good().as_bytes());
+    let (status, _, err) =
+        tool(&["diagnose", good.path().to_str().unwrap(), "--json", "/nowhere/at/all.json"]);
+    assert_eq!((status, err.lines().count()), (2, 1));
+    let (status, _, err) = tool(&["diagnose", good.path().to_str().unwrap(), "--alpha", "0.7"]);
+    assert_eq!((status, err.trim()), (2, "missing-physics: alpha is 0.7, expected above 0 and below 0.5"));
+}
+
+#[test]
+fn a_template_is_a_sound_recording() {
+    let parent = tempfile::tempdir().unwrap();
+    let fresh = parent.path().join("mine");
+    let fresh = fresh.to_str().unwrap();
+    assert_eq!(tool(&["new", "trajectory", fresh]).0, 0);
+    let (status, out, _) = tool(&["check", fresh]);
+    assert_eq!(status, 0);
+    assert!(out.contains("2 runs, 24 rows"), "{out}");
+    assert_eq!(tool(&["diagnose", fresh]).0, 0);
+    let (status, _, err) = tool(&["new", "trajectory", fresh]);
+    assert_eq!((status, err.contains("exists, expected a new or empty folder")), (2, true));
+    assert_eq!(tool(&["new", "weather", fresh]).0, 2);
+}

@@ -1,0 +1,117 @@
+//! The tool on recordings whose answer is known: practice cases with their keys, and measured drops.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+/// The folder of the shared recordings, which lies beside the workspace; says loudly where it is not there.
+fn shared() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("NOT TESTED: {} is not there", folder.display());
+    None
+}
+
+/// The tool's JSON on a folder; its page must be whole.
+fn answer(folder: &Path, threads: &str) -> Value {
+    let out = tempfile::tempdir().unwrap();
+    let (json, html) = (out.path().join("a.json"), out.path().join("a.html"));
+    let output = Command::new(env!("CARGO_BIN_EXE_missing-physics"))
+        .arg("diagnose")
+        .arg(folder)
+        .arg("--json")
+        .arg(&json)
+        .arg("--html")
+        .arg(&html)
+        .args(["--threads", threads])
+        .output()
+        .unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let page = std::fs::read_to_string(html).unwrap();
+    assert!(page.ends_with("</body></html>\n") && !page.contains("NaN"));
+    serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap()
+}
+
+fn ids(value: &Value) -> Vec<String> {
+    let mut ids: Vec<String> =
+        value.as_array().unwrap().iter().map(|v| v.as_str().unwrap().to_owned()).collect();
+    ids.sort();
+    ids
+}
+
+/// The verdicts of the practice cases' keys; where a key names look-alikes, the truth must be among the rivals.
+#[test]
+fn practice_cases_get_the_verdicts_of_their_keys() {
+    let Some(shared) = shared() else { return };
+    let mut seen = 0;
+    for entry in std::fs::read_dir(shared.join("practice/trajectory")).unwrap() {
+        let folder = entry.unwrap().path();
+        let key: Value =
+            serde_json::from_str(&std::fs::read_to_string(folder.join("key.json")).unwrap()).unwrap();
+        let answer = answer(&folder, "2");
+        let alike = key["confusable"].as_array().is_some_and(|c| !c.is_empty());
+        let expected = match key["kind"].as_str().unwrap() {
+            "null" => "adequate",
+            "unlisted" => "unexplained",
+            _ if alike => "ambiguous",
+            _ => "explained",
+        };
+        assert_eq!(answer["verdict"], expected, "{}", folder.display());
+        let accepted: Vec<Vec<String>> = key["accepted"].as_array().unwrap().iter().map(ids).collect();
+        let mut said = vec![ids(&answer["chosen"])];
+        if alike {
+            said.extend(answer["confused_with"].as_array().unwrap().iter().map(ids));
+        }
+        assert!(said.iter().any(|s| accepted.contains(s)), "{}: {said:?}", folder.display());
+        assert_eq!(answer["where"].as_array().unwrap().is_empty(), expected == "adequate");
+        seen += 1;
+    }
+    assert!(seen >= 7);
+}
+
+/// Measured drops: drag where there is drag, and no other set; the golf ball proves nothing.
+#[test]
+fn measured_drops_are_drag_or_nothing() {
+    let Some(shared) = shared() else { return };
+    let drops = shared.join("recordings/real/trajectory");
+    for name in ["desilva-tennis-ball", "desilva-volleyball", "desilva-whiffle-ball-1"] {
+        let answer = answer(&drops.join(name), "0");
+        let mut named = ids(&answer["chosen"]);
+        named.extend(answer["confused_with"].as_array().unwrap().iter().flat_map(ids));
+        assert!(!named.is_empty() && named.iter().all(|id| id.ends_with("-drag")), "{name}: {named:?}");
+        for m in answer["mechanisms"].as_array().unwrap() {
+            if named.iter().any(|id| m["id"] == id.as_str()) {
+                assert!(
+                    m["parameters"].as_array().unwrap().iter().all(|p| p["value"].as_f64().unwrap() > 0.0)
+                );
+            }
+        }
+        if name.contains("whiffle") {
+            let error = |when: &str| answer["fit"][when]["z_m"]["heldout_rmse"].as_f64().unwrap();
+            assert!(error("before") > 5.0 * error("after"), "{} and {}", error("before"), error("after"));
+        }
+    }
+    let golf = answer(&drops.join("desilva-golf-ball"), "0");
+    assert_eq!(golf["verdict"], "adequate");
+    assert!(ids(&golf["chosen"]).is_empty());
+}
+
+#[test]
+fn bundled_recordings_get_the_answer_that_is_hidden_in_them() {
+    let recordings = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings");
+    for (name, verdict, chosen) in [
+        ("dropped-ball", "explained", vec!["quadratic-drag"]),
+        ("thrown-ball", "explained", vec!["camera-tilt", "quadratic-drag"]),
+        ("steel-ball", "adequate", vec![]),
+    ] {
+        let (one, three) = (answer(&recordings.join(name), "1"), answer(&recordings.join(name), "3"));
+        assert_eq!(
+            (one["verdict"].as_str(), ids(&one["chosen"])),
+            (Some(verdict), chosen.iter().map(|s| (*s).to_owned()).collect())
+        );
+        assert_eq!(one, three, "the answer depends on the number of threads");
+    }
+}
