@@ -27,7 +27,7 @@ fn flight(c: &mut Criterion) {
         if drag.states(&start, &times, &mut out).is_ok() && drag.states(&start, &dense, &mut fine).is_ok() {
             let last = rows - 1;
             let error = (0..3)
-                .map(|i| (out[last].position[i] - fine[100 * last].position[i]).abs())
+                .map(|i| f64::abs(out[last].position[i] - fine[100 * last].position[i]))
                 .fold(0.0, f64::max);
             println!("flight/quadratic/{rows}: largest difference to steps 100 times finer: {error:.1e} m");
         }

@@ -1,4 +1,10 @@
 //! The flight against closed forms, invariants and finite differences.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use approx::assert_relative_eq;
 use bounce_audio::flight::{Flight, FlightError, State, drag_per_m};

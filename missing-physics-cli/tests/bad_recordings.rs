@@ -1,4 +1,10 @@
 //! Every way in which a recording can be wrong ends with one line that says file, row, column, what and what is expected.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use std::process::Command;
 

@@ -1,4 +1,10 @@
 //! The tool on recordings whose answer is known: practice cases with their keys, and measured drops.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

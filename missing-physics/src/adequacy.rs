@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 use crate::bank::{Bank, Reading};
 use crate::diagnosis::TestOutcome;
-use crate::fit::{Fit, NoiseRule, estimate_noise};
+use crate::fit::{Fit, NoiseRule};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
@@ -39,12 +39,11 @@ pub(crate) fn test(
 ) -> Result<Adequacy, PredictError> {
     let mut bank = Bank::new(problem, selection, fit, rivals, rule)?;
     let observed = residuals(problem, fit)?;
-    // The noise of the null worlds is that of the fitted model; shapes that such worlds never choose, nor these data
+    // Shapes that such worlds never choose, nor these data
     // under any alternative, need not be tried again for each of them.
-    let noise = estimate_noise(problem, selection, rule, &fit.shared, &fit.own)?;
-    let truth: Vec<(usize, f64)> = noise.shape.iter().copied().zip(noise.sigma.iter().copied()).collect();
+    let truth = bank.noise_beyond_mechanisms(&observed);
     let mut wanted: Vec<bool> = vec![false; problem.shapes.len()];
-    noise.shape.iter().for_each(|&s| wanted[s] = true);
+    truth.iter().for_each(|&(shape, _)| wanted[shape] = true);
     wanted[0] = true;
     let pilots: Vec<Reading> = (0..12u64)
         .into_par_iter()

@@ -454,12 +454,7 @@ impl<'a> Bank<'a> {
         let products = self.products(data);
         let own: Vec<usize> = (0..self.n_own).collect();
         let shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
-        let start: Vec<(usize, f64)> = (0..self.problem.channels())
-            .map(|c| {
-                let squares: f64 = products.values.iter().map(|row| row[c][0].total).sum();
-                (0, self.channel_score(c, squares, 0.0).1)
-            })
-            .collect();
+        let start = self.white_start(&products);
         let (score, noise, coefficients) = self.alternate(&products, &own, &shared, &start, 8);
         let gains = self
             .alternatives
@@ -474,6 +469,34 @@ impl<'a> Bank<'a> {
             })
             .collect();
         Reading { score, gains, noise, coefficients }
+    }
+
+    /// The noise of a data vector once the model *and* every mechanism are fitted to it: shape of the family and sigma, by
+    /// channel. Where the noise of null worlds is taken from, so that what is tested for does not swell it.
+    pub(crate) fn noise_beyond_mechanisms(&self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
+        let products = self.products(data);
+        let own: Vec<usize> = (0..self.n_own).collect();
+        let mut shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
+        for alternative in &self.alternatives[..self.mechanisms] {
+            for column in &alternative.shared {
+                if !shared.contains(column) {
+                    shared.push(*column);
+                }
+            }
+        }
+        let start = self.white_start(&products);
+        let (_, noise, _) = self.alternate(&products, &own, &shared, &start, 8);
+        noise.into_iter().map(|(shape, sigma)| (self.in_play[shape], sigma)).collect()
+    }
+
+    /// White noise at the level of the whole data, where fits begin.
+    fn white_start(&self, products: &Products) -> Vec<(usize, f64)> {
+        (0..self.problem.channels())
+            .map(|c| {
+                let squares: f64 = products.values.iter().map(|row| row[c][0].total).sum();
+                (0, self.channel_score(c, squares, 0.0).1)
+            })
+            .collect()
     }
 
     /// The whitened residual of a data vector under the model alone, `[run][channel]`.

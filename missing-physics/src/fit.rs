@@ -376,6 +376,7 @@ pub(crate) fn estimate_noise(
     }
     let own_columns: Vec<Vec<Vec<usize>>> =
         (0..own.len()).map(|run| channel_columns(problem, run, &raw[run][..selection.own.len()])).collect();
+    #[allow(clippy::needless_range_loop, reason = "the channel indexes five things")]
     for channel in 0..channels {
         let mut best = f64::NEG_INFINITY;
         for &shape in &rule.allowed {

@@ -19,6 +19,9 @@ struct Normals {
     others: DMatrix<f64>,
 }
 
+/// The best interval so far: what it is worth, its gain, the variable, the bins and their edges.
+type Best = (f64, f64, Option<usize>, (usize, usize), Vec<f64>);
+
 /// Finds the places where the baseline misses, largest share first.
 pub(crate) fn locate(
     problem: &Problem<'_>,
@@ -34,7 +37,7 @@ pub(crate) fn locate(
     let width = n_own + n_shared + 1;
     let mut found: Vec<(f64, Location)> = Vec::new();
     for (channel, quantity) in problem.recording.channels.iter().enumerate() {
-        let mut best: Option<(f64, f64, Option<usize>, (usize, usize), Vec<f64>)> = None;
+        let mut best: Option<Best> = None;
         for variable in variables(problem) {
             let edges = edges(problem, channel, variable);
             if edges.len() < 3 {

@@ -47,6 +47,9 @@ pub struct Parameter {
     pub scale: f64,
 }
 
+/// A function of the shared parameters.
+pub type OfParameters = std::sync::Arc<dyn Fn(&[f64]) -> f64 + Send + Sync>;
+
 /// A quantity that is computed from a mechanism's parameters and reported beside them.
 #[derive(Clone)]
 pub struct Derived {
@@ -55,7 +58,7 @@ pub struct Derived {
     /// The unit alone.
     pub unit: String,
     /// The value from the shared parameters, in the order of [`Spec::parameters`] restricted to [`Scope::Shared`].
-    pub value: std::sync::Arc<dyn Fn(&[f64]) -> f64 + Send + Sync>,
+    pub value: OfParameters,
 }
 
 impl std::fmt::Debug for Derived {
@@ -170,6 +173,10 @@ pub trait Model: Sync {
     ///
     /// # Errors
     /// As [`Model::predict`].
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "a derivative needs the prediction's arguments, what is free, and room"
+    )]
     fn jacobian(
         &self,
         run: &Run,

@@ -1,4 +1,10 @@
 //! The promised rate of false alarms, on worlds in which nothing is wrong.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 mod common;
 

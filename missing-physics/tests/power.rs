@@ -1,4 +1,10 @@
 //! Power, names and intervals, on worlds with a known effect.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 mod common;
 

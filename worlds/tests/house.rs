@@ -1,4 +1,10 @@
 //! Rules of the whole workspace: which crate may know which, and what is bundled.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,7 @@
 //! A small model of a thrown ball (height only), and worlds made without it.
 
+#![allow(dead_code, reason = "not every test uses all of it")]
+
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec};
 use rand::SeedableRng;
