@@ -231,7 +231,7 @@ pub fn diagnose(
             diagnosis.confusion =
                 Some(Confusion { sets: rivals.iter().map(|c| work.ids(&c.set)).collect(), matrix });
             tell("choosing the next experiment", 0.0)?;
-            diagnosis.next_experiment = experiment::best(&problem, &rivals, experiments)?;
+            diagnosis.next_experiment = experiment::best(&problem, &rivals, experiments);
             let names: Vec<String> = rivals.iter().map(|c| work.names(&c.set)).collect();
             diagnosis.undetermined.push(format!("{} cannot be told apart in these data", listed(&names)));
             if diagnosis.next_experiment.is_none() {

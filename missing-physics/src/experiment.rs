@@ -13,42 +13,62 @@ use crate::problem::{Problem, Selection};
 /// Below this expected log Bayes factor an experiment is not worth doing.
 const WORTHWHILE: f64 = 1.0;
 
-/// The experiment with the largest expected log Bayes factor between a rival and its nearest other.
+/// The experiment that tells all rivals apart best; where none does, the one that best tells a single rival from the rest.
 pub(crate) fn best(
     problem: &Problem<'_>,
     rivals: &[&Candidate],
     experiments: &[Experiment],
-) -> Result<Option<NextExperiment>, PredictError> {
-    let mut best: Option<(f64, &Experiment)> = None;
-    for experiment in experiments {
-        let mut nearest = f64::INFINITY;
-        for (i, truth) in rivals.iter().enumerate() {
-            for (j, other) in rivals.iter().enumerate() {
-                if i != j
-                    && let Ok(value) = expected(problem, truth, other, experiment)
-                {
-                    nearest = nearest.min(value);
-                }
-            }
-        }
-        if nearest.is_finite() && best.is_none_or(|(b, _)| nearest > b + 1e-9) {
-            best = Some((nearest, experiment));
-        }
-    }
-    let names = |set: &Candidate| -> Vec<String> {
-        set.set.iter().map(|&m| problem.spec().mechanisms[m].id.clone()).collect()
+) -> Option<NextExperiment> {
+    // For each experiment and rival: the log Bayes factor over the nearest other, if that rival is the truth.
+    let values: Vec<Vec<f64>> = experiments
+        .iter()
+        .map(|experiment| {
+            let over_nearest = |i: usize| {
+                (0..rivals.len())
+                    .filter(|&j| j != i)
+                    .map(|j| expected(problem, rivals[i], rivals[j], experiment).unwrap_or(0.0))
+                    .fold(f64::INFINITY, f64::min)
+            };
+            (0..rivals.len()).map(over_nearest).collect()
+        })
+        .collect();
+    let pick = |worth: &dyn Fn(&[f64]) -> f64| {
+        let best = (0..values.len()).max_by(|&a, &b| worth(&values[a]).total_cmp(&worth(&values[b])))?;
+        let value = worth(&values[best]);
+        (value >= WORTHWHILE && value.is_finite()).then_some((best, value))
     };
-    Ok(best.filter(|(value, _)| *value >= WORTHWHILE).map(|(value, experiment)| {
-        let mut separates: Vec<String> = rivals.iter().flat_map(|r| names(r)).collect();
-        separates.sort();
-        separates.dedup();
-        NextExperiment {
-            action: experiment.action.clone(),
-            words: experiment.words.clone(),
-            separates,
-            expected_log_bayes_factor: value,
+    let least = |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
+    let (at, value, alone) = match pick(&least) {
+        Some((at, value)) => (at, value, None),
+        None => {
+            let (at, value) = pick(&most)?;
+            (at, value, values[at].iter().position(|v| *v == value))
         }
-    }))
+    };
+    let mut separates: Vec<String> =
+        rivals.iter().flat_map(|r| r.set.iter().map(|&m| problem.spec().mechanisms[m].id.clone())).collect();
+    separates.sort();
+    separates.dedup();
+    let names = |set: &Candidate| {
+        let names: Vec<&str> = set.set.iter().map(|&m| problem.spec().mechanisms[m].name.as_str()).collect();
+        names.join(" with ")
+    };
+    let experiment = &experiments[at];
+    let words = match alone {
+        Some(i) => format!(
+            "{} (it tells {} from the others, not these from each other)",
+            experiment.words,
+            names(rivals[i])
+        ),
+        None => experiment.words.clone(),
+    };
+    Some(NextExperiment {
+        action: experiment.action.clone(),
+        words,
+        separates,
+        expected_log_bayes_factor: value,
+    })
 }
 
 /// Expected log Bayes factor of `truth` over `other` after the experiment: half the squared distance that is left once
