@@ -15,3 +15,4 @@ pub mod model;
 pub mod noise;
 pub mod observer;
 mod problem;
+pub mod synthetic;

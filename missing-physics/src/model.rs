@@ -1,7 +1,6 @@
 //! What the engine asks of a simulation: its parameters, its mechanisms and its prediction of a run.
 
 use crate::data::Run;
-use rand::Rng;
 
 /// A named number with a unit: a measured channel or a known input.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -188,24 +187,6 @@ pub trait Model: Sync {
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
         crate::fit::finite_differences(self, run, shared, own, shared_free, own_free, out, jacobian)
-    }
-
-    /// The log density of a run's measurements, for stochastic models; `None` for deterministic ones, whose
-    /// residuals the engine weighs with its own noise model.
-    fn log_likelihood(&self, _run: &Run, _shared: &[f64], _own: &[f64]) -> Option<Result<f64, PredictError>> {
-        None
-    }
-
-    /// Draws measurements of a run from a stochastic model into `out`; `None` for deterministic ones.
-    fn simulate(
-        &self,
-        _run: &Run,
-        _shared: &[f64],
-        _own: &[f64],
-        _rng: &mut dyn Rng,
-        _out: &mut [f64],
-    ) -> Option<Result<(), PredictError>> {
-        None
     }
 }
 

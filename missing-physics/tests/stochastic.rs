@@ -1,0 +1,120 @@
+//! A simulator with chance in it: balls that bounce with a restitution that scatters, seen through statistics.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
+
+use missing_physics::data::Run;
+use missing_physics::diagnosis::Verdict;
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::model::{Mechanism, Parameter, PredictError, Quantity, Scope, Spec};
+use missing_physics::observer::Silent;
+use missing_physics::synthetic::{Simulator, Synthetic, SyntheticError};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Intervals between bounces: t_{i+1} = e_i t_i, e_i = e - slope (v_i - 1) + scatter. Statistics: mean log ratio of the
+/// first and of the last four intervals, and the log of the first interval.
+#[derive(Debug)]
+struct Bounces(Spec, Vec<Quantity>);
+
+const G: f64 = 9.80665;
+
+impl Bounces {
+    fn new() -> Self {
+        let parameter = |name: &str, start, lower, upper, scale| Parameter {
+            name: name.into(),
+            unit: String::new(),
+            scope: Scope::Shared,
+            start,
+            lower,
+            upper,
+            scale,
+        };
+        let spec = Spec {
+            baseline: "one restitution for every bounce".into(),
+            parameters: vec![
+                parameter("e", 0.8, 0.3, 0.99, 0.05),
+                parameter("slope_s_m", 0.0, -0.2, 0.2, 0.02),
+            ],
+            mechanisms: vec![Mechanism {
+                id: "velocity-dependent-restitution".into(),
+                name: "restitution that depends on speed".into(),
+                parameters: vec![1],
+                ..Mechanism::default()
+            }],
+            terms: vec![],
+        };
+        Self(spec, ["early", "late", "first"].map(|n| Quantity::new(n, "")).to_vec())
+    }
+}
+
+impl Simulator for Bounces {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+    fn statistics(&self) -> &[Quantity] {
+        &self.1
+    }
+    fn simulate(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        _own: &[f64],
+        rng: &mut dyn Rng,
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        let mut speed = (2.0 * G * run.inputs[0][0]).sqrt();
+        let mut logs = Vec::new();
+        for _ in 0..8 {
+            let z: f64 = StandardNormal.sample(rng);
+            let e = (shared[0] - shared[1] * (speed - 1.0) + 0.01 * z).clamp(0.05, 1.0);
+            logs.push(e.ln());
+            speed *= e;
+        }
+        out[0] = logs[..4].iter().sum::<f64>() / 4.0;
+        out[1] = logs[4..].iter().sum::<f64>() / 4.0;
+        out[2] = logs[0];
+        Ok(())
+    }
+}
+
+fn observed(slope: f64, seed: u64) -> Vec<(Run, Vec<f64>)> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..8)
+        .map(|i| {
+            let height = 0.3 + 0.1 * f64::from(i);
+            let run = Run { label: format!("{i}"), inputs: vec![vec![height]], outputs: vec![], kind: 0 };
+            let mut out = vec![0.0; 3];
+            Bounces::new().simulate(&run, &[0.83, slope], &[], &mut rng, &mut out).unwrap();
+            (run, out)
+        })
+        .collect()
+}
+
+#[test]
+fn a_slope_of_the_restitution_is_found_and_none_is_not() {
+    let mut alarms = 0;
+    for seed in 0..40 {
+        let (model, recording) = Synthetic::new(Bounces::new(), &observed(0.0, seed), 200, 9).unwrap();
+        let options = Options { replicates: 99, seed, ..Options::default() };
+        let answer = diagnose(&model, &recording, &[], &options, &Silent).unwrap();
+        alarms += u32::from(answer.verdict != Verdict::Adequate);
+    }
+    println!("{alarms} alarms in 40 null worlds");
+    // More than 7 of 40 happen in 1 of 1,000 at a rate of 5 %.
+    assert!(alarms <= 7, "{alarms}");
+    let (model, recording) = Synthetic::new(Bounces::new(), &observed(0.03, 5), 200, 9).unwrap();
+    let answer = diagnose(&model, &recording, &[], &Options::default(), &Silent).unwrap();
+    assert_eq!((answer.verdict, answer.chosen.len()), (Verdict::Explained, 1));
+    let slope = &answer.mechanisms[0].parameters[0];
+    assert!(slope.ci95[0] < 0.03 && 0.03 < slope.ci95[1], "{slope:?}");
+}
+
+#[test]
+fn too_few_draws_are_refused() {
+    let error = Synthetic::new(Bounces::new(), &observed(0.0, 1), 20, 9).unwrap_err();
+    assert_eq!(error, SyntheticError::TooFewDraws { draws: 20, statistics: 3, expected: 30 });
+}
