@@ -158,9 +158,10 @@ pub fn diagnose(
     tell("adequacy of the best explanation", 0.0)?;
     // The chosen set has been selected to fit: only a clear failure (a fifth of alpha) speaks against it.
     let enough = options.alpha / 5.0;
+    // The baseline has been rejected: it is no candidate any more, however cheap it is.
     let mut best: Option<(&Candidate, f64)> = None;
     let mut failing = String::new();
-    if let Some(&first) = physical.first().filter(|c| !c.set.is_empty()) {
+    if let Some(&first) = physical.iter().find(|c| !c.set.is_empty()) {
         let tested = test(first, 2)?;
         failing = tested.tests.first().map_or_else(String::new, |t| t.name.clone());
         let mut current = (first, tested.p_value);

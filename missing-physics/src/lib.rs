@@ -9,6 +9,7 @@ mod estimate;
 mod experiment;
 pub mod fit;
 mod law;
+pub mod likelihood;
 mod linalg;
 mod locate;
 pub mod model;

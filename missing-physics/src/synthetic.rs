@@ -4,6 +4,8 @@
 //! is then a smooth prediction, and their covariance is the noise. [`Synthetic`] is the [`Model`] that does so: one row a run,
 //! one channel a statistic.
 
+use std::collections::HashMap;
+
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,6 +37,11 @@ pub trait Simulator: Sync {
         rng: &mut dyn Rng,
         out: &mut [f64],
     ) -> Result<(), PredictError>;
+
+    /// Shared parameters near the truth, where the statistics' covariance is taken; `None` for each one's `start`.
+    fn reference(&self) -> Option<&[f64]> {
+        None
+    }
 }
 
 /// A [`Simulator`] as a model: mean statistics at common random numbers, made uncorrelated and of unit variance.
@@ -49,6 +56,8 @@ pub struct Synthetic<S> {
     centre: Vec<f64>,
     factor: DMatrix<f64>,
     kept: Vec<bool>,
+    /// The runs with all their rows, by label: the engine sees one row of each.
+    whole: HashMap<String, Run>,
 }
 
 /// Why a simulator cannot be put behind the engine.
@@ -112,11 +121,13 @@ impl<S: Simulator> Synthetic<S> {
             centre: vec![0.0; n],
             factor: DMatrix::identity(n, n),
             kept: vec![true; n],
+            whole: runs.iter().map(|(run, _)| (run.label.clone(), run.clone())).collect(),
         };
         let start = |scope: Scope| -> Vec<f64> {
             model.simulator.spec().parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
         };
-        let (shared, own) = (start(Scope::Shared), start(Scope::PerRun));
+        let own = start(Scope::PerRun);
+        let shared = model.simulator.reference().map_or_else(|| start(Scope::Shared), <[f64]>::to_vec);
         let (mut covariance, mut centre) = (DMatrix::zeros(n, n), vec![0.0; n]);
         for (run, _) in runs {
             let drawn = model.draw(run, &shared, &own)?;
@@ -192,7 +203,7 @@ impl<S: Simulator> Model for Synthetic<S> {
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        let drawn = self.draw(run, shared, own)?;
+        let drawn = self.draw(self.whole.get(&run.label).unwrap_or(run), shared, own)?;
         let n = self.centre.len();
         let mean: Vec<f64> =
             (0..n).map(|k| drawn.iter().map(|d| d[k]).sum::<f64>() / drawn.len() as f64).collect();

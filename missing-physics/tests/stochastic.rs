@@ -8,12 +8,13 @@
 use missing_physics::data::Run;
 use missing_physics::diagnosis::Verdict;
 use missing_physics::engine::{Options, diagnose};
+use missing_physics::likelihood::{Likelihood, Scores};
 use missing_physics::model::{Mechanism, Parameter, PredictError, Quantity, Scope, Spec};
 use missing_physics::observer::Silent;
 use missing_physics::synthetic::{Simulator, Synthetic, SyntheticError};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, StandardNormal, Uniform};
 
 /// Intervals between bounces: t_{i+1} = e_i t_i, e_i = e - slope (v_i - 1) + scatter. Statistics: mean log ratio of the
 /// first and of the last four intervals, and the log of the first interval.
@@ -117,4 +118,71 @@ fn a_slope_of_the_restitution_is_found_and_none_is_not() {
 fn too_few_draws_are_refused() {
     let error = Synthetic::new(Bounces::new(), &observed(0.0, 1), 20, 9).unwrap_err();
     assert_eq!(error, SyntheticError::TooFewDraws { draws: 20, statistics: 3, expected: 30 });
+}
+
+/// Restitutions measured one by one, with a density of their own: heavy-tailed around `e - slope (v - 1)`.
+#[derive(Debug)]
+struct Heavy(Bounces);
+
+impl Likelihood for Heavy {
+    fn spec(&self) -> &Spec {
+        &self.0.0
+    }
+    fn log_density(&self, run: &Run, shared: &[f64]) -> Result<f64, PredictError> {
+        // Logistic law of scale 0.01.
+        let rows = run.inputs[0].iter().zip(&run.outputs[0]);
+        Ok(rows
+            .map(|(v, e)| {
+                let x = ((e - shared[0] + shared[1] * (v - 1.0)) / 0.01).abs();
+                -x - 2.0 * (-x).exp().ln_1p()
+            })
+            .sum())
+    }
+    fn draw(&self, run: &mut Run, shared: &[f64], rng: &mut dyn Rng) -> Result<(), PredictError> {
+        let law = Uniform::new(1e-12, 1.0).unwrap();
+        run.outputs[0] = run.inputs[0]
+            .iter()
+            .map(|v| {
+                let u: f64 = law.sample(rng);
+                shared[0] - shared[1] * (v - 1.0) + 0.01 * (u / (1.0 - u)).ln()
+            })
+            .collect();
+        Ok(())
+    }
+}
+
+/// Runs made by other means: noise from a Laplace law, as heavy in its tails as the logistic one and about as wide.
+fn measured(slope: f64, seed: u64) -> Vec<Run> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let law = Uniform::new(1e-9_f64, 1.0).unwrap();
+    (0..6)
+        .map(|i| {
+            let speeds: Vec<f64> = (0..12).map(|k| 3.0 - 0.2 * f64::from(k) + 0.01 * f64::from(i)).collect();
+            let out = speeds
+                .iter()
+                .map(|v| {
+                    let laplace = |a: f64, b: f64| (a / b).ln();
+                    let noise = laplace(law.sample(&mut rng), law.sample(&mut rng));
+                    0.81 - slope * (v - 1.0) + 0.0128 * noise
+                })
+                .collect();
+            Run { label: format!("{i}"), inputs: vec![speeds], outputs: vec![out], kind: 0 }
+        })
+        .collect()
+}
+
+#[test]
+fn a_model_with_a_likelihood_finds_its_mechanism() {
+    let run = |slope: f64, seed: u64| {
+        let (model, recording) = Scores::put(Heavy(Bounces::new()), &measured(slope, seed), 200, 3).unwrap();
+        let options = Options { replicates: 199, seed, ..Options::default() };
+        diagnose(&model, &recording, &[], &options, &Silent).unwrap()
+    };
+    let alarms = (0..30).filter(|&seed| run(0.0, seed).verdict != Verdict::Adequate).count();
+    println!("{alarms} alarms in 30 null worlds");
+    assert!(alarms <= 6, "{alarms}");
+    let answer = run(0.03, 2);
+    assert_eq!((answer.verdict, answer.chosen.len()), (Verdict::Explained, 1));
+    let slope = &answer.mechanisms[0].parameters[0];
+    assert!(slope.ci95[0] < 0.03 && 0.03 < slope.ci95[1], "{slope:?}");
 }
