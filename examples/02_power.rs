@@ -35,7 +35,7 @@ fn size(world: &FlightWorld) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let count = if examples::small() { 3 } else { 100 };
+    let count = if examples::small() { 3 } else { 60 };
     let base = FlightWorld::thrown(Seen::Space);
     type Grow = fn(f64) -> Effects;
     let kinds: [(&str, f64, Grow); 4] = [

@@ -9,7 +9,7 @@
 mod common;
 
 use common::{Ball, World};
-use missing_physics::diagnosis::Verdict;
+use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
 
@@ -109,8 +109,12 @@ fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
     assert_eq!(format!("{:?}", on(1)), format!("{:?}", on(3)));
 }
 
+fn rate(answer: &Diagnosis) -> f64 {
+    answer.mechanisms.iter().find(|m| m.id == "linear-drag").unwrap().parameters[0].value
+}
+
 #[test]
-fn the_order_of_runs_and_the_unit_do_not_matter() {
+fn the_order_of_runs_does_not_matter() {
     let model = Ball::default();
     let recording = World { linear_drag: 0.2, ..World::NULL }.draw(8);
     let answer = diagnose(&model, &recording, &[], &Options::default(), &Silent).unwrap();
@@ -118,8 +122,47 @@ fn the_order_of_runs_and_the_unit_do_not_matter() {
     turned.runs.reverse();
     let other = diagnose(&model, &turned, &[], &Options::default(), &Silent).unwrap();
     assert_eq!((answer.verdict, &answer.chosen), (other.verdict, &other.chosen));
-    let value = |d: &missing_physics::diagnosis::Diagnosis| {
-        d.mechanisms.iter().find(|m| m.id == "linear-drag").unwrap().parameters[0].value
-    };
-    approx::assert_relative_eq!(value(&answer), value(&other), max_relative = 1e-6);
+    approx::assert_relative_eq!(rate(&answer), rate(&other), max_relative = 1e-6);
+}
+
+#[test]
+fn the_unit_of_the_readings_does_not_matter() {
+    for (drag, seed) in [(0.0, 3), (0.2, 8)] {
+        let recording = World { linear_drag: drag, ..World::NULL }.draw(seed);
+        let mut millimetres = recording.clone();
+        for column in millimetres.runs.iter_mut().flat_map(|r| &mut r.outputs) {
+            column.iter_mut().for_each(|z| *z *= 1000.0);
+        }
+        let options = Options::default();
+        let answer = diagnose(&Ball::default(), &recording, &[], &options, &Silent).unwrap();
+        let other = diagnose(&Ball::in_unit(0.001), &millimetres, &[], &options, &Silent).unwrap();
+        assert_eq!((answer.verdict, &answer.chosen), (other.verdict, &other.chosen));
+        approx::assert_relative_eq!(answer.p_value, other.p_value, epsilon = 0.002);
+        if drag > 0.0 {
+            approx::assert_relative_eq!(rate(&answer), rate(&other), max_relative = 1e-4);
+        }
+    }
+}
+
+/// A further run of the same world, made by the chosen model with its own noise, is no news.
+#[test]
+fn a_run_from_the_chosen_model_does_not_change_the_verdict() {
+    let model = Ball::default();
+    for seed in [11, 12, 13] {
+        let mut recording = World { linear_drag: 0.25, ..World::NULL }.draw(seed);
+        let answer = diagnose(&model, &recording, &[], &Options::default(), &Silent).unwrap();
+        let mut more = recording.runs[0].clone();
+        more.label = "more".into();
+        let predicted = answer.curves[0].after[0].clone();
+        let mut quiet = World { runs: 1, linear_drag: 0.0, ..World::NULL }.draw(seed + 100).runs.remove(0);
+        let still = World { runs: 1, sigma: 0.0, ..World::NULL }.draw(seed + 100).runs.remove(0);
+        for ((noisy, clean), value) in quiet.outputs[0].iter_mut().zip(&still.outputs[0]).zip(predicted) {
+            *noisy = *noisy - clean + value;
+        }
+        more.outputs = quiet.outputs;
+        recording.runs.push(more);
+        let again = diagnose(&model, &recording, &[], &Options::default(), &Silent).unwrap();
+        assert_eq!((answer.verdict, &answer.chosen), (again.verdict, &again.chosen), "seed {seed}");
+        assert_eq!(again.chosen, ["linear-drag"]);
+    }
 }

@@ -38,12 +38,27 @@ pub struct Effects {
     pub camera_tilt_rad: [f64; 2],
     /// Stated times are this much too long, relative to 1.
     pub clock_rate: f64,
-    /// Unlisted: amplitude in m and frequency in Hz of a swinging mast, its phase new in each run.
+    /// Unlisted: amplitude in m and frequency in Hz of a swinging mast, its phase new in each run; x swings by the
+    /// amplitude, y by 0.3 and z by 0.1 of it.
     pub mast: [f64; 2],
     /// Unlisted: the drag falls to this share above a speed in m/s (share, speed); (0, 0) for none.
     pub drag_crisis: [f64; 2],
     /// Unlisted: a cord that pulls back towards the start, in 1/s^2.
     pub cord_per_s2: f64,
+    /// Unlisted: a gust that is added to the wind within a window of the true time.
+    pub gust: Gust,
+    /// Unlisted: the camera is knocked at a stated time in s, after which heights are read this much too large in m
+    /// (height, time); (0, 0) for none.
+    pub camera_step: [f64; 2],
+}
+
+/// A wind that blows for a while; it acts through drag.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gust {
+    /// Velocity of the air in m/s, added to the wind.
+    pub velocity_m_s: [f64; 3],
+    /// When it begins and when it is over, in s since the start of the run.
+    pub window_s: [f64; 2],
 }
 
 /// How flights are recorded.
@@ -146,7 +161,7 @@ impl FlightWorld {
             .into_iter()
             .enumerate()
             .map(|(r, (start, rows, phase))| {
-                let (t_s, mut channels) = self.fly(start, rows, phase);
+                let (t_s, mut channels) = self.fly(start, rows, phase, STEPS);
                 for column in &mut channels {
                     self.noise.apply(column, &mut rng);
                 }
@@ -156,12 +171,12 @@ impl FlightWorld {
         Drawn { names, runs }
     }
 
-    /// One flight as the camera would see it without noise.
-    fn fly(&self, start: [f64; 6], rows: usize, phase: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
+    /// One flight as the camera would see it without noise, integrated in `steps` steps a frame.
+    fn fly(&self, start: [f64; 6], rows: usize, phase: f64, steps: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
         let e = &self.effects;
         let origin = [start[0], start[1], start[2]];
-        let force = |y: &[f64; 6]| -> [f64; 3] {
-            let air = [y[3] - e.wind_m_s[0], y[4] - e.wind_m_s[1], y[5]];
+        let force = |y: &[f64; 6], gust: [f64; 3]| -> [f64; 3] {
+            let air = [y[3] - e.wind_m_s[0] - gust[0], y[4] - e.wind_m_s[1] - gust[1], y[5] - gust[2]];
             let speed = (air[0].powi(2) + air[1].powi(2) + air[2].powi(2)).sqrt();
             let share =
                 if e.drag_crisis[1] > 0.0 && speed > e.drag_crisis[1] { e.drag_crisis[0] } else { 1.0 };
@@ -173,15 +188,21 @@ impl FlightWorld {
                 lx * y[4] - ly * y[3] - drag * air[2] - e.cord_per_s2 * (y[2] - origin[2]) + e.lift_m_s2 - G,
             ]
         };
-        let rate = |y: &[f64; 6]| {
-            let f = force(y);
+        let rate = |y: &[f64; 6], gust: [f64; 3]| {
+            let f = force(y, gust);
             [y[3], y[4], y[5], f[0], f[1], f[2]]
         };
         let moved =
             |y: &[f64; 6], k: &[f64; 6], h: f64| -> [f64; 6] { std::array::from_fn(|i| y[i] + h * k[i]) };
         // The clock states (1 + rate) times the true time: frames are that much closer together.
         let frame = 1.0 / self.frame_hz;
-        let h = frame / (1.0 + e.clock_rate) / STEPS as f64;
+        let h = frame / (1.0 + e.clock_rate) / steps as f64;
+        // Constant within a step, whose middle decides: a method of high order wants no jump inside a step.
+        let gust_in = |step: usize| {
+            let middle = (step as f64 + 0.5) * h;
+            let [begin, end] = e.gust.window_s;
+            if middle > begin && middle < end { e.gust.velocity_m_s } else { [0.0; 3] }
+        };
         let mut y = start;
         let mut t_s = Vec::with_capacity(rows);
         let mut channels = vec![Vec::with_capacity(rows); if self.seen == Seen::Space { 3 } else { 1 }];
@@ -189,18 +210,23 @@ impl FlightWorld {
             let t = i as f64 * frame;
             t_s.push(t);
             let swing = e.mast[0] * (std::f64::consts::TAU * e.mast[1] * t + phase).sin();
-            let seen = self.read(&y, swing);
+            let mut seen = self.read(&y, swing);
+            let [size, knocked_at] = e.camera_step;
+            if size != 0.0 && t >= knocked_at {
+                seen[2] += size;
+            }
             match self.seen {
                 Seen::Height => channels[0].push(seen[2]),
                 Seen::Space => channels.iter_mut().zip(seen).for_each(|(c, v)| c.push(v)),
                 // Specific force with an offset that every run has of its own.
-                Seen::Felt => channels[0].push(force(&y)[2] + G + 0.05 * phase.cos()),
+                Seen::Felt => channels[0].push(force(&y, gust_in(i * steps))[2] + G + 0.05 * phase.cos()),
             }
-            for _ in 0..STEPS {
-                let k1 = rate(&y);
-                let k2 = rate(&moved(&y, &k1, 0.5 * h));
-                let k3 = rate(&moved(&y, &k2, 0.5 * h));
-                let k4 = rate(&moved(&y, &k3, h));
+            for step in i * steps..(i + 1) * steps {
+                let gust = gust_in(step);
+                let k1 = rate(&y, gust);
+                let k2 = rate(&moved(&y, &k1, 0.5 * h), gust);
+                let k3 = rate(&moved(&y, &k2, 0.5 * h), gust);
+                let k4 = rate(&moved(&y, &k3, h), gust);
                 for i in 0..6 {
                     y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
                 }
@@ -221,7 +247,7 @@ impl FlightWorld {
             turned[2] * about_y.cos() - turned[0] * about_y.sin(),
         ];
         let scale = 1.0 + e.camera_scale;
-        [scale * turned[0] + swing, scale * turned[1] + 0.3 * swing, scale * turned[2]]
+        [scale * turned[0] + swing, scale * turned[1] + 0.3 * swing, scale * turned[2] + 0.1 * swing]
     }
 }
 
@@ -242,43 +268,4 @@ impl Drawn {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_vacuum_gives_parabolas() {
-        let world = FlightWorld { noise: Noise::white(0.0), ..FlightWorld::thrown(Seen::Space) };
-        for run in world.draw(1).runs {
-            for (column, g) in run.channels.iter().zip([0.0, 0.0, G]) {
-                for i in 2..column.len() {
-                    let bend = column[i] - 2.0 * column[i - 1] + column[i - 2];
-                    approx::assert_abs_diff_eq!(bend, -g / 3600.0, epsilon = 1e-12);
-                }
-            }
-        }
-    }
-
-    /// A drop from rest under quadratic drag falls vt^2/g ln cosh(g t / vt).
-    #[test]
-    fn drag_follows_the_closed_form() {
-        let effects = Effects { quadratic_per_m: 0.03, ..Effects::default() };
-        let still = FlightWorld {
-            speed_m_s: [0.0, 0.0],
-            noise: Noise::white(0.0),
-            effects,
-            ..FlightWorld::dropped(1, [60, 60], 30.0)
-        };
-        let run = &still.draw(2).runs[0];
-        for (t, z) in run.t_s.iter().zip(&run.channels[0]) {
-            let fallen = ((G * 0.03_f64).sqrt() * t).cosh().ln() / 0.03;
-            approx::assert_abs_diff_eq!(run.channels[0][0] - z, fallen, epsilon = 1e-9);
-        }
-    }
-
-    #[test]
-    fn the_same_seed_gives_the_same_bits() {
-        let world = FlightWorld::thrown(Seen::Space);
-        assert_eq!(world.draw(5), world.draw(5));
-        assert_ne!(world.draw(5), world.draw(6));
-    }
-}
+mod tests;

@@ -9,12 +9,23 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
 /// Height of a ball with linear drag (closed form), another gravity and a camera of another scale.
-pub(crate) struct Ball(Spec);
+///
+/// `unit` is the length of one unit of height, in m: 0.001 where heights are in mm.
+pub(crate) struct Ball {
+    spec: Spec,
+    unit_m: f64,
+}
 
 const G: f64 = 9.80665;
 
 impl Default for Ball {
     fn default() -> Self {
+        Self::in_unit(1.0)
+    }
+}
+
+impl Ball {
+    pub(crate) fn in_unit(unit_m: f64) -> Self {
         let parameter = |name: &str, scope, lower: f64, upper: f64, scale| Parameter {
             name: name.into(),
             unit: String::new(),
@@ -30,14 +41,14 @@ impl Default for Ball {
             parameters: vec![parameter],
             ..Default::default()
         };
-        Self(Spec {
+        let spec = Spec {
             baseline: "ballistic flight".into(),
             parameters: vec![
                 parameter("rate_per_s", Scope::Shared, 0.0, 20.0, 0.1),
-                parameter("acceleration_m_s2", Scope::Shared, -0.5, 0.5, 0.2),
+                parameter("acceleration", Scope::Shared, -0.5 / unit_m, 0.5 / unit_m, 0.2 / unit_m),
                 parameter("scale", Scope::Shared, -0.5, 0.5, 0.01),
-                parameter("z0_m", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0),
-                parameter("vz0_m_s", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0),
+                parameter("z0", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0 / unit_m),
+                parameter("vz0", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0 / unit_m),
             ],
             mechanisms: vec![
                 mechanism("linear-drag", 0),
@@ -45,17 +56,18 @@ impl Default for Ball {
                 mechanism("camera-scale", 2),
             ],
             terms: vec![],
-        })
+        };
+        Self { spec, unit_m }
     }
 }
 
 impl Model for Ball {
     fn spec(&self) -> &Spec {
-        &self.0
+        &self.spec
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        let (r, g) = (shared[0], G - shared[1]);
+        let (r, g) = (shared[0], G / self.unit_m - shared[1]);
         for (z, t) in out.iter_mut().zip(&run.inputs[0]) {
             // (1 - exp(-x)) / x and its next term, by series where x is small.
             let x = r * t;
