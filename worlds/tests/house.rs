@@ -14,15 +14,20 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Normal dependencies on crates of this workspace, by crate.
-fn arrows() -> BTreeMap<String, Vec<String>> {
+/// What cargo knows of the workspace's packages.
+fn packages() -> Vec<serde_json::Value> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
         .current_dir(root())
         .output()
         .unwrap();
     let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let packages = metadata["packages"].as_array().unwrap();
+    metadata["packages"].as_array().unwrap().clone()
+}
+
+/// Dependencies on crates of this workspace, by crate; those of tests, examples and benches only on demand.
+fn arrows(of_tests_too: bool) -> BTreeMap<String, Vec<String>> {
+    let packages = packages();
     let names: Vec<&str> = packages.iter().map(|p| p["name"].as_str().unwrap()).collect();
     packages
         .iter()
@@ -30,7 +35,7 @@ fn arrows() -> BTreeMap<String, Vec<String>> {
             let dependencies = p["dependencies"].as_array().unwrap();
             let ours = dependencies
                 .iter()
-                .filter(|d| d["kind"].is_null())
+                .filter(|d| of_tests_too || d["kind"] != "dev")
                 .filter_map(|d| d["name"].as_str())
                 .filter(|n| names.contains(n));
             (p["name"].as_str().unwrap().to_owned(), ours.map(str::to_owned).collect())
@@ -43,7 +48,7 @@ fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
     const SHARED: [&str; 3] = ["hw-traits", "hertz-contact", "bayes-sim"];
     const CHAPTERS: [&str; 6] =
         ["liquid-haptics", "granular-infer", "bounce-audio", "softcell", "stretch", "dough-mbrl"];
-    let arrows = arrows();
+    let arrows = arrows(false);
     assert!(arrows.contains_key("missing-physics") && arrows.contains_key("worlds"), "{arrows:?}");
     for (from, to) in &arrows {
         let allowed: Vec<&str> = match from.as_str() {
@@ -51,15 +56,48 @@ fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
             name if SHARED.contains(&name) => vec![],
             name if CHAPTERS.contains(&name) => SHARED.to_vec(),
             "missing-physics-cli" => CHAPTERS.into_iter().chain(SHARED).chain(["missing-physics"]).collect(),
-            // Examples and benches look at everything, and nothing looks at them.
-            "examples" | "benches" => arrows.keys().map(String::as_str).collect(),
+            // Examples look at everything, benches at the examples' helpers too; nothing else looks at either.
+            "examples" => arrows.keys().map(String::as_str).filter(|n| *n != "benches").collect(),
+            "benches" => arrows.keys().map(String::as_str).collect(),
             other => panic!("{other} has no place on the map: add it to DESIGN's arrows and here"),
         };
         for name in to {
             assert!(allowed.contains(&name.as_str()), "{from} may not depend on {name}");
-            assert!(!["examples", "benches"].contains(&name.as_str()), "{from} may not depend on {name}");
         }
     }
+}
+
+/// What makes test data shares no code with what is tested, not even in its own tests.
+#[test]
+fn worlds_stand_apart() {
+    let arrows = arrows(true);
+    assert_eq!(arrows["worlds"], Vec::<String>::new());
+    let users = arrows.iter().filter(|(_, to)| to.iter().any(|n| n == "worlds")).count();
+    assert!(users > 0, "nobody uses the worlds: {arrows:?}");
+}
+
+/// The gate runs the numbered examples of `examples/` by pattern, and every other one by name.
+#[test]
+fn the_gate_runs_every_example() {
+    let gate = std::fs::read_to_string(root().join(".ci/run")).unwrap();
+    assert!(gate.contains("for example in examples/[0-9]*.rs; do"));
+    let mut seen = 0;
+    for package in packages() {
+        for target in package["targets"].as_array().unwrap() {
+            if !target["kind"].as_array().unwrap().iter().any(|k| k == "example") {
+                continue;
+            }
+            let (package, name) = (package["name"].as_str().unwrap(), target["name"].as_str().unwrap());
+            let numbered = package == "examples" && name.starts_with(|c: char| c.is_ascii_digit());
+            let by_name = format!("-p {package} --example {name}");
+            assert!(
+                numbered || gate.contains(&by_name),
+                ".ci/run does not run the example {name} of {package}"
+            );
+            seen += 1;
+        }
+    }
+    assert!(seen > 0);
 }
 
 #[test]
