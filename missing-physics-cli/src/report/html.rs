@@ -58,8 +58,6 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
         section(&mut page, "The law in the residual", &body);
     }
     section(&mut page, "How much better", &errors(d));
-    let key = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>baseline</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>where it misses</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
-    section(&mut page, "Data and fits", &format!("{key}{}", plots::channels(d)));
     if let Some(confusion) = &d.confusion {
         let mut table = String::from("<table><tr><th>data from</th>");
         for set in &confusion.sets {
@@ -92,6 +90,8 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     }
     let unsure: Vec<String> = d.undetermined.iter().chain(&d.remarks).cloned().collect();
     section(&mut page, "What these data cannot say", &list(&unsure));
+    let key = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>baseline</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>where it misses</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
+    section(&mut page, "Data and fits", &format!("{key}{}", plots::channels(d)));
     let noise: Vec<String> = d.noise.iter().map(|n| noise_sentence(d, n)).collect();
     section(&mut page, "Noise", &list(&noise));
     let outliers: Vec<String> = d

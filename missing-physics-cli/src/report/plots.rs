@@ -14,7 +14,12 @@ const MOST_RUNS: usize = 4;
 pub(super) fn channels(d: &Diagnosis) -> String {
     let mut html = String::new();
     let changed = d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Ambiguous);
-    for (c, (channel, unit)) in d.channels.iter().enumerate() {
+    // The channels that miss come first.
+    let mut order: Vec<usize> = (0..d.channels.len()).collect();
+    let rank =
+        |c: &usize| d.location.iter().position(|l| l.channel == d.channels[*c].0).unwrap_or(usize::MAX);
+    order.sort_by_key(rank);
+    for (c, (channel, unit)) in order.into_iter().map(|c| (c, &d.channels[c])) {
         let place = d.location.iter().find(|l| l.channel == *channel);
         // Plotted along the variable of the located interval, else along the first.
         let variable = place
