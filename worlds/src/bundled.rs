@@ -55,7 +55,7 @@ pub fn all() -> Vec<Bundled> {
             data: dropped.draw(20).csv(4),
             readme: readme(
                 "A tennis ball, dropped four times",
-                "Height alone, 30 frames a second, a fall of 12 to 18 m. Hidden: quadratic drag, Cd = 0.5. Noise: 5 mm, neighbouring rows correlated by 0.3.",
+                "Height alone, 30 frames a second, a fall of 12 to 16 m. Hidden: quadratic drag, Cd = 0.5. Noise: 5 mm, neighbouring rows correlated by 0.3.",
             ),
         },
         Bundled {
