@@ -6,6 +6,8 @@ use super::{Flight, FlightError, State};
 
 /// Error allowed in a step, in metres and metres per second, relative to the state's size.
 const TOLERANCE: f64 = 1e-11;
+/// Error allowed in a step of what quadratic drag would do, for dual numbers, relative to that drag's size.
+const DRAG_TOLERANCE: f64 = 1e-9;
 /// Steps allowed in a flight.
 const MOST_STEPS: usize = 100_000;
 
@@ -20,6 +22,9 @@ const A: [[f64; 6]; 6] = [
 /// Fifth-order weights less fourth-order ones.
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+
+/// Largest growth from one step to the next.
+const MOST_GROWTH: f64 = 5.0;
 
 /// Position and velocity, or their rates.
 type Six<T> = [T; 6];
@@ -59,26 +64,55 @@ pub(super) fn states<T: DualNum<Primitive = f64, Real = f64> + Copy>(
                 k[stage + 1] = rate(&next);
             }
             let size = 1.0 + y.iter().fold(0.0, |m: f64, v| m.max(v.re().abs()));
-            let error = (0..6)
-                .map(|i| (0..7).map(|j| E[j] * k[j][i].re()).sum::<f64>().abs() * h)
-                .fold(0.0, f64::max)
-                / (TOLERANCE * size);
+            let mut error =
+                worst((0..6).map(|i| (0..7).map(|j| E[j] * k[j][i].re()).sum())) * h / (TOLERANCE * size);
+            if T::NDERIV > 0 {
+                error = worst([error, drag_error(flight, &k) * h / DRAG_TOLERANCE].into_iter());
+            }
             steps += 1;
             // The tolerance bounds the error of a step whatever its length: short steps add up to less than it says.
-            if error <= 1.0 {
+            let accepted = error <= 1.0 && next.iter().all(|v| v.re().is_finite());
+            if accepted {
                 y = next;
                 k[0] = k[6];
                 t = if whole { end } else { t + h };
             }
-            let grown = if error > 0.0 { (0.9 * error.powf(-0.2)).clamp(0.2, 5.0) } else { 5.0 };
-            if error > 1.0 || !whole || h * grown < proposed {
-                proposed = h * grown.min(if error > 1.0 { 0.9 } else { 5.0 });
+            // An overlong step may overflow: that is a rejection like any other.
+            let grown = if error.is_finite() { 0.9 * error.powf(-0.2) } else { 0.1 };
+            // A step that was cut short by the next time shows that longer ones may do, not that shorter ones must.
+            if !accepted {
+                proposed = h * grown.clamp(0.1, 0.9);
+            } else if !whole || grown < MOST_GROWTH {
+                proposed = h * grown.clamp(0.2, MOST_GROWTH);
             }
-            if steps > MOST_STEPS || !error.is_finite() || !(proposed > 1e-12 * (1.0 + t)) {
+            if steps > MOST_STEPS || !(proposed > 1e-12 * (1.0 + t)) {
                 return Err(FlightError::TooStiff { reached_s: t });
             }
         }
         *state = State { position: [y[0], y[1], y[2]], velocity: [y[3], y[4], y[5]] };
     }
     Ok(())
+}
+
+/// The largest modulus; NaN where one is NaN (which `f64::max` would pass over).
+fn worst(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |m, v| if v.is_nan() || m.is_nan() { f64::NAN } else { m.max(v.abs()) })
+}
+
+/// The step's relative error per second in the integral of `|u| u`, from the velocities at its stages.
+///
+/// Where drag is off, the flight is a parabola and its own error says nothing, but the derivative with respect to the
+/// drag is just this integral; it has a kink where the ball turns over.
+fn drag_error<T: DualNum<Primitive = f64, Real = f64> + Copy>(flight: &Flight<T>, k: &[Six<T>; 7]) -> f64 {
+    let (mut sums, mut size) = ([0.0; 3], 1.0);
+    for (weight, rates) in E.iter().zip(k) {
+        let u = [0, 1, 2].map(|i| rates[i].re() - flight.wind_m_s[i].re());
+        let square: f64 = u.iter().map(|u| u * u).sum();
+        let speed = square.sqrt();
+        size = square.max(size);
+        for (sum, u) in sums.iter_mut().zip(u) {
+            *sum += weight * speed * u;
+        }
+    }
+    worst(sums.into_iter()) / size
 }

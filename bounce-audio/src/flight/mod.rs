@@ -37,6 +37,12 @@ pub enum FlightError {
         /// Time reached in seconds.
         reached_s: f64,
     },
+    /// The ball is farther away, or faster, than a number can hold.
+    #[error("the state at {time_s} s is beyond what a number can hold")]
+    Overflow {
+        /// Time of the state in seconds.
+        time_s: f64,
+    },
     /// `out` has another length than `times`.
     #[error("{expected} times need as many states, got {got}")]
     Length {
@@ -150,6 +156,9 @@ impl<T: DualNum<Primitive = f64, Real = f64> + Copy> Flight<T> {
         self.check(start, times_s, out.len())?;
         for (state, &t) in out.iter_mut().zip(times_s) {
             *state = self.linear(start, t);
+            if !state.position.iter().chain(&state.velocity).all(|v| v.re().is_finite()) {
+                return Err(FlightError::Overflow { time_s: t });
+            }
         }
         Ok(())
     }
