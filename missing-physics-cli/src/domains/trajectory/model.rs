@@ -154,10 +154,16 @@ impl TrajectoryModel {
         let n = times.len();
         let scale = scale + 1.0;
         if run.kind == ROD {
-            // The ends of a rod of one metre, upright: no flight, no clock.
-            let last = out.len() - n;
-            for (i, z) in out[last..].iter_mut().enumerate() {
-                *z = own[self.height_slot()] + scale * (i as f64);
+            // The ends of a rod of one metre, plumb: no flight, no clock, but the same camera.
+            for i in 0..n {
+                let mut p = [zero, zero, T::from(i as f64)];
+                if self.setup.axes == Axes::Space {
+                    p = tilted(p, tilt);
+                }
+                let first = 3 - out.len() / n.max(1);
+                for (c, p) in p.iter().enumerate().skip(first) {
+                    out[(c - first) * n + i] = own[c - first] + scale * *p;
+                }
             }
             return Ok(());
         }
@@ -200,10 +206,6 @@ impl TrajectoryModel {
             }
         }
         Ok(())
-    }
-
-    fn height_slot(&self) -> usize {
-        if self.setup.axes == Axes::Space { 2 } else { 0 }
     }
 }
 
@@ -295,6 +297,9 @@ impl Model for TrajectoryModel {
 }
 
 #[cfg(test)]
+mod keys;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use missing_physics::fit::finite_differences;
@@ -348,6 +353,47 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// A plumb rod of a metre is seen by the same camera as a flight, in every coordinate, whatever `out` held before.
+    #[test]
+    fn a_rod_shows_the_camera_and_nothing_else() {
+        let setup = Setup {
+            axes: Axes::Space,
+            mass_kg: None,
+            diameter_m: None,
+            gravity_m_s2: 9.8,
+            air_density_kg_m3: 1.2,
+            spin: false,
+        };
+        let model = TrajectoryModel::new(setup);
+        let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
+        for (role, value) in model.roles.iter().zip(&mut shared) {
+            *value = match role {
+                Role::CameraScale => 0.02,
+                Role::TiltX => -0.03,
+                Role::TiltY => 0.01,
+                Role::ClockRate | Role::Quadratic => 0.04,
+                _ => 0.0,
+            };
+        }
+        let rod = Run {
+            label: "rod".into(),
+            inputs: vec![vec![0.0, 1.0]],
+            outputs: vec![vec![0.0; 2]; 3],
+            kind: ROD,
+        };
+        let own = [0.3, -0.4, 0.5, 7.0, 7.0, 7.0];
+        let mut out = [f64::NAN; 6];
+        model.predict(&rod, &shared, &own, &mut out).unwrap();
+        // e_z turned by -0.03 about x, then by 0.01 about y.
+        let (sx, cx) = (-0.03_f64).sin_cos();
+        let (sy, cy) = 0.01_f64.sin_cos();
+        let top = [sy * cx, -sx, cy * cx];
+        for c in 0..3 {
+            assert!((out[2 * c] - own[c]).abs() < 1e-15, "{out:?}");
+            assert!((out[2 * c + 1] - own[c] - 1.02 * top[c]).abs() < 1e-15, "{out:?}");
         }
     }
 
