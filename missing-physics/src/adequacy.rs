@@ -20,9 +20,6 @@ pub(crate) struct Adequacy {
     pub(crate) tests: Vec<TestOutcome>,
 }
 
-/// Relative uncertainty of a calibrated sigma.
-const CALIBRATION_UNCERTAINTY: f64 = 0.02;
-
 /// A test that looks for nothing in particular must be this much surer than one that looks for a listed mechanism.
 const UNDIRECTED_WEIGHT: f64 = 3.0;
 
@@ -121,9 +118,10 @@ pub(crate) fn draw(
     let factors: Vec<f64> = rule
         .fixed_sigma
         .iter()
-        .map(|fixed| {
+        .zip(&rule.uncertainty)
+        .map(|(fixed, uncertainty)| {
             let z: f64 = StandardNormal.sample(&mut rng);
-            if fixed.is_some() { (CALIBRATION_UNCERTAINTY * z).exp() } else { 1.0 }
+            if fixed.is_some() { (uncertainty * z).exp() } else { 1.0 }
         })
         .collect();
     (0..problem.rows.len())
@@ -150,7 +148,7 @@ fn omnibus_names(problem: &Problem<'_>, rule: &NoiseRule) -> Vec<String> {
         names.push(format!("{name}: shifts between runs"));
         names.push(format!("{name}: shifts of intervals of rows"));
         if rule.fixed_sigma[c].is_some() {
-            names.push(format!("{name}: size against the calibrated noise"));
+            names.push(format!("{name}: size against the known noise"));
         }
     }
     names

@@ -15,9 +15,11 @@ use crate::fit::{Fit, NoiseRule, NoiseState, fit, solve};
 use crate::law;
 use crate::locate::locate;
 use crate::model::{Experiment, Model, PredictError};
-use crate::noise::{median, rough_sigma, spikes};
+use crate::noise::{median, rough_sigma};
+use crate::noise_rule::noise_rule;
 use crate::observer::{Observer, Progress};
-use crate::problem::{Problem, noise_positions};
+use crate::outliers::set_aside;
+use crate::problem::Problem;
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,14 +72,10 @@ pub enum DiagnoseError {
     Stopped,
 }
 
-/// A single row further than this many robust sigmas from its neighbours is set aside.
-const SPIKE_LIMIT: f64 = 7.0;
 /// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
 const RIVAL_GAP: f64 = 3.0;
 /// A richer set must beat an adequate simpler one by this log evidence.
 const EARNED: f64 = 3.0;
-/// Below this mean number of rows in a run, correlation along a run is not looked for.
-const ROWS_FOR_COLOUR: usize = 8;
 
 /// Diagnoses a recording: is the baseline adequate; if not, where does it miss, and which mechanisms explain it?
 ///
@@ -98,15 +96,14 @@ pub fn diagnose(
         if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }
     };
     tell("reading the noise", 0.0)?;
-    let (cleaned, outliers) = without_spikes(recording);
+    let problem = Problem::new(model, recording.clone());
+    enough_rows(&problem)?;
+    tell("looking for wild readings", 0.0)?;
+    let (cleaned, outliers) = set_aside(&problem)?;
     let problem = Problem::new(model, cleaned);
     let rule = noise_rule(&problem);
     let selection = problem.select(&[], &[]);
-    let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-    let unknowns = selection.shared.len() + selection.own.len() * problem.rows.len() + problem.channels();
-    if rows <= unknowns {
-        return Err(DiagnoseError::TooFewRows { rows, parameters: unknowns });
-    }
+    let (rows, unknowns) = enough_rows(&problem)?;
     tell("fitting the baseline", 0.0)?;
     let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
     let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
@@ -293,62 +290,15 @@ fn check(recording: &Recording, options: &Options) -> Result<(), DiagnoseError> 
     Ok(())
 }
 
-/// Sets rows aside that their neighbours contradict, where they are few.
-fn without_spikes(recording: &Recording) -> (Recording, Vec<Outlier>) {
-    let mut cleaned = recording.clone();
-    let mut outliers = Vec::new();
-    for (r, run) in recording.runs.iter().enumerate() {
-        let along = noise_positions(recording, run);
-        for (c, column) in run.outputs.iter().enumerate() {
-            let rows: Vec<usize> = (0..column.len()).filter(|&i| column[i].is_finite()).collect();
-            if rows.len() < 12 {
-                continue;
-            }
-            let positions: Vec<f64> = rows.iter().map(|&i| along[i]).collect();
-            let values: Vec<f64> = rows.iter().map(|&i| column[i]).collect();
-            let found = spikes(&positions, &values, SPIKE_LIMIT);
-            if found.len() * 20 > rows.len() {
-                continue;
-            }
-            for spike in found {
-                let row = rows[spike.index];
-                cleaned.runs[r].outputs[c][row] = f64::NAN;
-                outliers.push(Outlier {
-                    run: run.label.clone(),
-                    row,
-                    channel: recording.channels[c].name.clone(),
-                    z: spike.z,
-                });
-            }
-        }
+/// Measured values and unknowns of the baseline, where the former are more.
+fn enough_rows(problem: &Problem<'_>) -> Result<(usize, usize), DiagnoseError> {
+    let selection = problem.select(&[], &[]);
+    let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+    let unknowns = selection.shared.len() + selection.own.len() * problem.rows.len() + problem.channels();
+    if rows <= unknowns {
+        return Err(DiagnoseError::TooFewRows { rows, parameters: unknowns });
     }
-    (cleaned, outliers)
-}
-
-fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
-    let recording = &problem.recording;
-    let floor = (0..problem.channels())
-        .map(|c| {
-            let largest = recording
-                .runs
-                .iter()
-                .flat_map(|r| &r.outputs[c])
-                .filter(|v| v.is_finite())
-                .fold(0.0, |m: f64, v| m.max(v.abs()));
-            let digit = recording.resolution.get(c).copied().unwrap_or(0.0) / 12f64.sqrt();
-            digit.max(1e-9 * largest).max(f64::MIN_POSITIVE)
-        })
-        .collect();
-    let rows: usize = problem.recording.runs.iter().map(|r| r.len()).sum();
-    let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1);
-    let fixed_sigma =
-        (0..problem.channels()).map(|c| recording.calibration.get(c).copied().flatten()).collect();
-    NoiseRule {
-        fixed_sigma,
-        against_colour: 0.0,
-        allowed: if long { (0..problem.shapes.len()).collect() } else { vec![0] },
-        floor,
-    }
+    Ok((rows, unknowns))
 }
 
 /// Sigma of each channel's rough part, whatever the model: what is left once everything smooth is taken away.
@@ -469,9 +419,10 @@ impl Work<'_> {
                 ChannelNoise {
                     channel: recording.channels[c].name.clone(),
                     sigma: fit.noise.sigma[c],
-                    source: match self.rule.fixed_sigma[c] {
-                        Some(_) => NoiseSource::Calibration,
-                        None => NoiseSource::Differences,
+                    source: match (self.rule.fixed_sigma[c], recording.calibration.get(c)) {
+                        (None, _) => NoiseSource::Differences,
+                        (Some(_), Some(Some(_))) => NoiseSource::Calibration,
+                        (Some(_), _) => NoiseSource::Replicates,
                     },
                     correlated_share: shape.correlated,
                     correlation_length: shape.length_steps * self.problem.step,

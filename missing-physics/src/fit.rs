@@ -334,8 +334,10 @@ pub(crate) fn solve(
 /// How the noise is chosen while a model is fitted.
 #[derive(Debug, Clone)]
 pub(crate) struct NoiseRule {
-    /// A channel's sigma where a calibration fixes it.
+    /// A channel's sigma where a calibration or replicates fix it.
     pub(crate) fixed_sigma: Vec<Option<f64>>,
+    /// How well each fixed sigma is known: its relative standard error.
+    pub(crate) uncertainty: Vec<f64>,
     /// The shapes that are allowed.
     pub(crate) allowed: Vec<usize>,
     /// Further log prior weight against correlated noise. Where mechanisms compete, colour that only some of them need is

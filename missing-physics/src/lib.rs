@@ -14,6 +14,8 @@ mod linalg;
 mod locate;
 pub mod model;
 pub mod noise;
+mod noise_rule;
 pub mod observer;
+mod outliers;
 mod problem;
 pub mod synthetic;

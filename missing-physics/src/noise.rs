@@ -55,6 +55,9 @@ pub fn family() -> Vec<Shape> {
     shapes
 }
 
+/// Smallest share of the variance that is white.
+const LEAST_WHITE: f64 = 1e-6;
+
 /// Turns noise of one shape at fixed positions into white noise of unit variance, and back.
 #[derive(Debug, Clone)]
 pub struct Whitener {
@@ -91,8 +94,9 @@ impl Whitener {
             return Self { steps: Vec::new(), kind, log_determinant: 0.0 };
         }
         let (correlated, length) = (shape.correlated, shape.length_steps * step);
-        // The white part never vanishes altogether: readings have a last digit, and the filter stays regular.
-        let white = (1.0 - correlated).max(if shape.smooth { 1e-6 } else { 0.0 });
+        // The white part never vanishes altogether: readings have a last digit, and the filter stays regular (also where
+        // two rows share a position).
+        let white = (1.0 - correlated).max(LEAST_WHITE);
         let rate = if shape.smooth { 3f64.sqrt() / length } else { 1.0 / length };
         // Stationary covariance of the state: diagonal in both cases.
         let stationary = [correlated, if shape.smooth { rate * rate * correlated } else { 0.0 }];
@@ -141,13 +145,36 @@ impl Whitener {
         });
     }
 
+    /// The whitened image of a shift of row `i` alone among `n` rows: its entries from row `i` on, at most `reach` of them.
+    pub fn impulse(&self, i: usize, n: usize, reach: usize) -> Vec<f64> {
+        if self.kind == Kind::White {
+            return vec![1.0];
+        }
+        let mut image = vec![0.0; n.saturating_sub(i).min(reach)];
+        if let Some(first) = image.first_mut() {
+            *first = 1.0;
+        }
+        self.run_from(i, &mut image, |value, mean, inverse_sigma| {
+            let innovation = value - mean;
+            (innovation * inverse_sigma, innovation)
+        });
+        image
+    }
+
     #[inline]
     fn run(&self, column: &mut [f64], output: impl Fn(f64, f64, f64) -> (f64, f64)) {
+        self.run_from(0, column, output);
+    }
+
+    /// Runs the filter over rows that begin at row `first`, all rows before them being zero.
+    #[inline]
+    fn run_from(&self, first: usize, column: &mut [f64], output: impl Fn(f64, f64, f64) -> (f64, f64)) {
+        let steps = self.steps.get(first..).unwrap_or_default();
         match self.kind {
             Kind::White => {}
             Kind::Rough => {
                 let mut state = 0.0;
-                for (value, step) in column.iter_mut().zip(&self.steps) {
+                for (value, step) in column.iter_mut().zip(steps) {
                     state *= step.transition[0];
                     let (out, innovation) = output(*value, state, step.inverse_sigma);
                     state += step.gain[0] * innovation;
@@ -156,7 +183,7 @@ impl Whitener {
             }
             Kind::Smooth => {
                 let (mut state, mut slope) = (0.0, 0.0);
-                for (value, step) in column.iter_mut().zip(&self.steps) {
+                for (value, step) in column.iter_mut().zip(steps) {
                     let f = step.transition;
                     (state, slope) = (f[0] * state + f[1] * slope, f[2] * state + f[3] * slope);
                     let (out, innovation) = output(*value, state, step.inverse_sigma);
@@ -182,15 +209,6 @@ fn propagate(p: [f64; 3], stationary: [f64; 2], f: [f64; 4]) -> [f64; 3] {
     ]
 }
 
-/// A row whose neighbours contradict it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spike {
-    /// Index into the column.
-    pub index: usize,
-    /// Distance from the line or curve through its neighbours, in robust sigmas.
-    pub z: f64,
-}
-
 /// Sigma of a column's rough part, from differences that a locally cubic curve does not touch; `None` below 8 rows.
 ///
 /// `values` at `positions`; robust against spikes (median of moduli).
@@ -202,52 +220,12 @@ pub fn rough_sigma(positions: &[f64], values: &[f64]) -> Option<f64> {
     Some(median(&mut moduli)? / 0.6745)
 }
 
-/// Single rows further than `limit` robust sigmas from the cubic through the two neighbours on either side.
-///
-/// A jump is no spike: a row counts only where its neighbours agree with one another without it.
-pub fn spikes(positions: &[f64], values: &[f64], limit: f64) -> Vec<Spike> {
-    let Some(sigma) = rough_sigma(positions, values).filter(|s| *s > 0.0) else { return Vec::new() };
-    let n = values.len();
-    let score: Vec<f64> = (0..n)
-        .map(|i| if i < 2 || i + 2 >= n { 0.0 } else { departure(positions, values, i) / sigma })
-        .collect();
-    (2..n - 2)
-        .filter(|&i| score[i].abs() > limit)
-        // A spike disturbs its neighbours' scores with the opposite sign and less; it is the largest of them.
-        .filter(|&i| (i - 2..=i + 2).all(|j| score[j].abs() <= score[i].abs()))
-        .filter(|&i| {
-            // Without it, the neighbours must be in line: the cubic through the next four on either side.
-            i < 4 || i + 4 >= n || {
-                let around = [i - 4, i - 3, i - 2, i - 1, i + 1, i + 2, i + 3, i + 4];
-                let left = |k: usize| {
-                    let ids: Vec<usize> = around.iter().copied().filter(|&j| j != k).collect();
-                    interpolate(positions, values, &nearest(&ids, k), positions[k])
-                };
-                [i - 1, i + 1].iter().all(|&k| (values[k] - left(k)).abs() < 0.5 * limit * sigma * 2.0)
-            }
-        })
-        .map(|i| Spike { index: i, z: score[i] })
-        .collect()
-}
-
-/// The four of `ids` nearest to `k`.
-fn nearest(ids: &[usize], k: usize) -> Vec<usize> {
-    let mut sorted = ids.to_vec();
-    sorted.sort_by_key(|&j| j.abs_diff(k));
-    sorted.truncate(4);
-    sorted
-}
-
 /// Distance of row `i` from the cubic through its four neighbours, scaled to the sigma of one row.
 fn departure(positions: &[f64], values: &[f64], i: usize) -> f64 {
     let ids = [i - 2, i - 1, i + 1, i + 2];
     let weights = lagrange(positions, &ids, positions[i]);
     let guess: f64 = ids.iter().zip(&weights).map(|(&j, w)| w * values[j]).sum();
     (values[i] - guess) / (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt()
-}
-
-fn interpolate(positions: &[f64], values: &[f64], ids: &[usize], at: f64) -> f64 {
-    ids.iter().zip(lagrange(positions, ids, at)).map(|(&j, w)| w * values[j]).sum()
 }
 
 fn lagrange(positions: &[f64], ids: &[usize], at: f64) -> Vec<f64> {
@@ -288,11 +266,7 @@ mod tests {
             } else {
                 (-gap).exp()
             };
-            let white = if i == j {
-                (1.0 - shape.correlated).max(if shape.smooth { 1e-6 } else { 0.0 })
-            } else {
-                0.0
-            };
+            let white = if i == j { (1.0 - shape.correlated).max(LEAST_WHITE) } else { 0.0 };
             shape.correlated * kernel + white
         })
     }
@@ -323,21 +297,5 @@ mod tests {
                 approx::assert_relative_eq!(a, b, epsilon = 1e-9);
             }
         }
-    }
-
-    #[test]
-    fn a_spike_is_found_and_a_jump_is_not() {
-        let positions: Vec<f64> = (0..60).map(|i| f64::from(i) * 0.02).collect();
-        let noise = |i: usize| 0.01 * ((i as f64 * 12.9898).sin() * 43758.5453).fract();
-        let mut values: Vec<f64> =
-            positions.iter().enumerate().map(|(i, t)| 4.9 * t * t + noise(i)).collect();
-        values[30] += 0.3;
-        let found = spikes(&positions, &values, 6.0);
-        assert_eq!(found.iter().map(|s| s.index).collect::<Vec<_>>(), vec![30]);
-        values[30] -= 0.3;
-        for v in &mut values[35..] {
-            *v += 0.3;
-        }
-        assert_eq!(spikes(&positions, &values, 6.0), vec![]);
     }
 }

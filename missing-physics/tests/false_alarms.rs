@@ -56,3 +56,8 @@ fn quantised_noise() {
 fn faintly_coloured_noise() {
     holds(World { phi: 0.3, ..World::NULL });
 }
+
+#[test]
+fn one_reading_in_a_hundred_is_wild() {
+    holds(World { wild: 0.01, ..World::NULL });
+}

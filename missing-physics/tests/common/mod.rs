@@ -4,7 +4,7 @@
 
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
@@ -87,6 +87,8 @@ pub(crate) struct World {
     pub(crate) sigma: f64,
     /// Correlation of neighbouring rows' noise.
     pub(crate) phi: f64,
+    /// Share of the readings that are off by 10 to 40 sigma.
+    pub(crate) wild: f64,
     /// Smallest step of a reading.
     pub(crate) digit: f64,
     pub(crate) linear_drag: f64,
@@ -95,8 +97,16 @@ pub(crate) struct World {
 }
 
 impl World {
-    pub(crate) const NULL: Self =
-        Self { runs: 4, rows: 40, sigma: 0.005, phi: 0.0, digit: 0.0, linear_drag: 0.0, lift_m_s2: 0.0 };
+    pub(crate) const NULL: Self = Self {
+        runs: 4,
+        rows: 40,
+        sigma: 0.005,
+        phi: 0.0,
+        wild: 0.0,
+        digit: 0.0,
+        linear_drag: 0.0,
+        lift_m_s2: 0.0,
+    };
 
     /// Integrates Newton's law in small steps and reads it with noise.
     pub(crate) fn draw(&self, seed: u64) -> Recording {
@@ -110,7 +120,11 @@ impl World {
                 let (mut times, mut heights) = (Vec::new(), Vec::new());
                 let mut noise: f64 = StandardNormal.sample(&mut rng);
                 for i in 0..self.rows {
-                    let reading = z + self.sigma * noise;
+                    let mut reading = z + self.sigma * noise;
+                    if self.wild > 0.0 && rng.random_bool(self.wild) {
+                        let size: f64 = rng.random_range(10.0..40.0);
+                        reading += self.sigma * if rng.random_bool(0.5) { size } else { -size };
+                    }
                     heights.push(if self.digit > 0.0 {
                         (reading / self.digit).round() * self.digit
                     } else {

@@ -1,0 +1,130 @@
+//! Wild readings: set aside before anything is judged, and listed.
+
+use crate::adequacy::residuals;
+use crate::bank::Bank;
+use crate::data::Recording;
+use crate::diagnosis::Outlier;
+use crate::fit::fit;
+use crate::model::PredictError;
+use crate::noise_rule::noise_rule;
+use crate::problem::Problem;
+
+/// A row further than this many robust sigmas from what all other rows say of it is wild.
+const ROW_LIMIT: f64 = 5.5;
+/// Rows are set aside in rounds, the wildest first: they hide one another.
+const ROUNDS: usize = 5;
+/// As many wild rows one after the other are no accident.
+const NEIGHBOURS: usize = 3;
+
+/// The recording without its wild rows (NaN in their place), and the list of them, by run, channel and row.
+///
+/// # Errors
+/// [`PredictError`] where the simulation has no answer.
+pub(crate) fn set_aside(problem: &Problem<'_>) -> Result<(Recording, Vec<Outlier>), PredictError> {
+    let recording = &problem.recording;
+    let (mut cleaned, mut outliers) = (recording.clone(), Vec::new());
+    for _ in 0..ROUNDS {
+        let found = wild_rows(&problem.with(cleaned.clone()))?;
+        if found.is_empty() {
+            break;
+        }
+        for wild in found {
+            cleaned.runs[wild.run].outputs[wild.channel][wild.row] = f64::NAN;
+            outliers.push((wild.run, wild.channel, wild.row, wild.z));
+        }
+    }
+    outliers.sort_by_key(|o| (o.0, o.1, o.2));
+    let series = put_back_series(recording, &cleaned, &outliers);
+    for &(run, channel, row, _) in &series {
+        cleaned.runs[run].outputs[channel][row] = recording.runs[run].outputs[channel][row];
+    }
+    let listed = outliers
+        .into_iter()
+        .filter(|o| !series.contains(o))
+        .map(|(run, channel, row, z)| Outlier {
+            run: recording.runs[run].label.clone(),
+            row,
+            channel: recording.channels[channel].name.clone(),
+            z,
+        })
+        .collect();
+    Ok((cleaned, listed))
+}
+
+/// Run, channel, row, robust sigmas.
+type Place = (usize, usize, usize, f64);
+
+struct Wild {
+    run: usize,
+    channel: usize,
+    row: usize,
+    z: f64,
+}
+
+/// The wildest rows given all others, few at a time.
+fn wild_rows(problem: &Problem<'_>) -> Result<Vec<Wild>, PredictError> {
+    let rule = noise_rule(problem);
+    let selection = problem.select(&[], &[]);
+    let start = fit(problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
+    let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
+    let bank = Bank::new(problem, &selection, &start, &everything, &rule)?;
+    let scores = bank.row_scores(&residuals(problem, &start)?);
+    let mut found = Vec::new();
+    for channel in 0..problem.channels() {
+        let all: usize = problem.count(channel);
+        let wildest = scores.iter().flat_map(|run| &run[channel]).fold(0.0, |most: f64, z| most.max(z.abs()));
+        let limit = ROW_LIMIT.max(0.5 * wildest);
+        let mut here = Vec::new();
+        for (run, of_run) in scores.iter().enumerate() {
+            let z = &of_run[channel];
+            for (k, value) in z.iter().enumerate() {
+                let around = &z[k.saturating_sub(1)..(k + 2).min(z.len())];
+                if value.abs() > limit && around.iter().all(|other| other.abs() <= value.abs()) {
+                    here.push(Wild { run, channel, row: problem.rows[run].valid[channel][k], z: *value });
+                }
+            }
+        }
+        if here.len() * 20 <= all {
+            found.append(&mut here);
+        }
+    }
+    Ok(found)
+}
+
+/// Rows that stand in a series: what lasts is an effect, not an accident.
+fn put_back_series(recording: &Recording, cleaned: &Recording, outliers: &[Place]) -> Vec<Place> {
+    let mut series = Vec::new();
+    let mut current: Vec<Place> = Vec::new();
+    let close = |current: &mut Vec<Place>, series: &mut Vec<Place>| {
+        if current.len() >= NEIGHBOURS {
+            series.append(current);
+        }
+        current.clear();
+    };
+    for &place in outliers {
+        let (run, channel, row, _) = place;
+        let follows = current.last().is_some_and(|last| {
+            let between = last.2 + 1..row;
+            last.0 == run
+                && last.1 == channel
+                && between.into_iter().all(|i| !recording.runs[run].outputs[channel][i].is_finite())
+        });
+        if !follows {
+            close(&mut current, &mut series);
+        }
+        current.push(place);
+    }
+    close(&mut current, &mut series);
+    // A run that lost more than a tenth of its rows did not lose them by accident either.
+    for (run, data) in recording.runs.iter().enumerate() {
+        for channel in 0..recording.channels.len() {
+            let count = |r: &Recording| r.runs[run].outputs[channel].iter().filter(|v| v.is_finite()).count();
+            let (before, lost) = (count(recording), count(recording) - count(cleaned));
+            if lost > 2 && lost * 10 > before && !data.is_empty() {
+                let mine = outliers.iter().filter(|o| o.0 == run && o.1 == channel);
+                series.extend(mine.filter(|o| !series.contains(o)).copied().collect::<Vec<_>>());
+            }
+        }
+    }
+    series
+}

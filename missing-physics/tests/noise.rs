@@ -1,0 +1,85 @@
+//! What is known of the noise: replicates, and readings that are none.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a test stops where it fails")]
+
+mod common;
+
+use common::{Ball, World};
+use missing_physics::data::Recording;
+use missing_physics::diagnosis::{NoiseSource, Verdict};
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+/// Every row three times, each reading with its own noise.
+fn thrice(world: World, seed: u64) -> Recording {
+    let mut recording = World { sigma: 0.0, ..world }.draw(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xabc);
+    let noise = Normal::new(0.0, world.sigma).unwrap();
+    for run in &mut recording.runs {
+        let repeat = |column: &[f64]| -> Vec<f64> { column.iter().flat_map(|v| [*v; 3]).collect() };
+        run.inputs = run.inputs.iter().map(|c| repeat(c)).collect();
+        run.outputs = run.outputs.iter().map(|c| repeat(c)).collect();
+        run.outputs[0].iter_mut().for_each(|v| *v += noise.sample(&mut rng));
+    }
+    recording
+}
+
+#[test]
+fn replicates_give_the_noise_and_keep_the_promised_rate() {
+    let model = Ball::default();
+    let world = World { runs: 3, rows: 20, ..World::NULL };
+    let options = Options { replicates: 199, ..Options::default() };
+    let mut alarms = 0;
+    for seed in 0..100 {
+        let answer = diagnose(&model, &thrice(world, seed), &[], &options, &Silent).unwrap();
+        assert_eq!(answer.noise[0].source, NoiseSource::Replicates);
+        // 120 degrees of freedom: 6.5 % standard error.
+        assert!((answer.noise[0].sigma / world.sigma - 1.0).abs() < 0.3, "{}", answer.noise[0].sigma);
+        alarms += usize::from(answer.verdict != Verdict::Adequate);
+    }
+    println!("{alarms} alarms in 100 worlds");
+    assert!(alarms <= 12, "{alarms} alarms in 100 worlds at 5 %");
+    let pulled =
+        diagnose(&model, &thrice(World { rows: 40, linear_drag: 0.3, ..world }, 1), &[], &options, &Silent);
+    let pulled = pulled.unwrap();
+    assert_eq!(pulled.chosen, ["linear-drag"]);
+    assert!((pulled.noise[0].sigma / world.sigma - 1.0).abs() < 0.3, "misfit is not noise");
+}
+
+#[test]
+fn wild_readings_are_listed_wherever_they_stand_and_change_nothing() {
+    let model = Ball::default();
+    let options = Options { replicates: 199, ..Options::default() };
+    for (seed, linear_drag) in [(2, 0.25), (3, 0.0), (4, 0.25), (6, 0.0)] {
+        let clean = World { linear_drag, ..World::NULL }.draw(seed);
+        let mut recording = clean.clone();
+        let planted = [(0, 0), (1, 17), (2, 38), (3, 39)];
+        for (k, &(run, row)) in planted.iter().enumerate() {
+            recording.runs[run].outputs[0][row] += if k % 2 == 0 { 0.12 } else { -0.1 };
+        }
+        let before = diagnose(&model, &clean, &[], &options, &Silent).unwrap();
+        let after = diagnose(&model, &recording, &[], &options, &Silent).unwrap();
+        let listed: Vec<(String, usize)> = after.outliers.iter().map(|o| (o.run.clone(), o.row)).collect();
+        let wanted: Vec<(String, usize)> =
+            planted.iter().map(|&(run, row)| (clean.runs[run].label.clone(), row)).collect();
+        assert_eq!(listed, wanted, "seed {seed}");
+        assert_eq!((before.verdict, before.chosen), (after.verdict, after.chosen), "seed {seed}");
+    }
+}
+
+/// A step at the end of the runs is no wild reading: it lasts.
+#[test]
+fn what_lasts_is_not_set_aside() {
+    let model = Ball::default();
+    let mut recording = World::NULL.draw(5);
+    for run in &mut recording.runs {
+        run.outputs[0][35..].iter_mut().for_each(|v| *v += 0.1);
+    }
+    let answer =
+        diagnose(&model, &recording, &[], &Options { replicates: 199, ..Options::default() }, &Silent)
+            .unwrap();
+    assert_ne!(answer.verdict, Verdict::Adequate);
+    assert!(answer.outliers.iter().filter(|o| o.row >= 35).count() == 0, "{:?}", answer.outliers);
+}
