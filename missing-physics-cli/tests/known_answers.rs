@@ -49,11 +49,10 @@ fn ids(value: &Value) -> Vec<String> {
 }
 
 /// The verdicts of the practice cases' keys; where a key names look-alikes, the truth must be among the rivals.
-#[test]
-fn practice_cases_get_the_verdicts_of_their_keys() {
+fn practice_cases_get_the_verdicts_of_their_keys(domain: &str) {
     let Some(shared) = shared() else { return };
     let mut seen = 0;
-    for entry in std::fs::read_dir(shared.join("practice/trajectory")).unwrap() {
+    for entry in std::fs::read_dir(shared.join("practice").join(domain)).unwrap() {
         let folder = entry.unwrap().path();
         let key: Value =
             serde_json::from_str(&std::fs::read_to_string(folder.join("key.json")).unwrap()).unwrap();
@@ -76,6 +75,16 @@ fn practice_cases_get_the_verdicts_of_their_keys() {
         seen += 1;
     }
     assert!(seen >= 7);
+}
+
+#[test]
+fn practice_flights() {
+    practice_cases_get_the_verdicts_of_their_keys("trajectory");
+}
+
+#[test]
+fn practice_waves() {
+    practice_cases_get_the_verdicts_of_their_keys("slosh");
 }
 
 /// Measured drops: drag where there is drag, and no other set; the golf ball proves nothing.

@@ -39,7 +39,7 @@ pub(crate) fn candidate(
     set: &[usize],
     terms: &[usize],
     near: &Fit,
-    hints: &[(usize, f64)],
+    guesses: &[Vec<(usize, f64)>],
 ) -> Result<Candidate, PredictError> {
     let selection = problem.select(set, terms);
     let added: Vec<usize> =
@@ -55,11 +55,12 @@ pub(crate) fn candidate(
         }
     }
     let mut starts: Vec<Vec<f64>> = Vec::new();
-    if !hints.is_empty() {
+    for guess in guesses {
         let mut start = near.shared.clone();
-        hints.iter().filter(|(slot, _)| added.contains(slot)).for_each(|&(slot, value)| start[slot] = value);
+        guess.iter().filter(|(slot, _)| added.contains(slot)).for_each(|&(slot, value)| start[slot] = value);
         starts.push(start);
-    } else {
+    }
+    if guesses.is_empty() {
         for side in [0.0, 0.3, -0.3] {
             let mut start = near.shared.clone();
             for &slot in &added {
@@ -113,10 +114,8 @@ fn evidence(
     let two_pi = std::f64::consts::TAU.ln();
     let mut value = fit.log_likelihood
         + 0.5 * (kept.iter().filter(|k| **k).count() as f64 * two_pi - log_determinant(&factor, &kept));
-    for (i, added) in selection.added_own.iter().enumerate() {
-        if *added {
-            value -= fit.own.len() as f64 * own_prior_width(problem, selection, i).ln();
-        }
+    for i in (0..selection.own.len()).filter(|&i| selection.added_own[i]) {
+        value -= own_prior_cost(problem, selection, fit, i);
     }
     // Each free parameter's prior belongs to the first mechanism or term that frees it.
     let mut taken: Vec<usize> = Vec::new();
@@ -127,7 +126,7 @@ fn evidence(
             spec.mechanisms[m].parameters.iter().chain(&spec.mechanisms[m].companions).copied().collect()
         })
         .chain(terms.iter().map(|&t| vec![spec.terms[t].parameter]));
-    for group in groups {
+    for (order, group) in groups.enumerate() {
         let group: Vec<usize> = group;
         let mine: Vec<usize> = added
             .iter()
@@ -139,6 +138,17 @@ fn evidence(
             .collect();
         taken.extend(&mine);
         value += LOG_PRIOR_ODDS;
+        if mine.is_empty() {
+            continue;
+        }
+        let shapes = &set.get(order).map_or(&[][..], |&m| &spec.mechanisms[m].shapes);
+        let is_shape = |i: &usize| shapes.contains(&problem.shared.index[selection.shared[*i]]);
+        let (shapes, mine): (Vec<usize>, Vec<usize>) = mine.into_iter().partition(is_shape);
+        for i in shapes {
+            let slot = selection.shared[i];
+            let (low, high, x) = (problem.shared.lower[slot], problem.shared.upper[slot], fit.shared[slot]);
+            value -= if low > 0.0 { ((high / low).ln() * x).ln() } else { (high - low).ln() };
+        }
         if mine.is_empty() {
             continue;
         }
@@ -158,10 +168,25 @@ fn evidence(
         let sphere = if one_sided { 0.5 * sphere } else { sphere };
         value -= sphere.ln() + dimension * 0.5 * square.ln() + LOG_RANGE.ln();
     }
+    let senseless = || set.iter().find_map(|&mechanism| problem.model.implausible(mechanism, &fit.shared));
     let ruled_out = bound
         .map(|slot| format!("{} ended at its bound of {}", name(slot), fit.shared[slot]))
+        .or_else(senseless)
         .or_else(|| (!fit.converged).then(|| "its fit did not converge".to_owned()));
     (value, ruled_out)
+}
+
+/// What a mechanism's own parameter costs in log evidence: its values in the runs come from a normal law around its start,
+/// whose width the runs tell (between nothing and the prior's width, all equally likely on a log scale).
+fn own_prior_cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: usize) -> f64 {
+    let (slot, widest) = (selection.own[i], own_prior_width(problem, selection, i));
+    let runs = fit.own.len() as f64;
+    let departure = |(own, start): (&Vec<f64>, &Vec<f64>)| (own[slot] - start[slot]).powi(2);
+    let square = fit.own.iter().zip(&problem.own_start).map(departure).sum::<f64>() / runs;
+    let width = square.sqrt().clamp(1e-6 * widest, widest);
+    // The fit's own prior, of the widest width, is in the likelihood already.
+    let prior = runs * width.ln() + 0.5 * runs * square * (1.0 / (width * width) - 1.0 / (widest * widest));
+    prior + LOG_RANGE.ln() - 0.5 * (std::f64::consts::PI / runs).ln()
 }
 
 /// Tries sets of mechanisms: each alone, then the best ones with one more, to three.
@@ -192,10 +217,11 @@ pub(crate) fn search(
             .par_iter()
             .filter_map(|(set, parent)| {
                 let parent = &all[*parent];
+                let guesses = guesses(problem, parent, set);
+                let mut found = candidate(problem, rule, set, &[], &parent.fit, &guesses).ok();
                 let hints = hints(problem, &all, set);
-                let mut found = candidate(problem, rule, set, &[], &parent.fit, &[]).ok();
                 if size > 1
-                    && let Ok(other) = candidate(problem, rule, set, &[], &parent.fit, &hints)
+                    && let Ok(other) = candidate(problem, rule, set, &[], &parent.fit, &[hints])
                     && found.as_ref().is_none_or(|f| other.fit.log_likelihood > f.fit.log_likelihood + 1e-6)
                 {
                     found = Some(other);
@@ -222,6 +248,31 @@ pub(crate) fn search(
 
 fn best_evidence(all: &[Candidate]) -> f64 {
     all.iter().filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Where the model says to begin the mechanism that a set has and its parent has not.
+fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Vec<(usize, f64)>> {
+    let Some(&new) = set.iter().find(|m| !parent.set.contains(m)) else { return Vec::new() };
+    let Ok(left) = residuals(problem, &parent.fit) else { return Vec::new() };
+    let whole: Vec<Vec<Vec<f64>>> = left
+        .into_iter()
+        .zip(&problem.rows)
+        .zip(&problem.recording.runs)
+        .map(|((channels, rows), run)| {
+            let spread = |(values, valid): (Vec<f64>, &Vec<usize>)| {
+                let mut column = vec![f64::NAN; run.len()];
+                valid.iter().zip(values).for_each(|(&i, v)| column[i] = v);
+                column
+            };
+            channels.into_iter().zip(&rows.valid).map(spread).collect()
+        })
+        .collect();
+    let starts = problem.model.starts(new, &problem.recording.runs, &whole);
+    let shared = |p: usize| problem.shared.index.iter().position(|&i| i == p);
+    starts
+        .into_iter()
+        .map(|start| start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value))).collect())
+        .collect()
 }
 
 /// Values of a set's parameters from the fits of its members alone.

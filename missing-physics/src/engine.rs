@@ -9,7 +9,7 @@ use crate::diagnosis::{
     ChannelFit, ChannelNoise, Confusion, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport,
     Verdict,
 };
-use crate::estimate::estimates;
+use crate::estimate::{estimates, of_mechanism};
 use crate::experiment;
 use crate::fit::{Fit, NoiseRule, NoiseState, fit, solve};
 use crate::law;
@@ -501,13 +501,7 @@ impl Work<'_> {
                     .map(|(_, p)| p)
                     .sum::<f64>()
                     .min(1.0),
-                parameters: estimates(
-                    self.problem,
-                    holder,
-                    &mechanism.parameters,
-                    &mechanism.derived,
-                    profile,
-                ),
+                parameters: of_mechanism(self.problem, holder, mechanism, profile),
                 heldout_log_score_gain: score.map_or(f64::NAN, |s| s.log_score - base.log_score),
                 heldout_rmse: score.map_or(Vec::new(), |s| {
                     channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()

@@ -3,7 +3,7 @@
 use crate::compare::Candidate;
 use crate::diagnosis::Estimate;
 use crate::fit::{NoiseRule, covariance, solve};
-use crate::model::{Derived, Scope};
+use crate::model::{Derived, Mechanism, Scope};
 use crate::problem::{Problem, Selection};
 
 /// Two-sided 95 % quantile of the normal law.
@@ -11,7 +11,22 @@ const Z95: f64 = 1.959_963_984_540_054;
 /// Its square: the 95 % quantile of chi-square with one degree of freedom.
 const CHI95: f64 = Z95 * Z95;
 
-/// Estimates of the given parameters (indices into the model's list; shared ones) and of what is derived from them.
+/// Estimates of a mechanism's parameters and of what is derived from them.
+pub(crate) fn of_mechanism(
+    problem: &Problem<'_>,
+    candidate: &Candidate,
+    mechanism: &Mechanism,
+    profile: Option<&NoiseRule>,
+) -> Vec<Estimate> {
+    let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, profile);
+    all.extend(mechanism.derived_per_run.iter().map(|quantity| {
+        let of_run = |own: &Vec<f64>| (quantity.value)(&candidate.fit.shared, own);
+        over_runs(candidate.fit.own.iter().map(of_run).collect(), &quantity.name, &quantity.unit)
+    }));
+    all
+}
+
+/// Estimates of the given parameters (indices into the model's list) and of what is derived from them.
 ///
 /// Intervals are quadratic; with `profile` they follow the likelihood where that is not quadratic.
 pub(crate) fn estimates(
@@ -31,7 +46,8 @@ pub(crate) fn estimates(
             let info = &spec.parameters[p];
             let slot = problem.slots[p];
             if info.scope == Scope::PerRun {
-                return over_runs(candidate, info, slot);
+                let values = candidate.fit.own.iter().map(|own| own[slot]).collect();
+                return over_runs(values, &info.name, &info.unit);
             }
             let value = candidate.fit.shared[slot];
             let mut ci95 = [f64::NAN; 2];
@@ -84,14 +100,13 @@ pub(crate) fn estimates(
     estimates
 }
 
-/// The mean over runs of a parameter that each run has of its own, with the interval of that mean.
-fn over_runs(candidate: &Candidate, info: &crate::model::Parameter, slot: usize) -> Estimate {
-    let values: Vec<f64> = candidate.fit.own.iter().map(|own| own[slot]).collect();
+/// The mean of a value that each run has of its own, with the interval of that mean.
+fn over_runs(values: Vec<f64>, name: &str, unit: &str) -> Estimate {
     let n = values.len().max(1) as f64;
     let value = values.iter().sum::<f64>() / n;
     let spread = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     let half = Z95 * (spread / n).sqrt();
-    Estimate { name: info.name.clone(), unit: info.unit.clone(), value, ci95: [value - half, value + half] }
+    Estimate { name: name.into(), unit: unit.into(), value, ci95: [value - half, value + half] }
 }
 
 /// The profile-likelihood interval of the `i`-th free shared parameter, where the quadratic one misleads.

@@ -36,13 +36,11 @@ pub fn finite_differences<M: Model + ?Sized>(
         let value = if is_shared { shared[slot] } else { own[slot] };
         let step = 1e-5 * info.scale.max(1e-3 * value.abs());
         let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
-        let mut at = |x: f64, out: &mut [f64]| {
+        for (x, out) in [(high, &mut above), (low, &mut below)] {
             *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = x;
-            model.predict(run, &shared, &own, out)
-        };
-        at(high, &mut above)?;
-        at(low, &mut below)?;
-        at(value, out)?;
+            model.predict(run, &shared, &own, out)?;
+        }
+        *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = value;
         for ((d, a), b) in column.iter_mut().zip(&above).zip(&below) {
             *d = (a - b) / (high - low);
         }

@@ -30,7 +30,7 @@ pub enum Scope {
 /// One parameter of the full model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
-    /// Name with its unit as a suffix (`k_per_m`), unique in the model.
+    /// Name with its unit as a suffix (`k_per_m`), unique in its mechanism.
     pub name: String,
     /// The unit alone (`1/m`).
     pub unit: String,
@@ -66,6 +66,26 @@ impl std::fmt::Debug for Derived {
     }
 }
 
+/// A function of the shared parameters and of one run's own.
+pub type OfRun = std::sync::Arc<dyn Fn(&[f64], &[f64]) -> f64 + Send + Sync>;
+
+/// A quantity that is computed run by run; the mean over the runs is reported.
+#[derive(Clone)]
+pub struct DerivedPerRun {
+    /// Name with its unit as a suffix.
+    pub name: String,
+    /// The unit alone.
+    pub unit: String,
+    /// The value from the shared parameters and the run's own ones, each in the order of [`Spec::parameters`].
+    pub value: OfRun,
+}
+
+impl std::fmt::Debug for DerivedPerRun {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("DerivedPerRun").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
 /// A named group of the full model's parameters; off where each has its `start` value.
 #[derive(Debug, Clone, Default)]
 pub struct Mechanism {
@@ -83,12 +103,19 @@ pub struct Mechanism {
     pub confused_with: Vec<String>,
     /// Indices into [`Spec::parameters`] of the parameters that it frees.
     pub parameters: Vec<usize>,
+    /// Those of [`Self::parameters`] that say what the effect looks like and not how strong it is (the frequency of an
+    /// oscillation whose amplitude is free): at the off value of the others they make no difference. Their `start` is a
+    /// typical value, and all values within their bounds are thought equally likely (on a log scale where both bounds are
+    /// above zero).
+    pub shapes: Vec<usize>,
     /// Parameters freed with it because it acts only through them (wind acts through drag), not reported as its own.
     pub companions: Vec<usize>,
     /// Identifiers of mechanisms that make the companions unnecessary.
     pub companions_unless: Vec<String>,
     /// Quantities computed from its parameters, reported beside them.
     pub derived: Vec<Derived>,
+    /// Quantities computed from each run's own parameters, reported as a mean over the runs.
+    pub derived_per_run: Vec<DerivedPerRun>,
 }
 
 /// A candidate term of an unknown law: a parameter of the model that no mechanism frees.
@@ -164,6 +191,25 @@ pub trait Model: Sync {
 
     /// Fills in good starting values of the run's own parameters; `own` holds each parameter's `start`.
     fn start(&self, _run: &Run, _own: &mut [f64]) {}
+
+    /// Where to begin fitting a mechanism (index into [`Spec::mechanisms`]) whose surface has many hills, judged from what a
+    /// fit without it leaves: `residual[run][channel][row]`, measured less predicted, NaN where nothing was measured.
+    ///
+    /// Each start is a list of shared parameters (index into [`Spec::parameters`]) with their values; none by default.
+    fn starts(
+        &self,
+        _mechanism: usize,
+        _runs: &[Run],
+        _residual: &[Vec<Vec<f64>>],
+    ) -> Vec<Vec<(usize, f64)>> {
+        Vec::new()
+    }
+
+    /// Why a mechanism (index into [`Spec::mechanisms`]) is no explanation at these shared parameters, in a few words; `None`
+    /// where it makes sense. Bounds say what each parameter may be; this says what they may not be together.
+    fn implausible(&self, _mechanism: usize, _shared: &[f64]) -> Option<String> {
+        None
+    }
 
     /// The derivatives of [`Model::predict`] with respect to the shared parameters at the slots `shared_free` and
     /// the own parameters at the slots `own_free`, one column after the other, each as long as `out`.

@@ -1,5 +1,8 @@
 //! The domains: what each reads, and the full model that it puts before the engine.
 
+mod builder;
+mod reading;
+pub mod slosh;
 pub mod trajectory;
 
 use missing_physics::data::Recording;
@@ -55,11 +58,11 @@ pub trait Domain: Sync {
 
 /// All domains of this version.
 pub fn all() -> &'static [&'static dyn Domain] {
-    &[&trajectory::Trajectory]
+    &[&trajectory::Trajectory, &slosh::Slosh]
 }
 
 /// Domains of the format that this version does not have yet.
-const LATER: [&str; 6] = ["liquid-tilt", "slosh", "bounce", "indentation", "dough-roll", "grain-pour"];
+const LATER: [&str; 5] = ["liquid-tilt", "bounce", "indentation", "dough-roll", "grain-pour"];
 
 /// The domain of an identifier.
 ///

@@ -125,6 +125,40 @@ impl<'a> Section<'a> {
         self.table.and_then(|t| t.get(key))
     }
 
+    /// A section within the section (empty where it is absent).
+    ///
+    /// # Errors
+    /// [`ReadError::Value`] where the key holds something else.
+    pub fn section(&self, name: &str) -> Result<Section<'a>, ReadError> {
+        let path = format!("{}{name}.", self.path);
+        match self.table.and_then(|t| t.get(name)) {
+            None => Ok(Section { header: self.header, table: None, path }),
+            Some(Value::Table(table)) => Ok(Section { header: self.header, table: Some(table), path }),
+            Some(other) => Err(self.header.wrong(&format!("{}{name}", self.path), other, "a section")),
+        }
+    }
+
+    /// A number within `[lower, upper]` that has to be there.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingKey`], [`ReadError::Value`].
+    pub fn required(&self, key: &str, lower: f64, upper: f64) -> Result<f64, ReadError> {
+        let missing = || {
+            self.header.missing(&format!("{}{key}", self.path), &format!("a number from {lower} to {upper}"))
+        };
+        self.number(key, lower, upper)?.ok_or_else(missing)
+    }
+
+    /// Complains of a key's value.
+    pub fn unfit(&self, key: &str, got: impl Into<String>, expected: impl Into<String>) -> ReadError {
+        ReadError::Value {
+            file: self.header.file.clone(),
+            key: format!("{}{key}", self.path),
+            got: got.into(),
+            expected: expected.into(),
+        }
+    }
+
     /// The names of the keys in the section.
     pub fn keys(&self) -> Vec<String> {
         self.table.map(|t| t.keys().cloned().collect()).unwrap_or_default()

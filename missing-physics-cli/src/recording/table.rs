@@ -138,6 +138,17 @@ impl Table {
         ReadError::MissingColumn { file: self.file.clone(), column: name.into(), expected: expected.into() }
     }
 
+    /// The error for a number in a row (counted from 0 in the columns) that cannot stand there.
+    pub fn cell(&self, row: usize, column: &str, got: f64, expected: impl Into<String>) -> ReadError {
+        ReadError::Cell {
+            file: self.file.clone(),
+            row: self.lines[row],
+            column: column.into(),
+            got: format!("{got}"),
+            expected: expected.into(),
+        }
+    }
+
     /// The rows of each run, in the order in which the runs begin.
     pub fn by_run(labels: &[String]) -> Vec<(String, Vec<usize>)> {
         let mut places = std::collections::HashMap::new();

@@ -99,7 +99,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
         .iter()
         .map(|o| {
             format!(
-                "run {}, row {}, {}: {:.0} sigma off its neighbours",
+                "run {}, row {}, {}: {:.0} sigma from what all other rows say",
                 o.run,
                 o.row + 1,
                 o.channel,

@@ -40,7 +40,7 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
     }
     for o in d.outliers.iter().take(5) {
         let line = format!(
-            "row {} of run {} ({}) was set aside: {:.0} sigma off its neighbours",
+            "row {} of run {} ({}) was set aside: {:.0} sigma from what all other rows say",
             o.row + 1,
             o.run,
             o.channel,

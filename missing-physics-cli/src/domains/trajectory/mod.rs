@@ -7,13 +7,10 @@ mod spec;
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Quantity, Spec};
 
+use super::reading::{calibration, check_runs, number, resolution};
 use super::{Domain, Loaded, Template};
 use crate::recording::{Column, Header, ReadError, Table, inside};
 use model::{Axes, Setup, TrajectoryModel};
-
-const fn number(name: &'static str, what: &'static str) -> Column {
-    Column { name, what, label: false }
-}
 
 const COLUMNS: [Column; 9] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -93,28 +90,16 @@ impl Domain for Trajectory {
         };
         let spins: Vec<&[f64]> = SPIN.iter().filter_map(|n| table.numbers(n)).collect();
         check_spin(&table, axes, spins.len())?;
-        let noise = header.section("noise")?;
-        let mut calibration = Vec::new();
-        for name in channel_names {
-            calibration.push(noise.number(name, f64::MIN_POSITIVE, 1e12)?);
-        }
+        let calibration = calibration(header, channel_names)?;
         let columns: Vec<&[f64]> = channel_names.iter().filter_map(|n| table.numbers(n)).collect();
+        let by_run = check_runs(&table, labels, FEWEST_ROWS, Some("t_s"))?;
         let mut runs = Vec::new();
-        for (label, rows) in Table::by_run(labels) {
-            check_run(&table, &label, &rows, times, &spins)?;
+        for (label, rows) in by_run {
+            check_spin_is_constant(&table, &rows, &spins)?;
             let pick = |column: &[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
             let mut inputs = vec![pick(times)];
             inputs.extend(spins.iter().map(|s| pick(s)));
             runs.push(Run { label, inputs, outputs: columns.iter().map(|c| pick(c)).collect(), kind: 0 });
-        }
-        if runs.is_empty() {
-            let expected = format!("runs of at least {FEWEST_ROWS} rows");
-            return Err(ReadError::TooFewRows {
-                file: table.file.clone(),
-                what: "the file".into(),
-                got: 0,
-                expected,
-            });
         }
         let spin = spins.len() == 3;
         let model =
@@ -175,57 +160,16 @@ fn check_spin(table: &Table, axes: Axes, spins: usize) -> Result<(), ReadError> 
     }
 }
 
-fn check_run(
-    table: &Table,
-    label: &str,
-    rows: &[usize],
-    times: &[f64],
-    spins: &[&[f64]],
-) -> Result<(), ReadError> {
-    let cell = |row: usize, column: &str, got: String, expected: String| ReadError::Cell {
-        file: table.file.clone(),
-        row: table.lines[row],
-        column: column.into(),
-        got,
-        expected,
-    };
-    if rows.len() < FEWEST_ROWS {
-        return Err(ReadError::TooFewRows {
-            file: table.file.clone(),
-            what: format!("run {}", crate::recording::quoted(label)),
-            got: rows.len(),
-            expected: format!("at least {FEWEST_ROWS}"),
-        });
-    }
+fn check_spin_is_constant(table: &Table, rows: &[usize], spins: &[&[f64]]) -> Result<(), ReadError> {
     for pair in rows.windows(2) {
-        let (before, now) = (times[pair[0]], times[pair[1]]);
-        if now <= before {
-            return Err(cell(
-                pair[1],
-                "t_s",
-                format!("{now}"),
-                format!("more than {before}, the time before it"),
-            ));
-        }
         for (spin, name) in spins.iter().zip(SPIN) {
             if spin[pair[1]] != spin[pair[0]] {
                 let expected = format!("{}, as in the rest of its run", spin[pair[0]]);
-                return Err(cell(pair[1], name, format!("{}", spin[pair[1]]), expected));
+                return Err(table.cell(pair[1], name, spin[pair[1]], expected));
             }
         }
     }
     Ok(())
-}
-
-/// The step of a column's readings where they are clearly steps of one size, else 0.
-fn resolution(column: &[f64]) -> f64 {
-    let mut sorted = column.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let largest = sorted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-    let gaps = sorted.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1e-9 * largest);
-    let step = gaps.fold(f64::INFINITY, f64::min);
-    let whole = |v: &f64| ((v - sorted[0]) / step - ((v - sorted[0]) / step).round()).abs() < 1e-3;
-    if step.is_finite() && sorted.iter().all(whole) { step } else { 0.0 }
 }
 
 fn undetermined(axes: Axes) -> Vec<String> {

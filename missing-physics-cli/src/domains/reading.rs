@@ -1,0 +1,68 @@
+//! What every domain does with its table: runs, noise, resolution.
+
+use crate::recording::{Column, Header, ReadError, Table, quoted};
+
+/// A column of numbers.
+pub(super) const fn number(name: &'static str, what: &'static str) -> Column {
+    Column { name, what, label: false }
+}
+
+/// The rows of each run, in the order of the file; each has at least `fewest`, and the column `rising` rises in it.
+///
+/// # Errors
+/// [`ReadError::TooFewRows`], [`ReadError::Cell`].
+pub(super) fn check_runs(
+    table: &Table,
+    labels: &[String],
+    fewest: usize,
+    rising: Option<&str>,
+) -> Result<Vec<(String, Vec<usize>)>, ReadError> {
+    let expected =
+        |what: &str| format!("{what}at least {fewest}{}", if what.is_empty() { "" } else { " rows" });
+    let too_few = |what: String, got, expected| {
+        Err(ReadError::TooFewRows { file: table.file.clone(), what, got, expected })
+    };
+    let runs = Table::by_run(labels);
+    if runs.is_empty() {
+        return too_few("the file".into(), 0, expected("runs of "));
+    }
+    for (label, rows) in &runs {
+        if rows.len() < fewest {
+            return too_few(format!("run {}", quoted(label)), rows.len(), expected(""));
+        }
+        let Some((name, column)) = rising.and_then(|name| Some((name, table.numbers(name)?))) else {
+            continue;
+        };
+        for pair in rows.windows(2) {
+            let (before, now) = (column[pair[0]], column[pair[1]]);
+            if now <= before {
+                let before = format!(
+                    "more than {before}, the {} before it",
+                    if name == "t_s" { "time" } else { "one" }
+                );
+                return Err(table.cell(pair[1], name, now, before));
+            }
+        }
+    }
+    Ok(runs)
+}
+
+/// The calibrated sigma of each channel, where `[noise]` has one.
+///
+/// # Errors
+/// [`ReadError::Value`].
+pub(super) fn calibration(header: &Header, channels: &[&str]) -> Result<Vec<Option<f64>>, ReadError> {
+    let noise = header.section("noise")?;
+    channels.iter().map(|name| noise.number(name, f64::MIN_POSITIVE, 1e12)).collect()
+}
+
+/// The step of a column's readings where they are clearly steps of one size, else 0.
+pub(super) fn resolution(column: &[f64]) -> f64 {
+    let mut sorted = column.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let largest = sorted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let gaps = sorted.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1e-9 * largest);
+    let step = gaps.fold(f64::INFINITY, f64::min);
+    let whole = |v: &f64| ((v - sorted[0]) / step - ((v - sorted[0]) / step).round()).abs() < 1e-3;
+    if step.is_finite() && sorted.iter().all(whole) { step } else { 0.0 }
+}
