@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut all = Vec::new();
     println!("{:28} {:>7} {:>8} {:>8}", "null worlds", "number", "at 5 %", "at 1 %");
     for (k, (name, world)) in kinds.iter().enumerate() {
-        let answers = examples::diagnose_many(name, world, count, 10_000 * (k as u64 + 1), 399)?;
+        let answers = examples::diagnose_many(name, &|_| *world, count, 10_000 * (k as u64 + 1), 399)?;
         let p: Vec<f64> = answers.iter().map(|d| d.p_value).collect();
         let at = |level: f64| p.iter().filter(|p| **p <= level).count();
         println!("{name:28} {:>7} {:>8} {:>8}", p.len(), at(0.05), at(0.01));

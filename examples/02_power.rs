@@ -10,13 +10,14 @@ use missing_physics::diagnosis::Verdict;
 use worlds::flight::{Effects, FlightWorld, Seen};
 use worlds::noise::Noise;
 
-/// Standard errors by which a gravity-only flight misses, on average over draws: straight lines are fitted to what is left of
-/// the coordinates once gravity is taken away.
-fn size(world: &FlightWorld) -> f64 {
+/// Standard errors by which a gravity-only flight misses one draw: straight lines are fitted to what is left of the
+/// coordinates once gravity is taken away.
+fn size(world: &FlightWorld, seed: u64) -> f64 {
     let quiet = FlightWorld { noise: Noise::white(0.0), ..*world };
-    let draws = 40;
-    let squares: f64 = (0..draws)
-        .flat_map(|seed| quiet.draw(seed).runs)
+    let squares: f64 = quiet
+        .draw(seed)
+        .runs
+        .into_iter()
         .map(|run| {
             let last = run.channels.len() - 1;
             let misfit = |(c, z): (usize, &Vec<f64>)| {
@@ -31,7 +32,7 @@ fn size(world: &FlightWorld) -> f64 {
             run.channels.iter().enumerate().map(misfit).sum::<f64>()
         })
         .sum();
-    (squares / draws as f64).sqrt() / world.noise.sigma
+    squares.sqrt() / world.noise.sigma
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -46,9 +47,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     ];
     println!("{:16} {:>28} {:>12}", "effect", "times the told test's size", "detected");
     for (k, (name, told, grow)) in kinds.iter().enumerate() {
-        let unit = size(&FlightWorld { effects: grow(1.0), ..base });
         for (j, factor) in [1.0, 1.5, 2.0].into_iter().enumerate() {
-            let world = FlightWorld { effects: grow(factor * told / unit), ..base };
+            // Each throw is another one: the effect is grown until this one misses by the wanted size.
+            let world = |seed| {
+                let unit = size(&FlightWorld { effects: grow(1.0), ..base }, seed);
+                FlightWorld { effects: grow(factor * told / unit), ..base }
+            };
             let seed = 1_000_000 + 10_000 * (3 * k + j) as u64;
             let answers = examples::diagnose_many(name, &world, count, seed, 399)?;
             let seen = answers.iter().filter(|d| d.verdict != Verdict::Adequate).count();

@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "hidden", "parameter", "named", "in the answer", "interval holds it"
     );
     for (k, (id, parameter, truth, world)) in kinds.iter().enumerate() {
-        let answers = examples::diagnose_many(id, world, count, 2_000_000 + 10_000 * k as u64, 199)?;
+        let answers = examples::diagnose_many(id, &|_| *world, count, 2_000_000 + 10_000 * k as u64, 199)?;
         let is = |set: &Vec<String>| set.len() == 1 && set[0] == *id;
         let named: Vec<_> = answers.iter().filter(|d| is(&d.chosen)).collect();
         let inside = answers.iter().filter(|d| is(&d.chosen) || d.confused_with.iter().any(is)).count();

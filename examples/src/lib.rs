@@ -50,18 +50,18 @@ pub fn recording(world: &FlightWorld, seed: u64) -> Recording {
     }
 }
 
-/// Diagnoses `count` draws of a world, in parallel, each with its own seed; in order.
+/// Diagnoses `count` draws of a world, which may depend on the seed, in parallel; in order.
 ///
 /// # Errors
 /// The first [`DiagnoseError`].
 pub fn diagnose_many(
     name: &str,
-    world: &FlightWorld,
+    world: &(dyn Fn(u64) -> FlightWorld + Sync),
     count: u64,
     first_seed: u64,
     replicates: usize,
 ) -> Result<Vec<Diagnosis>, DiagnoseError> {
-    let model = model(world.seen);
+    let model = model(world(first_seed).seen);
     let style = ProgressStyle::with_template("{msg:40} {bar:30} {pos}/{len} {eta}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = indicatif::ProgressBar::new(count).with_style(style).with_message(name.to_owned());
@@ -70,7 +70,7 @@ pub fn diagnose_many(
         .progress_with(bar)
         .map(|seed| {
             let options = Options { seed, replicates, ..Options::default() };
-            diagnose(&model, &recording(world, seed), &[], &options, &Silent)
+            diagnose(&model, &recording(&world(seed), seed), &[], &options, &Silent)
         })
         .collect()
 }

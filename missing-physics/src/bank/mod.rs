@@ -89,7 +89,8 @@ struct Products {
 pub(crate) struct Reading {
     /// Log likelihood of the model alone, up to a constant of the data's layout.
     pub(crate) score: f64,
-    /// Twice the log-likelihood gain of each alternative, its noise fitted anew.
+    /// How much each alternative lowers the sum of squares in units of the noise that is left beside it: the model alone
+    /// would call a faint slow effect coloured noise.
     pub(crate) gains: Vec<f64>,
     /// Noise of the model alone: shape in play and sigma, by channel.
     pub(crate) noise: Vec<(usize, f64)>,
@@ -453,6 +454,25 @@ impl<'a> Bank<'a> {
         (score, noise, coefficients)
     }
 
+    /// Sum of squares in units of the noise.
+    fn chi2(
+        &self,
+        products: &Products,
+        noise: &[(usize, f64)],
+        own: &[usize],
+        shared: &[usize],
+        coefficients: &[Vec<f64>],
+    ) -> f64 {
+        let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+        noise
+            .iter()
+            .enumerate()
+            .map(|(c, &(shape, sigma))| {
+                self.squares(products, c, shape, &ids, coefficients).0 / (sigma * sigma)
+            })
+            .sum()
+    }
+
     /// Fits the model and every alternative to a data vector (`[run][channel]`, measured rows).
     pub(crate) fn read(&self, data: &[Vec<Vec<f64>>]) -> Reading {
         let products = self.products(data);
@@ -460,16 +480,23 @@ impl<'a> Bank<'a> {
         let shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
         let start = self.white_start(&products);
         let (score, noise, coefficients) = self.alternate(&products, &own, &shared, &start, 8);
+        let plain = (own.clone(), shared.clone());
         let gains = self
             .alternatives
             .iter()
             .map(|alternative| {
                 let own: Vec<usize> = own.iter().chain(&alternative.own).copied().collect();
                 let shared: Vec<usize> = shared.iter().chain(&alternative.shared).copied().collect();
-                let (with, _, x) = self.alternate(&products, &own, &shared, &noise, 4);
+                let (_, beside, _) = self.alternate(&products, &own, &shared, &noise, 4);
+                let x = self.solve(&products, &beside, &own, &shared);
                 let wrong = alternative.sign != 0.0
                     && x.first().and_then(|x| x.last()).is_some_and(|value| value * alternative.sign < 0.0);
-                if wrong { 0.0 } else { (2.0 * (with - score)).max(0.0) }
+                if wrong {
+                    return 0.0;
+                }
+                let with = self.chi2(&products, &beside, &own, &shared, &x);
+                let without = self.solve(&products, &beside, &plain.0, &plain.1);
+                (self.chi2(&products, &beside, &plain.0, &plain.1, &without) - with).max(0.0)
             })
             .collect();
         Reading { score, gains, noise, coefficients }

@@ -1,0 +1,22 @@
+/// Why a container cannot be, or cannot hold what is asked.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ContainerError {
+    /// A dimension is outside its range.
+    #[error("{name} is {got}, expected {expected}")]
+    Dimension {
+        /// What it is.
+        name: &'static str,
+        /// What came.
+        got: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// The volume is negative, no number, or more than the container holds.
+    #[error("a volume of {got_m3} m^3, expected 0 to {capacity_m3} m^3")]
+    Volume {
+        /// What came.
+        got_m3: f64,
+        /// What fits.
+        capacity_m3: f64,
+    },
+}
