@@ -67,6 +67,7 @@ fn quadrature(length: f64, tilt: f64, delta: f64) -> [f64; 3] {
     sums
 }
 
+#[allow(clippy::approx_constant, reason = "angles beside pi/2, not that angle")]
 const TILTS: [f64; 16] = [
     1e-12,
     1e-9,
@@ -74,7 +75,7 @@ const TILTS: [f64; 16] = [
     1e-3,
     0.1,
     0.4,
-    0.785_398_163_397_448_3,
+    PI / 4.0,
     1.2,
     1.5,
     1.57,

@@ -83,6 +83,11 @@ fn practice_flights() {
 }
 
 #[test]
+fn practice_sweeps() {
+    practice_cases_get_the_verdicts_of_their_keys("liquid-tilt");
+}
+
+#[test]
 fn practice_waves() {
     practice_cases_get_the_verdicts_of_their_keys("slosh");
 }

@@ -46,7 +46,8 @@ pub(crate) fn candidate(
         selection.shared.iter().zip(&selection.added_shared).filter(|(_, a)| **a).map(|(s, _)| *s).collect();
     // What the neighbour had on and this set does not is off again.
     let mut near = near.clone();
-    for slot in (0..near.shared.len()).filter(|s| !selection.shared.contains(s)) {
+    let places = problem.places(set);
+    for slot in (0..near.shared.len()).filter(|s| !selection.shared.contains(s) && !places.contains(s)) {
         near.shared[slot] = problem.shared.start[slot];
     }
     for (run, own) in near.own.iter_mut().enumerate() {
@@ -57,7 +58,8 @@ pub(crate) fn candidate(
     let mut starts: Vec<Vec<f64>> = Vec::new();
     for guess in guesses {
         let mut start = near.shared.clone();
-        guess.iter().filter(|(slot, _)| added.contains(slot)).for_each(|&(slot, value)| start[slot] = value);
+        let mine = |slot: &usize| added.contains(slot) || places.contains(slot);
+        guess.iter().filter(|(slot, _)| mine(slot)).for_each(|&(slot, value)| start[slot] = value);
         starts.push(start);
     }
     if guesses.is_empty() {
@@ -116,6 +118,9 @@ fn evidence(
         + 0.5 * (kept.iter().filter(|k| **k).count() as f64 * two_pi - log_determinant(&factor, &kept));
     for i in (0..selection.own.len()).filter(|&i| selection.added_own[i]) {
         value -= own_prior_cost(problem, selection, fit, i);
+    }
+    for slot in problem.places(set) {
+        value -= (problem.shared.upper[slot] - problem.shared.lower[slot] + 1.0).ln();
     }
     // Each free parameter's prior belongs to the first mechanism or term that frees it.
     let mut taken: Vec<usize> = Vec::new();

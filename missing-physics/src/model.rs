@@ -108,6 +108,9 @@ pub struct Mechanism {
     /// typical value, and all values within their bounds are thought equally likely (on a log scale where both bounds are
     /// above zero).
     pub shapes: Vec<usize>,
+    /// Those of [`Self::parameters`] that are whole numbers (the row at which something jumps): no fit moves them,
+    /// [`Model::starts`] proposes their values, and all whole values within their bounds are thought equally likely.
+    pub places: Vec<usize>,
     /// Parameters freed with it because it acts only through them (wind acts through drag), not reported as its own.
     pub companions: Vec<usize>,
     /// Identifiers of mechanisms that make the companions unnecessary.

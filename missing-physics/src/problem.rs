@@ -137,6 +137,11 @@ impl<'a> Problem<'a> {
         self.rows[run].valid[channel].iter().map(|&i| column[channel * n + i]).collect()
     }
 
+    /// Slots of the whole numbers that belong to the mechanisms `set`.
+    pub(crate) fn places(&self, set: &[usize]) -> Vec<usize> {
+        set.iter().flat_map(|&m| &self.spec().mechanisms[m].places).map(|&p| self.slots[p]).collect()
+    }
+
     /// The free parameters with the mechanisms `set` (indices into [`Spec::mechanisms`]) and terms `terms` on.
     pub(crate) fn select(&self, set: &[usize], terms: &[usize]) -> Selection {
         let spec = self.spec();
@@ -158,6 +163,9 @@ impl<'a> Problem<'a> {
             if !needless {
                 mechanism.companions.iter().for_each(|&p| free[p] = true);
             }
+        }
+        for &place in spec.mechanisms.iter().flat_map(|m| &m.places) {
+            free[place] = false;
         }
         for &t in terms {
             free[spec.terms[t].parameter] = true;

@@ -1,6 +1,7 @@
 //! The domains: what each reads, and the full model that it puts before the engine.
 
 mod builder;
+pub mod liquid_tilt;
 mod reading;
 pub mod slosh;
 pub mod trajectory;
@@ -58,11 +59,11 @@ pub trait Domain: Sync {
 
 /// All domains of this version.
 pub fn all() -> &'static [&'static dyn Domain] {
-    &[&trajectory::Trajectory, &slosh::Slosh]
+    &[&trajectory::Trajectory, &liquid_tilt::LiquidTilt, &slosh::Slosh]
 }
 
 /// Domains of the format that this version does not have yet.
-const LATER: [&str; 5] = ["liquid-tilt", "bounce", "indentation", "dough-roll", "grain-pour"];
+const LATER: [&str; 4] = ["bounce", "indentation", "dough-roll", "grain-pour"];
 
 /// The domain of an identifier.
 ///
