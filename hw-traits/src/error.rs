@@ -1,0 +1,71 @@
+/// What kind of thing went wrong, in terms that a driver can act on without knowing the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The device does not answer, or the link to it broke; trying again may help.
+    Link,
+    /// The device answered too late for the value to be of use; trying again may help.
+    Timeout,
+    /// A command is outside what the device can do; the same command will fail again.
+    OutOfRange,
+    /// A reading is beyond the sensor's range: its value says nothing.
+    Saturated,
+    /// The device stopped for safety, and moves again only after somebody has cleared it.
+    Stopped,
+    /// A recording that is played back has no more to give.
+    EndOfRecording,
+    /// A recording that is played back was made with other commands.
+    NotAsRecorded,
+    /// Anything else.
+    Other,
+}
+
+impl std::fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Link => "the device does not answer",
+            Self::Timeout => "the device answered too late",
+            Self::OutOfRange => "the command is outside the device's range",
+            Self::Saturated => "the reading is beyond the sensor's range",
+            Self::Stopped => "the device has stopped for safety",
+            Self::EndOfRecording => "the recording has ended",
+            Self::NotAsRecorded => "the recording was made with other commands",
+            Self::Other => "something else went wrong",
+        })
+    }
+}
+
+/// An error of a device.
+///
+/// Drivers keep their own error types, with all that they know; generic code asks for the [`ErrorKind`].
+pub trait Error: std::fmt::Debug {
+    /// The kind of this error. Of several that apply, the one that comes first in [`ErrorKind`].
+    fn kind(&self) -> ErrorKind;
+}
+
+impl Error for ErrorKind {
+    fn kind(&self) -> ErrorKind {
+        *self
+    }
+}
+
+/// A device that cannot fail.
+impl Error for std::convert::Infallible {
+    fn kind(&self) -> ErrorKind {
+        match *self {}
+    }
+}
+
+/// The error type of a device, one for all the traits that it implements.
+pub trait ErrorType {
+    /// The error.
+    type Error: Error;
+}
+
+impl<T: ErrorType + ?Sized> ErrorType for &mut T {
+    type Error = T::Error;
+}
+
+impl<T: ErrorType + ?Sized> ErrorType for Box<T> {
+    type Error = T::Error;
+}
