@@ -19,4 +19,7 @@ pub enum ContainerError {
         /// What fits.
         capacity_m3: f64,
     },
+    /// The mesh is no container.
+    #[error(transparent)]
+    Mesh(#[from] super::mesh::MeshError),
 }

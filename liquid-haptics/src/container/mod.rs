@@ -5,6 +5,7 @@
 
 mod cylinder;
 mod error;
+pub mod mesh;
 mod wedge;
 
 pub use cylinder::Cylinder;

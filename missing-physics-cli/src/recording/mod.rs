@@ -151,11 +151,11 @@ pub enum ReadError {
     },
 }
 
-/// Reads a text file of limited size.
+/// Reads a file of limited size.
 ///
 /// # Errors
-/// [`ReadError::Open`], [`ReadError::TooLarge`], [`ReadError::NotText`].
-pub fn read_text(path: &Path) -> Result<String, ReadError> {
+/// [`ReadError::Open`], [`ReadError::TooLarge`].
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let file = path.display().to_string();
     let open = |e: std::io::Error| ReadError::Open { file: file.clone(), why: plain(&e) };
     let metadata = std::fs::metadata(path).map_err(open)?;
@@ -165,8 +165,16 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     if metadata.len() > LARGEST_FILE {
         return Err(ReadError::TooLarge { file, bytes: metadata.len() });
     }
-    let bytes = std::fs::read(path).map_err(open)?;
-    let text = String::from_utf8(bytes)
+    std::fs::read(path).map_err(open)
+}
+
+/// Reads a text file of limited size.
+///
+/// # Errors
+/// [`ReadError::Open`], [`ReadError::TooLarge`], [`ReadError::NotText`].
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
+    let file = path.display().to_string();
+    let text = String::from_utf8(read_bytes(path)?)
         .map_err(|e| ReadError::NotText { file: file.clone(), at: e.utf8_error().valid_up_to() })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

@@ -3,14 +3,14 @@
 mod experiments;
 pub mod model;
 
-use liquid_haptics::container::Cylinder;
+use liquid_haptics::container::mesh::MeshContainer;
 use liquid_haptics::wrench::Grasp;
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
 use super::reading::{calibration, check_runs, number, resolution};
 use super::{Domain, Loaded, Template};
-use crate::recording::{Column, Header, ReadError, Section, Table, inside, quoted};
+use crate::recording::{Column, Header, ReadError, Section, Table, inside, quoted, read_bytes};
 use model::{LiquidTiltModel, Setup, Vessel};
 
 const CHANNELS: [&str; 3] = ["fx_n", "fy_n", "tau_z_nm"];
@@ -46,6 +46,10 @@ impl Domain for LiquidTilt {
             ("t_s", "optional, for the record"),
             ("[rig] container", "{ shape = \"cylinder\", radius_m, length_m }, its outer surface"),
             (
+                "",
+                "or { shape = \"mesh\", file = \"x.stl\" } (STL or OBJ, m, z along the axis, bottom at z = 0)",
+            ),
+            (
                 "[rig] container_mass_kg, gripper_mass_kg, grasp_height_m",
                 "the load besides the liquid, and where it is held",
             ),
@@ -79,7 +83,7 @@ impl Domain for LiquidTilt {
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
         let name = header.root().text("data", "the name of a CSV file")?;
         let rig = header.section("rig")?;
-        let vessel = vessel(&rig)?;
+        let vessel = vessel(header, &rig)?;
         let grasp = Grasp {
             container_mass_kg: rig.required("container_mass_kg", 0.0, 1e6)?,
             gripper_mass_kg: rig.required("gripper_mass_kg", 0.0, 1e6)?,
@@ -100,9 +104,10 @@ impl Domain for LiquidTilt {
         let volumes = table.numbers("volume_m3");
         let calibration = calibration(header, &CHANNELS)?;
         let by_run = check_runs(&table, labels, FEWEST_ROWS, table.numbers("t_s").map(|_| "t_s"))?;
+        let capacity = vessel.capacity_m3();
         let mut runs = Vec::new();
         for (label, rows) in by_run {
-            check_run(&table, &rows, theta, volumes, vessel.capacity_m3())?;
+            check_run(&table, &rows, theta, volumes, capacity)?;
             let pick = |column: &[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
             let mut inputs = vec![pick(theta), rows.iter().map(|&r| r as f64).collect()];
             inputs.extend(volumes.map(pick));
@@ -133,17 +138,36 @@ impl Domain for LiquidTilt {
     }
 }
 
-fn vessel(rig: &Section<'_>) -> Result<Vessel, ReadError> {
+fn vessel(header: &Header, rig: &Section<'_>) -> Result<Vessel, ReadError> {
+    const SHAPES: &str = "\"cylinder\" or \"mesh\"";
     let container = rig.section("container")?;
-    let shape = container.text("shape", "\"cylinder\"")?;
-    if shape != "cylinder" {
-        return Err(container.unfit("shape", quoted(shape), "\"cylinder\""));
+    match container.text("shape", SHAPES)? {
+        "cylinder" => {
+            let radius_m = container.required("radius_m", 1e-4, 1e3)?;
+            let length_m = container.required("length_m", 1e-4, 1e3)?;
+            Ok(Vessel::Cylinder { radius_m, length_m })
+        }
+        "mesh" => {
+            let name = container.text("file", "the name of an STL or OBJ file")?;
+            let path = inside(&header.folder, &header.file, "rig.container.file", name)?;
+            let bytes = read_bytes(&path)?;
+            let place = nalgebra::Isometry3::identity();
+            let mesh = if name.to_ascii_lowercase().ends_with(".obj") {
+                MeshContainer::from_obj(&bytes, 1.0, &place)
+            } else {
+                MeshContainer::from_stl(&bytes, 1.0, &place)
+            };
+            let mesh =
+                mesh.map_err(|e| container.unfit("file", quoted(name), format!("a closed mesh: {e}")))?;
+            let (low, high) = mesh.bounds();
+            if low.z.abs() > 1e-3 * (high.z - low.z) {
+                let expected = format!("a mesh with its bottom at z = 0, not {} m", low.z);
+                return Err(container.unfit("file", quoted(name), expected));
+            }
+            Ok(Vessel::Mesh(std::sync::Arc::new(mesh)))
+        }
+        shape => Err(container.unfit("shape", quoted(shape), SHAPES)),
     }
-    let radius_m = container.required("radius_m", 1e-4, 1e3)?;
-    let length_m = container.required("length_m", 1e-4, 1e3)?;
-    Cylinder::new(radius_m, length_m, 0.0)
-        .map_err(|e| container.unfit("radius_m", format!("{radius_m}"), e.to_string()))?;
-    Ok(Vessel::Cylinder { radius_m, length_m })
 }
 
 fn check_run(

@@ -1,5 +1,9 @@
 //! The full model of a tilt sweep: physics from `liquid-haptics`, and all parameters.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use liquid_haptics::container::mesh::{MeshContainer, PlannedMesh};
 use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::wrench::{Departures, Grasp};
 use missing_physics::data::Run;
@@ -7,44 +11,69 @@ use missing_physics::model::{Model, PredictError, Scope, Spec};
 
 use crate::domains::builder::{At, Builder};
 
-/// The container.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The container, by its outer surface.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Vessel {
-    /// A circular cylinder, by its outer surface.
+    /// A circular cylinder.
     Cylinder {
         /// Outer radius, m.
         radius_m: f64,
         /// Outer length, m.
         length_m: f64,
     },
+    /// Any shape: z along the axis, the bottom at z = 0.
+    Mesh(Arc<MeshContainer>),
 }
+
+/// What a liquid may be in, shared between threads.
+type Cavity = Arc<dyn Container + Send + Sync>;
+
+/// How many walls of a mesh are remembered; then it begins anew.
+const MOST_WALLS: usize = 64;
 
 impl Vessel {
     /// Outer length along the axis, m.
     pub fn length_m(&self) -> f64 {
-        let Self::Cylinder { length_m, .. } = self;
-        *length_m
+        match self {
+            Self::Cylinder { length_m, .. } => *length_m,
+            Self::Mesh(mesh) => mesh.bounds().1.z,
+        }
     }
 
     /// Volume inside the outer surface, m^3.
     pub fn capacity_m3(&self) -> f64 {
-        self.cavity(0.0).map_or(0.0, |c| c.capacity_m3())
+        match self {
+            Self::Cylinder { radius_m, length_m } => std::f64::consts::PI * radius_m * radius_m * length_m,
+            Self::Mesh(mesh) => mesh.capacity_m3(),
+        }
     }
 
     /// The thickest wall that leaves a cavity worth the name, m.
     fn thickest_m(&self) -> f64 {
-        let Self::Cylinder { radius_m, length_m } = self;
-        0.5 * radius_m.min(0.5 * length_m)
+        match self {
+            Self::Cylinder { radius_m, length_m } => 0.5 * radius_m.min(0.5 * length_m),
+            Self::Mesh(mesh) => {
+                let (low, high) = mesh.bounds();
+                let sound = |wall: &f64| mesh.with_wall(*wall).is_ok();
+                (1..8).map(|k| 0.25 * (high - low).min() * 0.5f64.powi(k)).find(sound).unwrap_or(0.0)
+            }
+        }
     }
 
-    fn cavity(&self, wall_m: f64) -> Result<Cylinder, String> {
-        let Self::Cylinder { radius_m, length_m } = *self;
-        Cylinder::new(radius_m, length_m, wall_m).map_err(|e| e.to_string())
+    fn cavity(&self, wall_m: f64) -> Result<Cavity, String> {
+        Ok(match self {
+            Self::Cylinder { radius_m, length_m } => {
+                Arc::new(Cylinder::new(*radius_m, *length_m, wall_m).map_err(|e| e.to_string())?)
+            }
+            Self::Mesh(mesh) => {
+                Arc::new(PlannedMesh::new(mesh.with_wall(wall_m).map_err(|e| e.to_string())?))
+            }
+        })
     }
 }
 
 /// What is known of the set-up.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
     /// The container.
     pub vessel: Vessel,
@@ -73,12 +102,19 @@ struct Places {
 }
 
 /// The model of the domain `liquid-tilt`.
-#[derive(Debug)]
 pub struct LiquidTiltModel {
     setup: Setup,
+    /// Cavities by the thickness of their wall (its bits), where making one takes long.
+    cavities: Mutex<HashMap<u64, Cavity>>,
     spec: Spec,
     places: Places,
     slip: usize,
+}
+
+impl std::fmt::Debug for LiquidTiltModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LiquidTiltModel").field("setup", &self.setup).finish_non_exhaustive()
+    }
 }
 
 impl LiquidTiltModel {
@@ -86,7 +122,24 @@ impl LiquidTiltModel {
     pub fn new(setup: Setup, rows: usize) -> Self {
         let (spec, places) = build(&setup, rows);
         let slip = spec.mechanisms.iter().position(|m| m.id == "grasp-slip").unwrap_or(usize::MAX);
-        Self { setup, spec, places, slip }
+        Self { setup, cavities: Mutex::default(), spec, places, slip }
+    }
+
+    fn cavity(&self, wall_m: f64) -> Result<Cavity, String> {
+        if matches!(self.setup.vessel, Vessel::Cylinder { .. }) {
+            return self.setup.vessel.cavity(wall_m);
+        }
+        let lock = || self.cavities.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cavity) = lock().get(&wall_m.to_bits()) {
+            return Ok(Arc::clone(cavity));
+        }
+        let cavity = self.setup.vessel.cavity(wall_m)?;
+        let mut cavities = lock();
+        if cavities.len() >= MOST_WALLS {
+            cavities.clear();
+        }
+        cavities.insert(wall_m.to_bits(), Arc::clone(&cavity));
+        Ok(cavity)
     }
 
     /// What is known of the set-up.
@@ -121,7 +174,7 @@ impl LiquidTiltModel {
         let [theta, row, ..] = run.inputs.as_slice() else {
             return Err("theta_rad and row are missing".into());
         };
-        let cavity = self.setup.vessel.cavity(shared[p.thickness.slot])?;
+        let cavity = self.cavity(shared[p.thickness.slot])?;
         let (mass, volume) = self.load(run, own);
         let volume = volume.clamp(0.0, cavity.capacity_m3());
         let mut departures = Departures {
@@ -142,7 +195,7 @@ impl LiquidTiltModel {
             let felt = self
                 .setup
                 .grasp
-                .wrench(&cavity, *theta, mass, volume, &departures)
+                .wrench(&*cavity, *theta, mass, volume, &departures)
                 .map_err(|e| e.to_string())?;
             out[i] = felt.fx_n;
             out[n + i] = felt.fy_n;
