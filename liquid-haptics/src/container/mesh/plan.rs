@@ -152,7 +152,9 @@ impl MeshPlan {
         up: [&[f64; 3]; 2],
     ) {
         let (low, high) = (self.heights[first], self.heights[end]);
-        for k in 0..4 {
+        let [area, first_moment, second_moment] = values;
+        let rows = area.iter_mut().zip(first_moment.iter_mut().zip(second_moment));
+        for (k, (area, (first, second))) in rows.enumerate() {
             let h = low + (high - low) * (k as f64 / 3.0);
             let at = |[a, b]: [&[f64; 3]; 2]| {
                 let t = ((h - a[2]) / (b[2] - a[2])).clamp(0.0, 1.0);
@@ -160,9 +162,9 @@ impl MeshPlan {
             };
             let (p, q) = (at(down), at(up));
             let cross = p[0] * q[1] - p[1] * q[0];
-            values[0][k] += 0.5 * cross;
-            values[1][k] += cross * (p[0] + q[0]) / 6.0;
-            values[2][k] += cross * (p[1] + q[1]) / 6.0;
+            *area += 0.5 * cross;
+            *first += cross * (p[0] + q[0]) / 6.0;
+            *second += cross * (p[1] + q[1]) / 6.0;
         }
     }
 
