@@ -88,6 +88,11 @@ fn practice_sweeps() {
 }
 
 #[test]
+fn practice_curves() {
+    practice_cases_get_the_verdicts_of_their_keys("indentation");
+}
+
+#[test]
 fn practice_waves() {
     practice_cases_get_the_verdicts_of_their_keys("slosh");
 }

@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use crate::adequacy::{draw, residuals};
 use crate::bank::Bank;
 use crate::data::Recording;
-use crate::fit::{Fit, NoiseRule, NoiseState, UNDETERMINED, covariance, fit, own_prior_width, solve};
+use crate::fit::{Fit, NoiseRule, NoiseState, UNDETERMINED, covariance, fit, solve};
 use crate::linalg::{cholesky, log_determinant};
 use crate::model::PredictError;
+use crate::own_prior;
 use crate::problem::{Problem, Selection};
 
 /// A set of mechanisms, fitted.
@@ -26,7 +27,7 @@ pub(crate) struct Candidate {
 /// Log prior odds of each further mechanism.
 const LOG_PRIOR_ODDS: f64 = -1.5;
 /// A mechanism's strength is thought equally likely on a log scale over this many e-folds.
-const LOG_RANGE: f64 = 9.21;
+pub(crate) const LOG_RANGE: f64 = 9.21;
 /// How many sets of one size are tried with one more mechanism.
 const BEAM: usize = 3;
 /// The largest set tried.
@@ -117,7 +118,7 @@ fn evidence(
     let mut value = fit.log_likelihood
         + 0.5 * (kept.iter().filter(|k| **k).count() as f64 * two_pi - log_determinant(&factor, &kept));
     for i in (0..selection.own.len()).filter(|&i| selection.added_own[i]) {
-        value -= own_prior_cost(problem, selection, fit, i);
+        value -= own_prior::cost(problem, selection, fit, i);
     }
     for slot in problem.places(set) {
         value -= (problem.shared.upper[slot] - problem.shared.lower[slot] + 1.0).ln();
@@ -179,19 +180,6 @@ fn evidence(
         .or_else(senseless)
         .or_else(|| (!fit.converged).then(|| "its fit did not converge".to_owned()));
     (value, ruled_out)
-}
-
-/// What a mechanism's own parameter costs in log evidence: its values in the runs come from a normal law around its start,
-/// whose width the runs tell (between nothing and the prior's width, all equally likely on a log scale).
-fn own_prior_cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: usize) -> f64 {
-    let (slot, widest) = (selection.own[i], own_prior_width(problem, selection, i));
-    let runs = fit.own.len() as f64;
-    let departure = |(own, start): (&Vec<f64>, &Vec<f64>)| (own[slot] - start[slot]).powi(2);
-    let square = fit.own.iter().zip(&problem.own_start).map(departure).sum::<f64>() / runs;
-    let width = square.sqrt().clamp(1e-6 * widest, widest);
-    // The fit's own prior, of the widest width, is in the likelihood already.
-    let prior = runs * width.ln() + 0.5 * runs * square * (1.0 / (width * width) - 1.0 / (widest * widest));
-    prior + LOG_RANGE.ln() - 0.5 * (std::f64::consts::PI / runs).ln()
 }
 
 /// Tries sets of mechanisms: each alone, then the best ones with one more, to three.
@@ -285,7 +273,8 @@ fn hints(problem: &Problem<'_>, all: &[Candidate], set: &[usize]) -> Vec<(usize,
     let mut hints = Vec::new();
     for &m in set {
         let Some(single) = all.iter().find(|c| c.set == [m]) else { continue };
-        for &p in &problem.spec().mechanisms[m].parameters {
+        let mechanism = &problem.spec().mechanisms[m];
+        for &p in mechanism.parameters.iter().chain(&mechanism.companions) {
             if let Some(slot) = problem.shared.index.iter().position(|&i| i == p) {
                 hints.push((slot, single.fit.shared[slot]));
             }

@@ -67,11 +67,22 @@ pub(crate) struct Fit {
     pub(crate) chi2: f64,
     /// Log likelihood with the runs' own parameters integrated out over a wide prior.
     pub(crate) log_likelihood: f64,
+    /// How well each run tells its own parameters.
+    pub(crate) own_told: Vec<OwnTold>,
     /// Information matrix of the free shared parameters (own ones eliminated).
     pub(crate) information: DMatrix<f64>,
     pub(crate) converged: bool,
     /// Free shared slots that ended at a bound.
     pub(crate) at_bound: Vec<usize>,
+}
+
+/// How well a run tells its free own parameters, in the order of the selection.
+#[derive(Debug, Clone)]
+pub(crate) struct OwnTold {
+    /// Standard errors for given shared parameters; infinite where the run does not tell.
+    pub(crate) error: Vec<f64>,
+    /// How each moves with each free shared parameter: `[own][shared]`.
+    pub(crate) slope: Vec<Vec<f64>>,
 }
 
 /// How wide the prior of a run's own parameter is, in units of its scale.
@@ -169,6 +180,27 @@ fn eliminate(normal: &RunNormal, own: usize, damping: f64) -> Eliminated {
         .collect();
     let log_determinant = log_determinant(&factor, &kept);
     Eliminated { factor, kept, border, log_determinant }
+}
+
+impl Eliminated {
+    fn told(&self, n_shared: usize) -> OwnTold {
+        let n = self.kept.len();
+        let error = (0..n)
+            .map(|i| {
+                let mut unit = vec![0.0; n];
+                unit[i] = 1.0;
+                forward(&self.factor, &self.kept, &mut unit);
+                if self.kept[i] { dot(&unit, &unit).sqrt() } else { f64::INFINITY }
+            })
+            .collect();
+        let mut slope = vec![vec![0.0; n_shared]; n];
+        for (j, border) in self.border.iter().take(n_shared).enumerate() {
+            let mut column = border.clone();
+            backward(&self.factor, &self.kept, &mut column);
+            slope.iter_mut().zip(column).for_each(|(row, value)| row[j] = -value);
+        }
+        OwnTold { error, slope }
+    }
 }
 
 struct Linearised {
@@ -316,6 +348,7 @@ pub(crate) fn solve(
             log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
         }
     }
+    let own_told = eliminated.iter().map(|e| e.told(n_shared)).collect();
     let at_bound = (0..n_shared).filter(|&i| fixed[i]).map(|i| selection.shared[i]).collect();
     Ok(Fit {
         shared,
@@ -323,6 +356,7 @@ pub(crate) fn solve(
         noise: noise.clone(),
         chi2: linear.chi2,
         log_likelihood,
+        own_told,
         information,
         converged,
         at_bound,

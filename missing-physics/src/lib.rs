@@ -17,5 +17,6 @@ pub mod noise;
 mod noise_rule;
 pub mod observer;
 mod outliers;
+mod own_prior;
 mod problem;
 pub mod synthetic;

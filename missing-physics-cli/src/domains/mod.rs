@@ -1,6 +1,7 @@
 //! The domains: what each reads, and the full model that it puts before the engine.
 
 mod builder;
+pub mod indentation;
 pub mod liquid_tilt;
 mod reading;
 pub mod slosh;
@@ -59,11 +60,11 @@ pub trait Domain: Sync {
 
 /// All domains of this version.
 pub fn all() -> &'static [&'static dyn Domain] {
-    &[&trajectory::Trajectory, &liquid_tilt::LiquidTilt, &slosh::Slosh]
+    &[&trajectory::Trajectory, &liquid_tilt::LiquidTilt, &slosh::Slosh, &indentation::Indentation]
 }
 
 /// Domains of the format that this version does not have yet.
-const LATER: [&str; 4] = ["bounce", "indentation", "dough-roll", "grain-pour"];
+const LATER: [&str; 3] = ["bounce", "dough-roll", "grain-pour"];
 
 /// The domain of an identifier.
 ///

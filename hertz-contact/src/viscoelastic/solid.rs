@@ -1,0 +1,197 @@
+//! The standard linear solid along a history, one pass.
+
+use super::{Contact, HistoryError, LinearSolid, Relaxation, check_history};
+use crate::Number;
+use crate::law::{Law, polish};
+
+/// `exp(-x)`, zero with its derivative where it vanishes.
+pub(super) fn decay<T: Number>(x: T) -> T {
+    if x.re() > 700.0 { T::from(0.0) } else { (-x).exp() }
+}
+
+/// `int_0^1 exp(-x (1 - u)) du` and the same of `u exp(-x (1 - u))`.
+pub(super) fn moments<T: Number>(x: T) -> (T, T) {
+    if x.re() < 0.3 {
+        // (1 - e^-x)/x = 1 - x/2 (1 - x/3 (...)); (1 - that)/x likewise, one later.
+        let (mut first, mut second) = (T::from(1.0), T::from(1.0));
+        for n in (2..=14).rev() {
+            first = T::from(1.0) - x * first / f64::from(n);
+            second = T::from(1.0) - x * second / f64::from(n + 1);
+        }
+        (first, second * 0.5)
+    } else {
+        let first = (T::from(1.0) - decay(x)) / x;
+        (first, (T::from(1.0) - first) / x)
+    }
+}
+
+/// A point of the history at which the contact grew.
+#[derive(Debug, Clone, Copy)]
+struct Point<T> {
+    time_s: T,
+    depth_m: T,
+    force_n: T,
+    /// `int exp(-(t - s)/tau) d delta(s)` and the same of the elastic force.
+    depth_memory: T,
+    force_memory: T,
+}
+
+/// Room for a history, to be used again.
+#[derive(Debug, Clone)]
+pub struct Scratch<T> {
+    grown: Vec<Point<T>>,
+}
+
+impl<T> Scratch<T> {
+    /// Empty; it grows to the longest history.
+    pub const fn new() -> Self {
+        Self { grown: Vec::new() }
+    }
+}
+
+impl<T> Default for Scratch<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Number> Point<T> {
+    /// On along a straight line in time to a later point, `part` (0 to 1) of the way; times may be equal: a jump.
+    fn to<L: Law<T>>(&self, law: &L, tau_s: T, end: (T, T), part: T) -> Self {
+        let (step, way) = ((end.0 - self.time_s) * part, (end.1 - self.depth_m) * part);
+        let depth_m = self.depth_m + way;
+        let x = step / tau_s;
+        let (left, (first, second)) = (decay(x), moments(x));
+        // The elastic force as a parabola in time, which the exponential is integrated against exactly.
+        let force_n = law.force(depth_m);
+        let middle = law.force(self.depth_m + way * 0.5);
+        let slope_0 = middle * 4.0 - self.force_n * 3.0 - force_n;
+        let slope_1 = self.force_n - middle * 4.0 + force_n * 3.0;
+        Self {
+            time_s: self.time_s + step,
+            depth_m,
+            force_n,
+            depth_memory: left * self.depth_memory + way * first,
+            force_memory: left * self.force_memory + slope_0 * (first - second) + slope_1 * second,
+        }
+    }
+}
+
+impl<T: Number> LinearSolid<T> {
+    /// Forces in N along a history of times (s, not falling; equal ones are a jump) and indentations (m), in O(n).
+    ///
+    /// `law` is the instantaneous one. Between samples the indentation is a straight line in time and the elastic force a
+    /// parabola; a first sample that is already in contact counts as a jump at that time.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn forces<L: Law<T>>(
+        &self,
+        law: &L,
+        contact: Contact,
+        times_s: &[f64],
+        indentations_m: &[T],
+        scratch: &mut Scratch<T>,
+        forces_n: &mut [T],
+    ) -> Result<(), HistoryError> {
+        Relaxation::<T>::check(self)?;
+        check_history(times_s, indentations_m, forces_n.len())?;
+        let zero = T::from(0.0);
+        let grown = &mut scratch.grown;
+        grown.clear();
+        // The state now, and where on the way of growth the contact's radius was last seen.
+        let mut now: Option<Point<T>> = None;
+        let mut before: Option<(f64, T)> = None;
+        let mut at = 0;
+        for ((&time, &depth), out) in times_s.iter().zip(indentations_m).zip(forces_n.iter_mut()) {
+            let start = match now {
+                Some(point) => point,
+                None if depth.re() > 0.0 => {
+                    // Contact begins where the line from the sample before crosses zero.
+                    let time_s = match before {
+                        Some((t, d)) => T::from(t) + (d / (d - depth)) * (time - t),
+                        None => T::from(time),
+                    };
+                    let touch = Point {
+                        time_s,
+                        depth_m: zero,
+                        force_n: zero,
+                        depth_memory: zero,
+                        force_memory: zero,
+                    };
+                    grown.push(touch);
+                    touch
+                }
+                None => {
+                    before = Some((time, depth));
+                    *out = zero;
+                    continue;
+                }
+            };
+            let point = start.to(law, self.tau_s, (T::from(time), depth), T::from(1.0));
+            now = Some(point);
+            *out = match contact {
+                Contact::Fixed => self.sum(&point, &point),
+                Contact::Shrinks => {
+                    let last = grown.len() - 1;
+                    if self.moved(&grown[last], &point).re() >= 0.0 {
+                        grown.push(point);
+                        at = last + 1;
+                        self.sum(&point, &point)
+                    } else {
+                        self.shrunk(law, grown, &mut at, &point)
+                    }
+                }
+            };
+            if contact == Contact::Fixed && out.re() < 0.0 {
+                *out = zero;
+            }
+        }
+        Ok(())
+    }
+
+    /// `int psi(t - s) d f` up to `then`, seen from `now`.
+    fn sum(&self, then: &Point<T>, now: &Point<T>) -> T {
+        let left = decay((now.time_s - then.time_s) / self.tau_s);
+        (T::from(1.0) - self.relaxed_fraction) * then.force_n
+            + self.relaxed_fraction * left * then.force_memory
+    }
+
+    /// `int psi(t - s) d delta` from `then` to `now`: zero where the contact's radius is the same.
+    fn moved(&self, then: &Point<T>, now: &Point<T>) -> T {
+        let left = decay((now.time_s - then.time_s) / self.tau_s);
+        (T::from(1.0) - self.relaxed_fraction) * (now.depth_m - then.depth_m)
+            + self.relaxed_fraction * (now.depth_memory - left * then.depth_memory)
+    }
+
+    /// The force while the contact is smaller than it was; `at` is the last index at which it was not larger.
+    fn shrunk<L: Law<T>>(&self, law: &L, grown: &[Point<T>], at: &mut usize, now: &Point<T>) -> T {
+        let smaller = |i: usize| self.moved(&grown[i], now).re() >= 0.0;
+        *at = (*at).min(grown.len() - 1);
+        while *at + 1 < grown.len() && smaller(*at + 1) {
+            *at += 1;
+        }
+        while !smaller(*at) {
+            if *at == 0 {
+                return T::from(0.0);
+            }
+            *at -= 1;
+        }
+        let from = &grown[*at];
+        let Some(end) = grown.get(*at + 1).map(|p| (p.time_s, p.depth_m)) else {
+            return self.sum(from, now);
+        };
+        // `moved` falls along the way from this point to the next.
+        let value = |part: T| {
+            let point = from.to(law, self.tau_s, end, part);
+            let slope = self.remaining(now.time_s - point.time_s) * (end.1 - from.depth_m);
+            (-self.moved(&point, now), slope)
+        };
+        let real = |part: f64| {
+            let (value, slope) = value(T::from(part));
+            (value.re(), slope.re())
+        };
+        let part = polish(T::from(crate::root::rising(real, 0.0, 1.0, 0.5)), value);
+        self.sum(&from.to(law, self.tau_s, end, part), now)
+    }
+}
