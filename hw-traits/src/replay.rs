@@ -1,6 +1,6 @@
 //! A recorded rig: the same traits, answered from what was measured once.
 //!
-//! One [`Recording`] is a list of poses in the order in which they were taken, each with the readings at it. A driver that was
+//! A [`Replay`] holds a list of poses in the order in which they were taken, each with the readings at it. A driver that was
 //! written for hardware runs on it unchanged, as long as it asks for what was recorded: the angles in their order, and no more
 //! readings than there are.
 

@@ -11,6 +11,9 @@ use crate::problem::{Problem, Selection};
 /// Intervals have their ends at these quantiles of a variable.
 const BINS: usize = 24;
 
+/// A later variable has to hold so much more of the misfit than an earlier one.
+const EARLIER: f64 = 1.2;
+
 /// Rows of one run, whitened as white noise, with the bin of each along one variable (`usize::MAX`: another channel).
 struct Normals {
     /// `[bin]` Gram matrices of (own, shared, residual) over the channel's rows.
@@ -55,6 +58,7 @@ pub(crate) fn locate(
                 })
                 .collect();
             let whole = outside(&normals, (0, 0), n_own, n_shared).0;
+            let mut here: Option<Best> = None;
             for from in 0..rows.len() {
                 for to in from + 1..=rows.len() {
                     let dropped: f64 = rows[from..to].iter().sum();
@@ -64,10 +68,16 @@ pub(crate) fn locate(
                     let gain = whole - outside(&normals, (from, to), n_own, n_shared).0 - dropped;
                     // A row belongs to the interval if it misses by more than noise does twice over.
                     let worth = gain - dropped;
-                    if best.as_ref().is_none_or(|b| worth > b.0 * 1.02 + 1e-9) {
-                        best = Some((worth, gain, variable, (from, to), edges.clone()));
+                    if here.as_ref().is_none_or(|b| worth > b.0 * 1.02 + 1e-9) {
+                        here = Some((worth, gain, variable, (from, to), edges.clone()));
                     }
                 }
+            }
+            // An earlier variable is the more natural one to name.
+            if let Some(here) = here
+                && best.as_ref().is_none_or(|b| here.0 > EARLIER * b.0 + 1e-9)
+            {
+                best = Some(here);
             }
         }
         let Some((_, gain, variable, (from, to), edges)) = best else { continue };
