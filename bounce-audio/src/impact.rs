@@ -148,10 +148,8 @@ mod tests {
             let start = State { position: [0.0; 3], velocity: launch };
             let mut states = [start; 2];
             flight.states(&start, &[0.0, 0.45], &mut states).unwrap();
-            for i in 0..3 {
-                approx::assert_relative_eq!(states[1].position[i], hop.displacement_m[i], epsilon = 1e-7);
-                approx::assert_relative_eq!(states[1].velocity[i], landing[i], epsilon = 1e-6);
-            }
+            approx::assert_relative_eq!(states[1].position[..], hop.displacement_m[..], epsilon = 1e-7);
+            approx::assert_relative_eq!(states[1].velocity[..], landing[..], epsilon = 1e-6);
         }
     }
 

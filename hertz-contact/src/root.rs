@@ -2,7 +2,7 @@
 
 /// Where a rising function is zero between `low` and `high`, to the last digits: Newton's step where it stays inside the
 /// bracket and shrinks it, else the middle. `f` gives value and slope. A bracket without a root gives the nearer end.
-pub(crate) fn rising(f: impl Fn(f64) -> (f64, f64), low: f64, high: f64, start: f64) -> f64 {
+pub(crate) fn rising(mut f: impl FnMut(f64) -> (f64, f64), low: f64, high: f64, start: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     let mut x = start.clamp(low.min(high), high.max(low));
     let mut last = high - low;
@@ -25,7 +25,9 @@ pub(crate) fn rising(f: impl Fn(f64) -> (f64, f64), low: f64, high: f64, start: 
             low + 0.5 * width
         };
         last = (next - x).abs();
-        let done = last <= 1e-16 * x.abs() || next == x || width <= 2.0 * f64::EPSILON * x.abs();
+        // Newton squares the error: a step of 1e-9 is the last one.
+        let done =
+            (next == newton && last <= 1e-9 * x.abs()) || next == x || width <= 2.0 * f64::EPSILON * x.abs();
         x = next;
         if done {
             break;

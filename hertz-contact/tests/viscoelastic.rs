@@ -304,7 +304,7 @@ fn what_cannot_be_followed_is_refused() {
 }
 
 proptest! {
-    /// Any history: no panic, no NaN, never more than the elastic force at the deepest point; fast and slow alike find no pull.
+    /// Any history: no panic, no NaN.
     #[test]
     fn any_history(
         steps in prop::collection::vec((0.0_f64..1.0, -1.0_f64..1.0), 1..60),

@@ -146,11 +146,16 @@ impl<T: Number> Law<T> for Jkr<T> {
     }
 
     fn derivative(&self, indentation_m: T) -> T {
+        self.both(indentation_m).1
+    }
+
+    fn both(&self, indentation_m: T) -> (T, T) {
         self.contact(indentation_m).map_or_else(
-            || nan_or_zero(indentation_m),
+            || (nan_or_zero(indentation_m), nan_or_zero(indentation_m)),
             |c| {
                 let one = T::from(1.0);
-                self.plane() * c.radius_m * 2.0 * (one - c.ratio * 3.0) / (one - c.ratio)
+                let slope = self.plane() * c.radius_m * 2.0 * (one - c.ratio * 3.0) / (one - c.ratio);
+                (c.force_n, slope)
             },
         )
     }

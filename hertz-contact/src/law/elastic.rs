@@ -237,8 +237,7 @@ impl<T: Number> Law<T> for PowerLaw<T> {
 ///
 /// Tabor's indentation strain `e = 0.2 a/R` with `a = sqrt(R delta)` is put into uniaxial compression:
 /// `F = pi a^2 B ((1 - e)^-2 - (1 - e))`, with B chosen so that small indentations give Hertz with nu = 0.5. A rule of
-/// thumb, kept by name: it stiffens, whereas finite elements of the same material soften
-/// ([`super::Stiffened`] with a coefficient near -0.15). `delta <= R`.
+/// thumb, kept by name: it takes the material's stiffening and leaves out the ball's own -0.1 delta/R. `delta <= R`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeoHookean<T> {
     /// Radius in m, positive.

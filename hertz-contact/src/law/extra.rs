@@ -77,9 +77,8 @@ impl<T: Number> Law<T> for Rim<T> {
 
 /// A law times `1 + c delta/R`: strains that stiffen (c > 0) or soften what is pressed.
 ///
-/// A first-order correction of any law. Under a sphere c is near -0.15 for a neo-Hookean half-space with nu = 0.5 (Zhang et
-/// al. 2014, doi:10.1007/s10237-013-0481-4) and -0.1 for the true sphere in linear elasticity. It means something while
-/// `|c| delta/R <= 0.5`; the factor does not go below 2/3, since further down the force would fall with depth.
+/// A first-order correction of any law; under a sphere, c is -0.1 for the true ball in linear elasticity. It means something
+/// while `|c| delta/R <= 0.5`; the factor does not go below 2/3, since further down the force would fall with depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stiffened<T, L> {
     /// The law without stiffening.
@@ -161,21 +160,23 @@ impl<T: Number, L: Law<T>> Compliant<T, L> {
             return measured_m;
         }
         let at = |x: f64| {
-            let t = T::from(x);
-            (x + c * self.law.force(t).re() - m, 1.0 + c * self.law.derivative(t).re())
+            let (force, slope) = self.law.both(T::from(x));
+            (x + c * force.re() - m, 1.0 + c * slope.re())
         };
-        let low = self.law.rises_from_m().min(m);
-        let root = if m > 0.0 && low >= 0.0 {
+        let lowest = self.law.rises_from_m();
+        let root = if c == 0.0 {
+            m
+        } else if m > 0.0 && lowest >= 0.0 {
             crate::root::rising(at, 0.0, m, m)
         } else {
-            match stuck(&at, self.law.rises_from_m(), m) {
+            match stuck(&at, lowest, m) {
                 Some(root) => root,
                 None => return measured_m,
             }
         };
         polish(T::from(root), |x| {
-            let value = x + self.compliance_m_n * self.law.force(x) - measured_m;
-            (value, self.compliance_m_n * self.law.derivative(x) + T::from(1.0))
+            let (force, slope) = self.law.both(x);
+            (x + self.compliance_m_n * force - measured_m, self.compliance_m_n * slope + T::from(1.0))
         })
     }
 }
@@ -224,8 +225,12 @@ impl<T: Number, L: Law<T>> Law<T> for Compliant<T, L> {
     }
 
     fn derivative(&self, indentation_m: T) -> T {
-        let slope = self.law.derivative(self.true_indentation_m(indentation_m));
-        slope / (self.compliance_m_n * slope + T::from(1.0))
+        self.both(indentation_m).1
+    }
+
+    fn both(&self, indentation_m: T) -> (T, T) {
+        let (force, slope) = self.law.both(self.true_indentation_m(indentation_m));
+        (force, slope / (self.compliance_m_n * slope + T::from(1.0)))
     }
 
     fn validity(&self, indentation_m: f64) -> Validity {

@@ -127,14 +127,17 @@ impl<T: Number> Sample<'_, T> {
         }
     }
 
-    /// Sum over the bulk's laws: layer, plus what adhesion changes on a half-space.
-    fn bulk(&self, d: T, part: impl Fn(&dyn Law<T>, T) -> T) -> T {
+    /// Force and stiffness of the bulk: the layer, plus what adhesion changes on a half-space.
+    fn bulk(&self, d: T) -> (T, T) {
         let half = self.half_space();
         match (self.layered(), self.adhesive()) {
-            (None, None) => part(&half, d),
-            (Some(layered), None) => part(&layered, d),
-            (None, Some(sticky)) => part(&sticky, d),
-            (Some(layered), Some(sticky)) => part(&layered, d) + part(&sticky, d) - part(&half, d),
+            (None, None) => half.both(d),
+            (Some(layered), None) => layered.both(d),
+            (None, Some(sticky)) => sticky.both(d),
+            (Some(layered), Some(sticky)) => {
+                let (a, b, c) = (layered.both(d), sticky.both(d), half.both(d));
+                (a.0 + b.0 - c.0, a.1 + b.1 - c.1)
+            }
         }
     }
 }
@@ -158,17 +161,19 @@ impl<T: Number> Law<T> for Sample<'_, T> {
     }
 
     fn force(&self, indentation_m: T) -> T {
-        let d = indentation_m;
-        let bulk = self.bulk(d, |law, d| law.force(d)) * self.stiffening(d).0;
-        bulk + self.membrane().force(d) + self.rim().force(d)
+        self.both(indentation_m).0
     }
 
     fn derivative(&self, indentation_m: T) -> T {
+        self.both(indentation_m).1
+    }
+
+    fn both(&self, indentation_m: T) -> (T, T) {
         let d = indentation_m;
         let (factor, slope) = self.stiffening(d);
-        let bulk = self.bulk(d, |law, d| law.derivative(d)) * factor;
-        let more = self.bulk(d, |law, d| law.force(d)) * slope;
-        bulk + more + self.membrane().derivative(d) + self.rim().derivative(d)
+        let (force, stiffness) = self.bulk(d);
+        let (membrane, rim) = (self.membrane().both(d), self.rim().both(d));
+        (force * factor + membrane.0 + rim.0, stiffness * factor + force * slope + membrane.1 + rim.1)
     }
 
     fn validity(&self, indentation_m: f64) -> Validity {
@@ -194,15 +199,15 @@ impl<T: Number> Law<T> for Indentation<T> {
     }
 
     fn force(&self, indentation_m: T) -> T {
-        if self.rigid() { self.sample().force(indentation_m) } else { self.cell().force(indentation_m) }
+        self.both(indentation_m).0
     }
 
     fn derivative(&self, indentation_m: T) -> T {
-        if self.rigid() {
-            self.sample().derivative(indentation_m)
-        } else {
-            self.cell().derivative(indentation_m)
-        }
+        self.both(indentation_m).1
+    }
+
+    fn both(&self, indentation_m: T) -> (T, T) {
+        if self.rigid() { self.sample().both(indentation_m) } else { self.cell().both(indentation_m) }
     }
 
     fn validity(&self, indentation_m: f64) -> Validity {

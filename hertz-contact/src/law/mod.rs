@@ -139,6 +139,11 @@ pub trait Law<T: Number> {
     /// Stiffness dF/d(indentation) in N/m; zero where there is no contact.
     fn derivative(&self, indentation_m: T) -> T;
 
+    /// Force and stiffness, where that is cheaper than one after the other.
+    fn both(&self, indentation_m: T) -> (T, T) {
+        (self.force(indentation_m), self.derivative(indentation_m))
+    }
+
     /// Whether the law holds at an indentation in m.
     fn validity(&self, indentation_m: f64) -> Validity;
 
@@ -166,7 +171,10 @@ pub(crate) fn invert<T: Number, L: Law<T> + ?Sized>(
     if !force.is_finite() {
         return Err(InverseError::NotFinite { force_n: force });
     }
-    let at = |x: f64| (law.force(T::from(x)).re() - force, law.derivative(T::from(x)).re());
+    let at = |x: f64| {
+        let (value, slope) = law.both(T::from(x));
+        (value.re() - force, slope.re())
+    };
     let low = law.rises_from_m();
     let lowest = at(low).0;
     if lowest > 0.0 {
@@ -180,7 +188,10 @@ pub(crate) fn invert<T: Number, L: Law<T> + ?Sized>(
         }
     }
     let root = crate::root::rising(at, low, low + step, low + 0.5 * step);
-    Ok(polish(T::from(root), |x| (law.force(x) - force_n, law.derivative(x))))
+    Ok(polish(T::from(root), |x| {
+        let (value, slope) = law.both(x);
+        (value - force_n, slope)
+    }))
 }
 
 /// Two steps of Newton in `T`, which carry the derivatives of a root whose real part is known: the first is right to

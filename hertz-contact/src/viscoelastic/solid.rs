@@ -9,16 +9,27 @@ pub(super) fn decay<T: Number>(x: T) -> T {
     if x.re() > 700.0 { T::from(0.0) } else { (-x).exp() }
 }
 
+/// One over (k + 1)!.
+const FACTORIALS: [f64; 14] = {
+    let (mut out, mut value, mut k) = ([0.0; 14], 1.0, 0);
+    while k < 14 {
+        value /= (k + 1) as f64;
+        out[k] = value;
+        k += 1;
+    }
+    out
+};
+
 /// `int_0^1 exp(-x (1 - u)) du` and the same of `u exp(-x (1 - u))`.
 pub(super) fn moments<T: Number>(x: T) -> (T, T) {
     if x.re() < 0.3 {
-        // (1 - e^-x)/x = 1 - x/2 (1 - x/3 (...)); (1 - that)/x likewise, one later.
-        let (mut first, mut second) = (T::from(1.0), T::from(1.0));
-        for n in (2..=14).rev() {
-            first = T::from(1.0) - x * first / f64::from(n);
-            second = T::from(1.0) - x * second / f64::from(n + 1);
+        // Sums of (-x)^k / (k + 1)! and (-x)^k / (k + 2)!, to the last digit.
+        let (mut first, mut second) = (T::from(0.0), T::from(0.0));
+        for k in (0..FACTORIALS.len() - 1).rev() {
+            first = T::from(FACTORIALS[k]) - x * first;
+            second = T::from(FACTORIALS[k + 1]) - x * second;
         }
-        (first, second * 0.5)
+        (first, second)
     } else {
         let first = (T::from(1.0) - decay(x)) / x;
         (first, (T::from(1.0) - first) / x)

@@ -5,8 +5,8 @@
 //!
 //! `phi(t) - (2/pi) int_0^a phi(s) int_0^inf m(k H) cos(k t) cos(k s) dk ds = E*/pi d/dt int_0^t r (delta - f(r)) / sqrt(t^2 - r^2) dr`
 //!
-//! and `F = 2 pi int_0^a phi dt`. Where the body has no edge, `phi(a) = 0` fixes the depth. (Sneddon 1965; Dhaliwal and Rau
-//! 1970, doi:10.1016/0020-7225(70)90034-0.)
+//! and `F = 2 pi int_0^a phi dt`. Where the body has no edge, `phi(a) = 0` fixes the depth. (Sneddon 1965, and Dhaliwal and Rau
+//! 1970 for layers.)
 
 use nalgebra::{SMatrix, SVector};
 
