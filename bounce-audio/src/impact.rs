@@ -87,6 +87,20 @@ pub fn speed_after_drop(height_m: f64, gravity_m_s2: f64, drag_per_m: f64) -> f6
     (fall * share).max(0.0).sqrt()
 }
 
+/// How long a ball that leaves the table straight up (m/s) stays in the air, s, and the speed at which it lands, with
+/// quadratic drag (1/m). Closed form: it rises like a tangent and falls like a hyperbolic one.
+pub fn rebound(launch_m_s: f64, gravity_m_s2: f64, drag_per_m: f64) -> (f64, f64) {
+    let x = drag_per_m * launch_m_s * launch_m_s / gravity_m_s2;
+    // (atan r + asinh r) / r for r^2 = x.
+    let shape = if x < 1e-3 {
+        2.0 - x * (0.5 - x * (0.275 - x * (1.0 / 7.0 + 15.0 / 336.0)))
+    } else {
+        let r = x.sqrt();
+        (r.atan() + r.asinh()) / r
+    };
+    (launch_m_s / gravity_m_s2 * shape, launch_m_s / (1.0 + x).sqrt())
+}
+
 /// The direction and relative speed that reflection on a table gives a ball, before restitution: the mirror image of its
 /// velocity, a part `friction` of it along the table lost.
 ///
@@ -103,23 +117,10 @@ pub fn reflected(before: &Velocity, slope: [f64; 2], friction: f64) -> Velocity 
     after
 }
 
-/// By how much a velocity's direction is off an expected one: components (rad, for small angles) towards x and across.
-pub fn direction_error(velocity: &Velocity, expected: &Velocity) -> [f64; 2] {
-    let (size, length) = (speed(velocity), speed(expected));
-    if size == 0.0 || length == 0.0 {
-        return [0.0; 2];
-    }
-    let r = expected.map(|x| x / length);
-    let mut first = [1.0 - r[0] * r[0], -r[0] * r[1], -r[0] * r[2]];
-    let norm = speed(&first).max(f64::MIN_POSITIVE);
-    first = first.map(|x| x / norm);
-    let second = [
-        r[1] * first[2] - r[2] * first[1],
-        r[2] * first[0] - r[0] * first[2],
-        r[0] * first[1] - r[1] * first[0],
-    ];
-    let dot = |u: &[f64; 3]| u.iter().zip(velocity).map(|(a, b)| a * b).sum::<f64>() / size;
-    [dot(&first), dot(&second)]
+/// The part along the table of a velocity's unit vector: where it heads, seen from above. Zero for a ball at rest.
+pub fn heading(velocity: &Velocity) -> [f64; 2] {
+    let size = speed(velocity);
+    if size == 0.0 { [0.0; 2] } else { [velocity[0] / size, velocity[1] / size] }
 }
 
 #[cfg(test)]
@@ -158,10 +159,19 @@ mod tests {
         assert_eq!(reflected(&[1.0, 2.0, -3.0], [0.0; 2], 0.0), [1.0, 2.0, 3.0]);
         assert_eq!(reflected(&[1.0, 2.0, -3.0], [0.0; 2], 0.25), [0.75, 1.5, 3.0]);
         let tilted = reflected(&[0.0, 0.0, -1.0], [0.0, -0.1f64.tan()], 0.0);
-        let error = direction_error(&tilted, &[0.0, 0.0, 1.0]);
-        approx::assert_relative_eq!(error[1].abs(), 0.2f64.sin(), max_relative = 1e-12);
+        approx::assert_relative_eq!(heading(&tilted)[1].abs(), 0.2f64.sin(), max_relative = 1e-12);
         assert!(tilted[1] > 0.0, "downhill");
-        assert_eq!(direction_error(&[0.0; 3], &[0.0, 0.0, 1.0]), [0.0; 2]);
+        assert_eq!(heading(&[0.0; 3]), [0.0; 2]);
+    }
+
+    #[test]
+    fn a_rebound_is_a_hop_straight_up() {
+        for (launch, drag) in [(2.0, 0.0), (2.0, 1e-6), (3.0, 1.05e-3), (3.0, 1.1e-3), (2.5, 0.15), (1.0, 0.4)] {
+            let (duration_s, lands) = rebound(launch, 9.81, drag);
+            let (up, down) = Hop { displacement_m: [0.0; 3], duration_s }.velocities(9.81, drag);
+            approx::assert_relative_eq!(up[2], launch, max_relative = 1e-8);
+            approx::assert_relative_eq!(-down[2], lands, max_relative = 1e-8);
+        }
     }
 
     #[test]

@@ -1,3 +1,4 @@
 #![doc = include_str!("../README.md")]
 pub mod flight;
 pub mod impact;
+pub mod missed;

@@ -1,5 +1,6 @@
 //! The domains: what each reads, and the full model that it puts before the engine.
 
+pub mod bounce;
 mod builder;
 pub mod indentation;
 pub mod liquid_tilt;
@@ -60,11 +61,11 @@ pub trait Domain: Sync {
 
 /// All domains of this version.
 pub fn all() -> &'static [&'static dyn Domain] {
-    &[&trajectory::Trajectory, &liquid_tilt::LiquidTilt, &slosh::Slosh, &indentation::Indentation]
+    &[&trajectory::Trajectory, &liquid_tilt::LiquidTilt, &slosh::Slosh, &indentation::Indentation, &bounce::Bounce]
 }
 
 /// Domains of the format that this version does not have yet.
-const LATER: [&str; 3] = ["bounce", "dough-roll", "grain-pour"];
+const LATER: [&str; 2] = ["dough-roll", "grain-pour"];
 
 /// The domain of an identifier.
 ///

@@ -5,6 +5,9 @@ use crate::fit::Fit;
 use crate::model::PredictError;
 use crate::problem::Problem;
 
+/// Range of a prediction, in sigmas, below which it counts as constant.
+const LEAST_RANGE: f64 = 0.1;
+
 /// The variables of which a residual may be a smooth function: the inputs, and the channel's own prediction.
 pub(crate) struct Curves {
     names: Vec<String>,
@@ -29,14 +32,18 @@ impl Curves {
             }
         }
         columns.extend(predictions);
+        // A prediction that moves by less than the noise is no variable, and what moves it may be the noise itself.
+        let least = |v: usize| v.checked_sub(inputs).map_or(0.0, |c| LEAST_RANGE * fit.noise.sigma[c]);
         let scaled = columns
             .into_iter()
-            .map(|runs| {
+            .enumerate()
+            .map(|(v, runs)| {
                 let (low, high) = runs
                     .iter()
                     .flatten()
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-                (high - low > 1e-12 * high.abs().max(low.abs()) && (high - low).is_finite()).then(|| {
+                let moves = high - low > least(v).max(1e-12 * high.abs().max(low.abs()));
+                (moves && (high - low).is_finite()).then(|| {
                     runs.into_iter()
                         .map(|r| r.into_iter().map(|v| 2.0 * (v - low) / (high - low) - 1.0).collect())
                         .collect()

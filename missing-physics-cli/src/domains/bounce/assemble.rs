@@ -1,0 +1,131 @@
+//! From drops that were read to a recording with its model.
+
+use bounce_audio::missed::{typical_restitution, unheard};
+use missing_physics::data::Recording;
+use missing_physics::model::Quantity;
+
+use super::drop::{Drop, Effects};
+use super::experiments::{experiments, of_times};
+use super::model::{BounceModel, Setup};
+use super::read::{Heard, Rig};
+use super::spread::{Known, judge};
+use super::times::TimesModel;
+use crate::domains::Loaded;
+use crate::domains::reading::resolution;
+
+/// A ball that keeps all its speed cannot be, but clocks err.
+const LIKELY_RESTITUTION: [f64; 2] = [0.05, 1.2];
+
+/// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
+pub(super) fn assemble(mut heard: Vec<Heard>, rig: &Rig, known: Known) -> Result<Loaded, (usize, String)> {
+    let (restitution, missed) = listen(&mut heard, rig);
+    let setup = Setup {
+        gravity_m_s2: rig.gravity_m_s2,
+        drag_unit: rig.drag_unit,
+        placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
+        dropped: rig.drop_height_m.is_some(),
+        unheard: [missed, heard.len()],
+    };
+    if setup.placed { placed(&heard, setup, restitution, known) } else { Ok(timed(&heard, rig, setup, restitution, known)) }
+}
+
+/// The typical restitution, and in how many drops an impact went unheard; where it did is marked in them.
+fn listen(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
+    let durations: Vec<Vec<f64>> =
+        heard.iter().map(|h| h.drop.times_s.windows(2).map(|w| w[1] - w[0]).collect()).collect();
+    let of_drop = rig.drop_height_m.map(|h| (8.0 * h / rig.gravity_m_s2).sqrt());
+    let restitution = typical_restitution(durations.iter().map(Vec::as_slice))
+        .or_else(|| Some(durations.first()?.first()? / of_drop?))
+        .unwrap_or(0.8)
+        .clamp(LIKELY_RESTITUTION[0], LIKELY_RESTITUTION[1]);
+    let mut missed = 0;
+    for (h, durations) in heard.iter_mut().zip(&durations) {
+        for (found, m) in h.drop.unheard.iter_mut().skip(1).zip(unheard(durations, restitution, None)) {
+            *found = (*found).max(m);
+        }
+        missed += usize::from(h.drop.unheard != h.drop.known);
+    }
+    (restitution, missed)
+}
+
+/// Times and places: impact by impact.
+fn placed(heard: &[Heard], setup: Setup, restitution: f64, known: Known) -> Result<Loaded, (usize, String)> {
+    let nominal = Effects {
+        gravity_m_s2: setup.gravity_m_s2,
+        restitution,
+        slope_s_m: 0.0,
+        drag_per_m: 0.0,
+        table: [0.0; 2],
+        friction: 0.0,
+        clock_rate: 0.0,
+        position_scale: 0.0,
+        unheard: 0.0,
+        terms: [0.0; 3],
+    };
+    let drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
+    let senseless = |h: &Heard| {
+        let label = crate::recording::quoted(&h.label);
+        (h.row, format!("times and places of a bouncing ball in run {label}"))
+    };
+    let (spread, linear) =
+        judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
+    let mut model = BounceModel::new(setup, nominal, spread);
+    let mut runs = Vec::new();
+    for (h, linear) in heard.iter().zip(linear) {
+        runs.push(model.run(&h.label, linear, &h.drop, &h.numbers).ok_or_else(|| senseless(h))?);
+    }
+    let recording = Recording {
+        channels: vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")],
+        variables: vec![
+            Quantity::new("bounce", ""),
+            Quantity::new("speed_m_s", "m/s"),
+            Quantity::new("x_m", "m"),
+            Quantity::new("y_m", "m"),
+        ],
+        runs,
+        noise_along: Some(0),
+        // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
+        calibration: vec![known.time_s, None, None],
+        resolution: vec![0.0; 3],
+    };
+    let mut undetermined = vec![format!(
+        "how a direction was scattered and how a place was misheard are told apart by the lengths of the flights alone \
+         (here: kappa about {:.0})",
+        spread.kappa
+    )];
+    if !setup.dropped {
+        undetermined.push(UNTIED.into());
+    }
+    let experiments = experiments(&mut model);
+    Ok(Loaded { recording, model: Box::new(model), experiments, undetermined })
+}
+
+const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
+
+/// Times alone.
+fn timed(heard: &[Heard], rig: &Rig, setup: Setup, restitution: f64, known: Known) -> Loaded {
+    let model = TimesModel::new(setup, restitution, rig.drop_height_m);
+    let times: Vec<f64> = heard.iter().flat_map(|h| h.drop.times_s.iter().copied()).collect();
+    // Directions scatter the times beyond the clock's noise, so that a calibrated clock is the least there is.
+    let least = known.time_s.map_or(0.0, |sigma| sigma * 12f64.sqrt());
+    let recording = Recording {
+        channels: vec![Quantity::new("t_s", "s")],
+        variables: vec![
+            Quantity::new("bounce", ""),
+            Quantity::new("known_gaps", ""),
+            Quantity::new("found_gaps", ""),
+        ],
+        runs: heard.iter().map(|h| TimesModel::run(&h.label, &h.drop, &h.numbers)).collect(),
+        noise_along: Some(0),
+        calibration: vec![None],
+        resolution: vec![resolution(&times).max(least)],
+    };
+    let mut undetermined = vec![
+        "times alone say nothing of where the ball went: a tilt, friction and the scale of places are not seen".into(),
+    ];
+    if !setup.dropped {
+        undetermined.push(UNTIED.into());
+    }
+    let experiments = of_times(&model, restitution, setup.gravity_m_s2);
+    Loaded { recording, model: Box::new(model), experiments, undetermined }
+}

@@ -1,0 +1,237 @@
+//! One drop as it was measured, and by how much each of its impacts is off what an effect expects.
+
+use bounce_audio::impact::{Hop, Velocity, heading, reflected, speed, speed_after_drop};
+use bounce_audio::missed::parts;
+use nalgebra::DVector;
+
+/// What changes a bounce; all zero but the restitution and gravity: the baseline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Effects {
+    pub(super) gravity_m_s2: f64,
+    /// Restitution at 1 m/s.
+    pub(super) restitution: f64,
+    /// By how much it falls for each m/s more.
+    pub(super) slope_s_m: f64,
+    pub(super) drag_per_m: f64,
+    /// Slopes dz/dx and dz/dy of the table.
+    pub(super) table: [f64; 2],
+    /// Share of the speed along the table that is lost beyond the restitution.
+    pub(super) friction: f64,
+    pub(super) clock_rate: f64,
+    pub(super) position_scale: f64,
+    /// 1: flights that hide unheard impacts are taken for what they are; 0: for one flight.
+    pub(super) unheard: f64,
+    /// Candidate terms of an unknown law, added to the logarithm of the restitution: x, y (per m), speed squared (s^2/m^2).
+    pub(super) terms: [f64; 3],
+}
+
+/// Smallest restitution that is computed with.
+const LEAST: f64 = 1e-3;
+
+impl Effects {
+    /// Logarithm of the restitution of an impact at a place and a speed.
+    fn log_restitution(&self, place: [f64; 2], speed_m_s: f64) -> f64 {
+        let [x, y, squared] = self.terms;
+        (self.restitution - self.slope_s_m * (speed_m_s - 1.0)).max(LEAST).ln()
+            + x * place[0]
+            + y * place[1]
+            + squared * speed_m_s * speed_m_s
+    }
+}
+
+/// How many numbers say by how much an impact is off: the logarithm of its speed's ratio, and two of its direction.
+pub(super) const PER_IMPACT: usize = 3;
+
+/// One of the values of a drop that are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Measured {
+    /// When an impact was heard.
+    Time(usize),
+    /// Where, along an axis.
+    Place(usize, usize),
+    /// Where it first headed along an axis.
+    Came(usize),
+}
+
+/// A drop: when and where the ball was heard.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Drop {
+    pub(super) times_s: Vec<f64>,
+    /// Places on the table; empty where only times were measured.
+    pub(super) places_m: Vec<[f64; 2]>,
+    /// Height from which it fell to the first impact that was heard, where it is known.
+    pub(super) height_m: Option<f64>,
+    /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known), in
+    /// the recording's units of length and time.
+    pub(super) came: [f64; 2],
+    /// How many impacts went unheard before the first one heard (only with a known height) and within each flight.
+    pub(super) unheard: Vec<usize>,
+    /// Of those, how many are known because the file's numbers jump.
+    pub(super) known: Vec<usize>,
+}
+
+impl Drop {
+    /// Index of the first impact about which something is known: the first, if the height from which it fell is.
+    pub(super) fn first(&self) -> usize {
+        usize::from(self.height_m.is_none())
+    }
+
+    /// Number of impacts about which something is known.
+    pub(super) fn impacts(&self) -> usize {
+        (self.times_s.len() - 1).saturating_sub(self.first())
+    }
+
+    /// Number of errors: three an impact, and before them where a ball headed first whose fall is not known.
+    pub(super) fn errors_len(&self) -> usize {
+        self.lead() + PER_IMPACT * self.impacts()
+    }
+
+    fn lead(&self) -> usize {
+        if self.height_m.is_some() { 0 } else { 2 }
+    }
+
+    /// Number of errors that are not of speeds; they come first.
+    ///
+    /// Errors are taken apart in their order. Speeds are known far better than directions: what is wrong with them must not
+    /// show in the directions.
+    pub(super) fn directions(&self) -> usize {
+        self.lead() + (PER_IMPACT - 1) * self.impacts()
+    }
+
+    /// Where the error of an impact in a channel stands (0: of its speed; 1 and 2: of its direction).
+    pub(super) fn row(&self, impact: usize, channel: usize) -> usize {
+        match channel {
+            0 => self.directions() + impact,
+            _ => self.lead() + 2 * impact + channel - 1,
+        }
+    }
+
+    /// Number of measured values: the times, the places' x and y in turn, and where the ball first headed, which is
+    /// measured to be straight down.
+    pub(super) fn measured(&self) -> usize {
+        self.times_s.len() + 2 * self.places_m.len() + 2
+    }
+
+    /// What the measured value at an index is.
+    pub(super) fn quantity(&self, index: usize) -> Measured {
+        let (times, places) = (self.times_s.len(), 2 * self.places_m.len());
+        match index {
+            i if i < times => Measured::Time(i),
+            i if i < times + places => Measured::Place((i - times) / 2, (i - times) % 2),
+            i => Measured::Came(i - times - places),
+        }
+    }
+
+    /// The measured values.
+    pub(super) fn values(&self) -> DVector<f64> {
+        DVector::from_fn(self.measured(), |i, _| match self.quantity(i) {
+            Measured::Time(k) => self.times_s[k],
+            Measured::Place(k, axis) => self.places_m[k][axis],
+            Measured::Came(axis) => self.came[axis],
+        })
+    }
+
+    /// Changes a measured value.
+    pub(super) fn nudge(&mut self, index: usize, by: f64) {
+        match self.quantity(index) {
+            Measured::Time(k) => self.times_s[k] += by,
+            Measured::Place(k, axis) => self.places_m[k][axis] += by,
+            Measured::Came(axis) => self.came[axis] += by,
+        }
+    }
+
+    fn place(&self, impact: usize) -> [f64; 2] {
+        self.places_m.get(impact).copied().unwrap_or_default()
+    }
+
+    /// The flight from one impact to the next as the effects see it, or the part of it beside an unheard impact.
+    fn flight(&self, index: usize, effects: &Effects, unheard: usize, part: Part) -> (Velocity, Velocity) {
+        let whole = (self.times_s[index + 1] - self.times_s[index]) / (1.0 + effects.clock_rate);
+        let duration_s = match (unheard, part) {
+            (0, _) => whole,
+            (m, Part::First) => parts(whole, m, effects.restitution).0,
+            (m, Part::Last) => parts(whole, m, effects.restitution).1,
+        };
+        let share = duration_s / (whole * (1.0 + effects.position_scale));
+        let (from, to) = (self.place(index), self.place(index + 1));
+        let [dx, dy] = [(to[0] - from[0]) * share, (to[1] - from[1]) * share];
+        let rise = effects.table[0] * dx + effects.table[1] * dy;
+        Hop { displacement_m: [dx, dy, rise], duration_s }
+            .velocities(effects.gravity_m_s2, effects.drag_per_m)
+    }
+
+    /// By how much each impact is off, in the order of [`Drop::row`]; unheard impacts count as heard where `split` says so.
+    fn fill(&self, effects: &Effects, split: bool, out: &mut [f64]) {
+        let hidden = |place: usize| {
+            let (found, known) = (self.unheard.get(place), self.known.get(place));
+            (if split { found } else { known }).copied().unwrap_or(0)
+        };
+        // Times and places in wrong units change every angle alike, the noise of the directions too: no likelier for that.
+        let angles = (1.0 + effects.position_scale) * (1.0 + effects.clock_rate).powi(-2);
+        let mut before: Option<Velocity> = self.height_m.map(|height| {
+            let speed = speed_after_drop(height, effects.gravity_m_s2, effects.drag_per_m);
+            let speed = speed * effects.restitution.powi(hidden(0) as i32);
+            [speed * self.came[0] / angles, speed * self.came[1] / angles, -speed]
+        });
+        let mut at = 0;
+        for impact in 0..self.times_s.len() - 1 {
+            let m = hidden(impact + 1);
+            let (after, mut landing) = self.flight(impact, effects, m, Part::First);
+            if m > 0 {
+                landing = self.flight(impact, effects, m, Part::Last).1;
+            }
+            if let Some(before) = before {
+                let expected = reflected(&before, effects.table, effects.friction);
+                let ratio = (speed(&after).max(f64::MIN_POSITIVE) / speed(&expected).max(f64::MIN_POSITIVE)).ln();
+                let restitution = effects.log_restitution(self.place(impact), speed(&before));
+                let (now, then) = (heading(&after), heading(&expected));
+                let values =
+                    [ratio - restitution, angles * (now[0] - then[0]), angles * (now[1] - then[1])];
+                values.iter().enumerate().for_each(|(c, v)| out[self.row(at, c)] = *v);
+                at += 1;
+            } else if self.lead() > 0 {
+                let now = heading(&after);
+                (0..2).for_each(|k| out[k] = angles * now[k] - self.came[k]);
+            }
+            before = Some(landing);
+        }
+    }
+
+    /// By how much each impact is off, in the order of [`Drop::row`].
+    pub(super) fn errors(&self, effects: &Effects, out: &mut [f64]) {
+        let split = effects.unheard;
+        if self.unheard == self.known || split == 1.0 {
+            return self.fill(effects, true, out);
+        }
+        self.fill(effects, false, out);
+        if split != 0.0 {
+            let mut apart = vec![0.0; out.len()];
+            self.fill(effects, true, &mut apart);
+            out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
+        }
+    }
+
+    /// Where the ball heads after each of those impacts.
+    pub(super) fn headings(&self, effects: &Effects) -> Vec<[f64; 2]> {
+        let hidden = |i: usize| self.unheard.get(i + 1).copied().unwrap_or(0);
+        let flights = self.first()..self.times_s.len() - 1;
+        flights.map(|i| heading(&self.flight(i, effects, hidden(i), Part::First).0)).collect()
+    }
+
+    /// Speed at which the ball comes to each of those impacts, m/s.
+    pub(super) fn speeds(&self, effects: &Effects) -> Vec<f64> {
+        let landing = (0..self.times_s.len() - 1)
+            .map(|i| speed(&self.flight(i, effects, self.unheard.get(i + 1).copied().unwrap_or(0), Part::Last).1));
+        let dropped = self.height_m.map(|h| {
+            let hidden = self.unheard.first().copied().unwrap_or(0);
+            speed_after_drop(h, effects.gravity_m_s2, 0.0) * effects.restitution.powi(hidden as i32)
+        });
+        dropped.into_iter().chain(landing).take(self.impacts()).collect()
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    First,
+    Last,
+}

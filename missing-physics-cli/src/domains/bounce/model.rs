@@ -1,0 +1,127 @@
+//! The full model of a bouncing ball: by how much each impact is off, for every effect at once.
+
+use std::collections::HashMap;
+
+use missing_physics::data::Run;
+use missing_physics::model::{Model, PredictError, Spec};
+
+use super::drop::{Drop, Effects, PER_IMPACT};
+use super::spec::{Places, build};
+use super::weights::{Linear, Spread, Weights};
+use crate::domains::builder::At;
+
+/// What is known of the set-up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Setup {
+    pub(super) gravity_m_s2: f64,
+    /// Drag (1/m) of a drag coefficient of one, where mass and diameter are known.
+    pub(super) drag_unit: Option<f64>,
+    /// Whether places were measured.
+    pub(super) placed: bool,
+    /// Whether the height of the drop is known.
+    pub(super) dropped: bool,
+    /// Runs in which an impact went unheard, and runs.
+    pub(super) unheard: [usize; 2],
+}
+
+/// A drop with its weights and the errors that the engine is shown as its data.
+#[derive(Debug)]
+struct Known {
+    weights: Weights,
+    shown: Vec<f64>,
+}
+
+/// The model of the domain `bounce`.
+#[derive(Debug)]
+pub(super) struct BounceModel {
+    setup: Setup,
+    spec: Spec,
+    places: Places,
+    spread: Spread,
+    nominal: Effects,
+    drops: HashMap<String, Known>,
+}
+
+impl BounceModel {
+    pub(super) fn new(setup: Setup, nominal: Effects, spread: Spread) -> Self {
+        let (builder, places) = build(&setup, nominal.restitution);
+        Self { setup, spec: builder.spec, places, spread, nominal, drops: HashMap::new() }
+    }
+
+    pub(super) fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    pub(super) fn nominal(&self) -> &Effects {
+        &self.nominal
+    }
+
+    /// A drop that was not measured, about itself.
+    pub(super) fn imagined(&mut self, label: &str, drop: &Drop, numbers: &[f64]) -> Option<Run> {
+        let linear = Linear::new(drop, &self.nominal);
+        self.run(label, linear, drop, numbers)
+    }
+
+    /// The run of a drop: what is known of each of its impacts, and their errors. `None` where the drop makes no sense.
+    pub(super) fn run(&mut self, label: &str, linear: Linear, drop: &Drop, numbers: &[f64]) -> Option<Run> {
+        let (n, first) = (drop.impacts(), drop.first());
+        let speeds = linear.drop.speeds(&self.nominal);
+        let places = linear.drop.places_m.clone();
+        let weights = Weights::new(linear, self.spread)?;
+        let shown = weights.errors(&self.nominal)?.as_slice().to_vec();
+        if shown.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let of = |k: usize| (0..n).map(|i| shown[drop.row(i, k)]).collect::<Vec<f64>>();
+        let mut inputs = vec![numbers[first..first + n].to_vec(), speeds];
+        // Likely places: their errors, unlike the measured ones', have nothing to do with those of the impacts.
+        inputs.extend((0..2).map(|k| places[first..first + n].iter().map(|p| p[k]).collect()));
+        let outputs = (0..PER_IMPACT).map(of).collect();
+        self.drops.insert(label.to_owned(), Known { weights, shown });
+        Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
+    }
+
+    fn effects(&self, shared: &[f64]) -> Effects {
+        let p = &self.places;
+        let at = |at: Option<At>| at.map_or(0.0, |at| shared[at.slot]);
+        Effects {
+            gravity_m_s2: self.setup.gravity_m_s2,
+            restitution: shared[p.restitution.slot],
+            slope_s_m: shared[p.slope.slot],
+            drag_per_m: shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0),
+            table: p.table.map_or([0.0; 2], |t| t.map(|t| shared[t.slot])),
+            friction: at(p.friction),
+            clock_rate: at(p.clock),
+            position_scale: at(p.position),
+            unheard: at(p.unheard),
+            terms: [at(p.terms.map(|t| t[0])), at(p.terms.map(|t| t[1])), shared[p.squared.slot]],
+        }
+    }
+}
+
+impl Model for BounceModel {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn white_noise(&self) -> bool {
+        true
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
+        let known = self.drops.get(&run.label).ok_or_else(|| wrong("no such drop"))?;
+        let errors = known
+            .weights
+            .errors(&self.effects(shared))
+            .ok_or_else(|| wrong("the covariance of its errors has no root"))?;
+        let n = run.len();
+        for (channel, values) in out.chunks_exact_mut(n.max(1)).enumerate() {
+            for (impact, value) in values.iter_mut().enumerate() {
+                let at = known.weights.linear.drop.row(impact, channel);
+                *value = known.shown[at] - errors[at];
+            }
+        }
+        Ok(())
+    }
+}

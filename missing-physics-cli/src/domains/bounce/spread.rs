@@ -1,0 +1,155 @@
+//! The noise of a set of drops, and a likely course of each of them.
+
+use argmin::core::{CostFunction, Error, Executor, State};
+use argmin::solver::neldermead::NelderMead;
+use nalgebra::{DMatrix, DVector};
+
+use super::drop::{Drop, Effects};
+use super::weights::{Linear, Spread};
+
+/// Sigmas that were calibrated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Known {
+    pub(super) time_s: Option<f64>,
+    pub(super) place_m: [Option<f64>; 2],
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Unknown {
+    Time,
+    Restitution,
+    Place,
+    Kappa,
+    Came,
+}
+
+/// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
+/// only about the likely drop.
+const NUISANCES: [fn(&mut Effects, f64); 5] = [
+    |e, d| e.restitution += d,
+    |e, d| e.slope_s_m += d,
+    |e, d| e.drag_per_m += d,
+    |e, d| e.table[0] += d,
+    |e, d| e.table[1] += d,
+];
+
+/// Restricted likelihood (Patterson and Thompson 1971, doi:10.1093/biomet/58.3.545) of the sigmas that are not known.
+#[derive(Clone, Copy)]
+struct Likelihood<'a> {
+    drops: &'a [(Linear, DVector<f64>, DMatrix<f64>)],
+    known: Known,
+    start: Spread,
+}
+
+impl Likelihood<'_> {
+    /// The spread at logarithms of the factors by which each unknown sigma differs from its start.
+    fn spread(&self, logs: &[f64]) -> Spread {
+        let mut spread = self.start;
+        for (free, log) in self.unknowns().into_iter().zip(logs) {
+            let factor = log.clamp(-12.0, 12.0).exp();
+            match free {
+                Unknown::Time => spread.time_s *= factor,
+                Unknown::Restitution => spread.restitution *= factor,
+                Unknown::Place => spread.place_m = spread.place_m.map(|p| p * factor),
+                Unknown::Kappa => spread.kappa *= factor,
+                Unknown::Came => spread.came_rad *= factor,
+            }
+        }
+        spread
+    }
+
+    fn unknowns(&self) -> Vec<Unknown> {
+        let mut list = Vec::new();
+        if self.known.time_s.is_none() {
+            list.extend([Unknown::Time, Unknown::Restitution]);
+        }
+        list.extend([Unknown::Kappa, Unknown::Came]);
+        if self.known.place_m == [None; 2] {
+            list.push(Unknown::Place);
+        }
+        list
+    }
+
+    /// Minus twice the logarithm, up to a constant, and the nuisances' best values.
+    fn value(&self, spread: &Spread) -> Option<(f64, DVector<f64>)> {
+        let columns = NUISANCES.len();
+        let (mut total, mut squares) = (0.0, 0.0);
+        let mut normal = DMatrix::identity(columns, columns) * 1e-9;
+        let mut pull = DVector::zeros(columns);
+        for (linear, errors, design) in self.drops {
+            let factor = linear.factor(spread, 0.0)?;
+            let lower = factor.l_dirty();
+            total += 2.0 * (0..lower.nrows()).map(|i| lower[(i, i)].ln()).sum::<f64>();
+            let (mut white, mut design) = (errors.clone(), design.clone());
+            lower.solve_lower_triangular_mut(&mut white).then_some(())?;
+            lower.solve_lower_triangular_mut(&mut design).then_some(())?;
+            squares += white.norm_squared();
+            pull += design.tr_mul(&white);
+            normal += design.tr_mul(&design);
+        }
+        let factor = normal.cholesky()?;
+        let lower = factor.l_dirty();
+        let determinant: f64 = (0..columns).map(|i| lower[(i, i)].ln()).sum();
+        let best = factor.solve(&pull);
+        Some((total + squares - pull.dot(&best) + 2.0 * determinant, -best))
+    }
+}
+
+impl CostFunction for Likelihood<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, logs: &Vec<f64>) -> Result<f64, Error> {
+        Ok(self.value(&self.spread(logs)).map_or(f64::INFINITY, |v| v.0))
+    }
+}
+
+/// The spread of all drops and each drop about its likely course; `None` where a drop makes no sense.
+pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<(Spread, Vec<Linear>)> {
+    const ROUNDS: usize = 3;
+    let [x, y] = known.place_m;
+    let mut spread = Spread {
+        time_s: known.time_s.unwrap_or(1e-4),
+        place_m: [x.or(y).unwrap_or(5e-3), y.or(x).unwrap_or(5e-3)],
+        kappa: 3e3,
+        came_rad: 0.03,
+        restitution: if known.time_s.is_some() { 0.0 } else { 1e-3 },
+    };
+    let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::new(d, effects)).collect();
+    for _ in 0..ROUNDS {
+        let parts: Vec<_> = linear.iter().map(|l| with_design(l, effects)).collect();
+        let likelihood = Likelihood { drops: &parts, known, start: spread };
+        spread = likelihood.spread(&best(&likelihood)?);
+        let (_, moved) = likelihood.value(&spread)?;
+        let mut likely = *effects;
+        NUISANCES.iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
+        likely.friction = 0.0;
+        likely.drag_per_m = likely.drag_per_m.max(0.0);
+        linear = linear.iter().map(|l| l.likely(&likely, &spread)).collect::<Option<_>>()?;
+    }
+    Some((spread, linear))
+}
+
+/// A drop with its errors and what the nuisances make of them.
+fn with_design(linear: &Linear, effects: &Effects) -> (Linear, DVector<f64>, DMatrix<f64>) {
+    const STEP: f64 = 1e-4;
+    let errors = linear.errors(effects);
+    let columns: Vec<DVector<f64>> = NUISANCES
+        .iter()
+        .map(|change| {
+            let mut moved = *effects;
+            change(&mut moved, STEP);
+            (linear.errors(&moved) - &errors) / STEP
+        })
+        .collect();
+    (linear.clone(), errors, DMatrix::from_columns(&columns))
+}
+
+/// Logarithms of the factors by which the unknown sigmas differ from their start.
+fn best(likelihood: &Likelihood<'_>) -> Option<Vec<f64>> {
+    let n = likelihood.unknowns().len();
+    let corner = |i: usize| (0..n).map(|k| if k + 1 == i { 1.5 } else { 0.0 }).collect::<Vec<f64>>();
+    let solver = NelderMead::new((0..=n).map(corner).collect()).with_sd_tolerance(1e-4).ok()?;
+    let run = Executor::new(*likelihood, solver).configure(|s| s.max_iters(100 * n as u64)).run().ok()?;
+    run.state().get_best_param().cloned()
+}

@@ -1,0 +1,245 @@
+//! How the errors of a drop's impacts hang together: neighbours share measured times and places.
+//!
+//! Times and places are measured with errors of their own, and a direction is scattered at each impact: a functional
+//! relation with errors in all variables (Fuller 1987, doi:10.1002/9780470316665). The errors of a drop are therefore
+//! linearised not at what was measured but at what the whole drop makes most likely, and whitened by their covariance there.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+
+use super::drop::{Drop, Effects, Measured};
+
+/// Sigmas of what is measured, and the spread of directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Spread {
+    pub(super) time_s: f64,
+    pub(super) place_m: [f64; 2],
+    /// Concentration of the directions after an impact (von Mises and Fisher).
+    pub(super) kappa: f64,
+    /// How far from straight down a ball first comes to the table, along each axis, rad.
+    pub(super) came_rad: f64,
+    /// Scatter of the restitution's logarithm from impact to impact; zero where the clock's sigma is known.
+    pub(super) restitution: f64,
+}
+
+/// A drop whose errors are linear in what is measured, about a likely drop near the measured one.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    measured: Drop,
+    /// The likely drop.
+    pub(super) drop: Drop,
+    /// Derivatives of the errors with respect to the measured values, and how friction changes them.
+    sensitivity: [DMatrix<f64>; 2],
+    /// What the measured drop's errors have beyond those of the likely drop, and how friction changes that.
+    shift: [DVector<f64>; 2],
+    /// Where the ball heads after each impact: a direction scatters across it.
+    headings: Vec<[f64; 2]>,
+    /// What the errors have beyond the straight line, being curved: on average, and its covariance.
+    curved: DVector<f64>,
+    bent: DMatrix<f64>,
+}
+
+impl Linear {
+    /// About the measured drop itself.
+    pub(super) fn new(measured: &Drop, effects: &Effects) -> Self {
+        Self::about(measured, measured.clone(), effects)
+    }
+
+    fn about(measured: &Drop, drop: Drop, effects: &Effects) -> Self {
+        const FRICTION: f64 = 0.1;
+        let free = sensitivity(&drop, &Effects { friction: 0.0, ..*effects });
+        let rubbed = sensitivity(&drop, &Effects { friction: FRICTION, ..*effects });
+        let change = (rubbed - &free) / FRICTION;
+        let off = measured.values() - drop.values();
+        let shift = [&free * &off, &change * &off];
+        let curved = DVector::zeros(free.nrows());
+        let bent = DMatrix::zeros(free.nrows(), free.nrows());
+        let headings = drop.headings(effects);
+        Self { measured: measured.clone(), drop, sensitivity: [free, change], shift, headings, curved, bent }
+    }
+
+    /// The errors under some effects, and the covariance factor they go with.
+    pub(super) fn errors(&self, effects: &Effects) -> DVector<f64> {
+        let mut out = DVector::zeros(self.curved.len());
+        self.drop.errors(effects, out.as_mut_slice());
+        out += &self.shift[0];
+        out += &self.shift[1] * effects.friction;
+        out + &self.curved
+    }
+
+    /// Sigma of each measured value.
+    fn sigmas(&self, spread: &Spread) -> DVector<f64> {
+        DVector::from_fn(self.drop.measured(), |i, _| match self.drop.quantity(i) {
+            Measured::Time(_) => spread.time_s,
+            Measured::Place(_, axis) => spread.place_m[axis],
+            Measured::Came(_) => spread.came_rad,
+        })
+    }
+
+    /// Derivatives of the errors with respect to the measured values, each in units of its sigma.
+    fn scaled(&self, spread: &Spread, friction: f64) -> DMatrix<f64> {
+        let [free, change] = &self.sensitivity;
+        let mut scaled = if friction == 0.0 { free.clone() } else { free + change * friction };
+        for (mut column, sigma) in scaled.column_iter_mut().zip(self.sigmas(spread).iter()) {
+            column *= *sigma;
+        }
+        scaled
+    }
+
+    /// Covariance of the errors, factored.
+    pub(super) fn factor(&self, spread: &Spread, friction: f64) -> Option<Cholesky<f64, Dyn>> {
+        self.covariance(spread, friction).cholesky()
+    }
+
+    fn covariance(&self, spread: &Spread, friction: f64) -> DMatrix<f64> {
+        let scaled = self.scaled(spread, friction);
+        let mut covariance = &scaled * scaled.transpose() + &self.bent;
+        self.scatter(&mut covariance, spread);
+        // At least what rounding does, far below any clock.
+        let scatter = spread.restitution.powi(2).max(1e-18);
+        (self.drop.directions()..covariance.nrows()).for_each(|row| covariance[(row, row)] += scatter);
+        covariance
+    }
+
+    /// Adds the scatter of directions, seen from above, to their covariance.
+    fn scatter(&self, covariance: &mut DMatrix<f64>, spread: &Spread) {
+        for (impact, [x, y]) in self.headings.iter().enumerate() {
+            let scatter = 1.0 / spread.kappa;
+            let at = self.drop.row(impact, 1);
+            covariance[(at, at)] += scatter * (1.0 - x * x);
+            covariance[(at + 1, at + 1)] += scatter * (1.0 - y * y);
+            covariance[(at, at + 1)] -= scatter * x * y;
+            covariance[(at + 1, at)] -= scatter * x * y;
+        }
+    }
+
+    /// Scaled derivatives of the directions, which say which drop is likely, and the factor of their covariance.
+    ///
+    /// Speeds have no say: they hang on places by the squares of small angles, which no straight line follows.
+    fn telling(&self, spread: &Spread) -> Option<(DMatrix<f64>, Cholesky<f64, Dyn>)> {
+        let rows = self.drop.directions();
+        let derivatives = self.scaled(spread, 0.0).rows(0, rows).into_owned();
+        let covariance = self.covariance(spread, 0.0).view((0, 0), (rows, rows)).into_owned();
+        Some((derivatives, covariance.cholesky()?))
+    }
+
+    /// The same about the likely drop: the one whose errors are as small as they should be. `None` where it makes no sense.
+    pub(super) fn likely(&self, effects: &Effects, spread: &Spread) -> Option<Self> {
+        let effects = Effects { friction: 0.0, ..*effects };
+        let sigmas = self.sigmas(spread);
+        let (told, factor) = self.telling(spread)?;
+        let errors = self.errors(&effects).rows(0, told.nrows()).into_owned();
+        let pulled = told.tr_mul(&factor.solve(&errors));
+        let mut drop = self.measured.clone();
+        for (i, (pull, sigma)) in pulled.iter().zip(sigmas.iter()).enumerate() {
+            drop.nudge(i, -pull * sigma);
+        }
+        if drop.times_s.windows(2).any(|w| w[1] <= w[0]) {
+            return None;
+        }
+        let mut next = Self::about(&self.measured, drop, &effects);
+        next.curve(&effects, spread)?;
+        Some(next)
+    }
+
+    /// What curvature adds to the errors over all that the true drop may be: its mean, and its covariance.
+    fn curve(&mut self, effects: &Effects, spread: &Spread) -> Option<()> {
+        // Air bends nothing here that gravity does not.
+        let effects = Effects { drag_per_m: 0.0, ..*effects };
+        let (mut told, factor) = self.telling(spread)?;
+        factor.l_dirty().solve_lower_triangular_mut(&mut told).then_some(())?;
+        let n = told.ncols();
+        let eigen = SymmetricEigen::new(DMatrix::identity(n, n) - told.tr_mul(&told));
+        let sigmas = self.sigmas(spread);
+        // Steps of half a sigma keep times in their order.
+        const STEP: f64 = 0.5;
+        let axes: Vec<DVector<f64>> = (0..n)
+            .map(|k| eigen.eigenvectors.column(k).component_mul(&sigmas) * eigen.eigenvalues[k].max(0.0).sqrt())
+            .collect();
+        let rows = self.curved.len();
+        let at = |step: &DVector<f64>| {
+            let mut drop = self.drop.clone();
+            step.iter().enumerate().for_each(|(i, v)| drop.nudge(i, STEP * v));
+            let mut out = DVector::zeros(rows);
+            drop.errors(&effects, out.as_mut_slice());
+            out
+        };
+        let centre = at(&DVector::zeros(n));
+        let single: Vec<[DVector<f64>; 2]> = axes.iter().map(|a| [at(a), at(&-a)]).collect();
+        let (mut curved, mut bent) = (DVector::zeros(rows), DMatrix::zeros(rows, rows));
+        for j in 0..n {
+            for k in 0..=j {
+                let second = if j == k {
+                    &single[j][0] + &single[j][1] - &centre * 2.0
+                } else {
+                    at(&(&axes[j] + &axes[k])) - &single[j][0] - &single[k][0] + &centre
+                } / (STEP * STEP);
+                if j == k {
+                    curved += &second * 0.5;
+                }
+                bent.ger(if j == k { 0.5 } else { 1.0 }, &second, &second, 1.0);
+            }
+        }
+        (self.curved, self.bent) = (curved, bent);
+        Some(())
+    }
+}
+
+/// Derivatives of a drop's errors with respect to its measured values, one column each.
+fn sensitivity(drop: &Drop, effects: &Effects) -> DMatrix<f64> {
+    const STEP: f64 = 1e-6;
+    let rows = drop.errors_len();
+    let mut matrix = DMatrix::zeros(rows, drop.measured());
+    let (mut up, mut down) = (vec![0.0; rows], vec![0.0; rows]);
+    for column in 0..drop.measured() {
+        let mut moved = drop.clone();
+        moved.nudge(column, STEP);
+        moved.errors(effects, &mut up);
+        moved.nudge(column, -2.0 * STEP);
+        moved.errors(effects, &mut down);
+        for row in 0..rows {
+            matrix[(row, column)] = (up[row] - down[row]) / (2.0 * STEP);
+        }
+    }
+    matrix
+}
+
+/// Takes a drop's errors to independent ones of one size, each in the unit of its channel.
+#[derive(Debug, Clone)]
+pub(super) struct Weights {
+    pub(super) linear: Linear,
+    spread: Spread,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Weights {
+    pub(super) fn new(linear: Linear, spread: Spread) -> Option<Self> {
+        let factor = linear.factor(&spread, 0.0)?;
+        factor.l_dirty().iter().all(|v| v.is_finite()).then_some(Self { linear, spread, factor })
+    }
+
+    /// The white errors under some effects; `None` where they cannot be had.
+    ///
+    /// Where an effect changes the covariance too, the errors of each channel are scaled by the geometric mean of its
+    /// conditional sigmas: their sum of squares then is the likelihood with the channel's size profiled out.
+    pub(super) fn errors(&self, effects: &Effects) -> Option<DVector<f64>> {
+        let drop = &self.linear.drop;
+        let rows = |channel: usize| (0..drop.impacts()).map(move |impact| drop.row(impact, channel));
+        let mut white = self.linear.errors(effects);
+        let mut scale = [self.spread.time_s, self.spread.place_m[0], self.spread.place_m[1]];
+        if effects.friction == 0.0 {
+            self.factor.l_dirty().solve_lower_triangular_mut(&mut white).then_some(())?;
+        } else {
+            let factor = self.linear.factor(&self.spread, effects.friction)?;
+            let (now, before) = (factor.l_dirty(), self.factor.l_dirty());
+            for (channel, scale) in scale.iter_mut().enumerate() {
+                let grown: f64 = rows(channel).map(|i| (now[(i, i)] / before[(i, i)]).ln()).sum();
+                *scale *= (grown / drop.impacts() as f64).exp();
+            }
+            now.solve_lower_triangular_mut(&mut white).then_some(())?;
+        }
+        for (channel, scale) in scale.into_iter().enumerate() {
+            rows(channel).for_each(|i| white[i] *= scale);
+        }
+        Some(white)
+    }
+}
