@@ -166,7 +166,9 @@ mod tests {
 
     #[test]
     fn a_rebound_is_a_hop_straight_up() {
-        for (launch, drag) in [(2.0, 0.0), (2.0, 1e-6), (3.0, 1.05e-3), (3.0, 1.1e-3), (2.5, 0.15), (1.0, 0.4)] {
+        for (launch, drag) in
+            [(2.0, 0.0), (2.0, 1e-6), (3.0, 1.05e-3), (3.0, 1.1e-3), (2.5, 0.15), (1.0, 0.4)]
+        {
             let (duration_s, lands) = rebound(launch, 9.81, drag);
             let (up, down) = Hop { displacement_m: [0.0; 3], duration_s }.velocities(9.81, drag);
             approx::assert_relative_eq!(up[2], launch, max_relative = 1e-8);

@@ -33,9 +33,8 @@ pub fn unheard(durations_s: &[f64], restitution: f64, expected_first: Option<f64
     let whole = |m: usize| (0..=m).map(|k| e.powi(k as i32)).sum::<f64>();
     let last = |m: usize| e.powi(m as i32);
     let doubt = |m: usize| if m > 0 { DOUBT } else { 0.0 };
-    let off = |duration: f64, expected: f64, m: usize| {
-        (duration / (expected * whole(m))).ln().abs() + doubt(m)
-    };
+    let off =
+        |duration: f64, expected: f64, m: usize| (duration / (expected * whole(m))).ln().abs() + doubt(m);
     let nearest = |duration: f64, expected: f64| {
         (0..=MOST).map(|m| (off(duration, expected, m), m)).fold((f64::INFINITY, 0), nearer)
     };
@@ -45,8 +44,8 @@ pub fn unheard(durations_s: &[f64], restitution: f64, expected_first: Option<f64
         let m = match (before, durations_s.get(i + 1)) {
             (Some(before), _) => nearest(duration, e * before).1,
             (None, Some(&next)) => {
-                let choices = (0..=MOST)
-                    .map(|m| (nearest(next, e * duration / whole(m) * last(m)).0 + doubt(m), m));
+                let choices =
+                    (0..=MOST).map(|m| (nearest(next, e * duration / whole(m) * last(m)).0 + doubt(m), m));
                 choices.fold((f64::INFINITY, 0), nearer).1
             }
             (None, None) => 0,

@@ -97,6 +97,11 @@ fn practice_waves() {
     practice_cases_get_the_verdicts_of_their_keys("slosh");
 }
 
+#[test]
+fn practice_bounces() {
+    practice_cases_get_the_verdicts_of_their_keys("bounce");
+}
+
 /// Measured drops: drag where there is drag, and no other set; the golf ball proves nothing.
 #[test]
 fn measured_drops_are_drag_or_nothing() {

@@ -192,10 +192,10 @@ pub trait Model: Sync {
     /// [`PredictError`] where the simulation has no answer at these parameters.
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError>;
 
-    /// Whether what is measured comes with its noise already made white (by a covariance that is known): correlation along a
-    /// run then is physics, never noise.
-    fn white_noise(&self) -> bool {
-        false
+    /// The longest correlation that noise may have along a run, in steps between its rows: what is slower is physics. Zero
+    /// where noise is white by construction; no limit by default.
+    fn longest_noise(&self) -> f64 {
+        f64::INFINITY
     }
 
     /// Fills in good starting values of the run's own parameters; `own` holds each parameter's `start`.

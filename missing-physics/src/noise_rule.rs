@@ -29,7 +29,8 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         })
         .collect();
     let rows: usize = recording.runs.iter().map(|r| r.len()).sum();
-    let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1) && !problem.model.white_noise();
+    let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1);
+    let longest = problem.model.longest_noise();
     let (fixed_sigma, uncertainty) = (0..problem.channels())
         .map(|c| match recording.calibration.get(c).copied().flatten() {
             Some(sigma) => (Some(sigma), CALIBRATION_UNCERTAINTY),
@@ -46,7 +47,9 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         fixed_sigma,
         uncertainty,
         against_colour: 0.0,
-        allowed: if long { (0..problem.shapes.len()).collect() } else { vec![0] },
+        allowed: (0..problem.shapes.len())
+            .filter(|&s| s == 0 || long && problem.shapes[s].length_steps <= longest)
+            .collect(),
         floor,
     }
 }

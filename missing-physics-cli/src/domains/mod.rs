@@ -61,7 +61,13 @@ pub trait Domain: Sync {
 
 /// All domains of this version.
 pub fn all() -> &'static [&'static dyn Domain] {
-    &[&trajectory::Trajectory, &liquid_tilt::LiquidTilt, &slosh::Slosh, &indentation::Indentation, &bounce::Bounce]
+    &[
+        &trajectory::Trajectory,
+        &liquid_tilt::LiquidTilt,
+        &slosh::Slosh,
+        &indentation::Indentation,
+        &bounce::Bounce,
+    ]
 }
 
 /// Domains of the format that this version does not have yet.

@@ -26,7 +26,11 @@ pub(super) fn assemble(mut heard: Vec<Heard>, rig: &Rig, known: Known) -> Result
         dropped: rig.drop_height_m.is_some(),
         unheard: [missed, heard.len()],
     };
-    if setup.placed { placed(&heard, setup, restitution, known) } else { Ok(timed(&heard, rig, setup, restitution, known)) }
+    if setup.placed {
+        placed(&heard, setup, restitution, known)
+    } else {
+        Ok(timed(&heard, rig, setup, restitution, known))
+    }
 }
 
 /// The typical restitution, and in how many drops an impact went unheard; where it did is marked in them.
@@ -125,6 +129,11 @@ fn timed(heard: &[Heard], rig: &Rig, setup: Setup, restitution: f64, known: Know
     ];
     if !setup.dropped {
         undetermined.push(UNTIED.into());
+    }
+    if heard.len() == 1 {
+        undetermined.push(
+            "in a single drop, an error that wanders along it would look like physics: drop it again".into(),
+        );
     }
     let experiments = of_times(&model, restitution, setup.gravity_m_s2);
     Loaded { recording, model: Box::new(model), experiments, undetermined }

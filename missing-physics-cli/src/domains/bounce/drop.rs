@@ -182,11 +182,11 @@ impl Drop {
             }
             if let Some(before) = before {
                 let expected = reflected(&before, effects.table, effects.friction);
-                let ratio = (speed(&after).max(f64::MIN_POSITIVE) / speed(&expected).max(f64::MIN_POSITIVE)).ln();
+                let ratio =
+                    (speed(&after).max(f64::MIN_POSITIVE) / speed(&expected).max(f64::MIN_POSITIVE)).ln();
                 let restitution = effects.log_restitution(self.place(impact), speed(&before));
                 let (now, then) = (heading(&after), heading(&expected));
-                let values =
-                    [ratio - restitution, angles * (now[0] - then[0]), angles * (now[1] - then[1])];
+                let values = [ratio - restitution, angles * (now[0] - then[0]), angles * (now[1] - then[1])];
                 values.iter().enumerate().for_each(|(c, v)| out[self.row(at, c)] = *v);
                 at += 1;
             } else if self.lead() > 0 {
@@ -220,8 +220,9 @@ impl Drop {
 
     /// Speed at which the ball comes to each of those impacts, m/s.
     pub(super) fn speeds(&self, effects: &Effects) -> Vec<f64> {
-        let landing = (0..self.times_s.len() - 1)
-            .map(|i| speed(&self.flight(i, effects, self.unheard.get(i + 1).copied().unwrap_or(0), Part::Last).1));
+        let landing = (0..self.times_s.len() - 1).map(|i| {
+            speed(&self.flight(i, effects, self.unheard.get(i + 1).copied().unwrap_or(0), Part::Last).1)
+        });
         let dropped = self.height_m.map(|h| {
             let hidden = self.unheard.first().copied().unwrap_or(0);
             speed_after_drop(h, effects.gravity_m_s2, 0.0) * effects.restitution.powi(hidden as i32)

@@ -104,8 +104,9 @@ impl Model for BounceModel {
         &self.spec
     }
 
-    fn white_noise(&self) -> bool {
-        true
+    /// Errors come apart by their own covariance.
+    fn longest_noise(&self) -> f64 {
+        0.0
     }
 
     fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {

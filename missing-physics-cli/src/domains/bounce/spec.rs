@@ -27,8 +27,10 @@ pub(super) struct Places {
 pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
     let mut b = Builder::default();
     b.spec.baseline = "ballistic flight from impact to impact, a constant restitution, a level table".into();
-    let mut p =
-        Places { restitution: b.shared("restitution", "", restitution, [1e-2, 2.0], 0.02), ..Places::default() };
+    let mut p = Places {
+        restitution: b.shared("restitution", "", restitution, [1e-2, 2.0], 0.02),
+        ..Places::default()
+    };
     air_and_speed(&mut b, &mut p, setup);
     if setup.placed {
         table(&mut b, &mut p);
@@ -182,7 +184,6 @@ fn terms(b: &mut Builder, p: &mut Places, placed: bool) {
     };
     p.squared = term("per_v2_s2_m2", "s^2/m^2", 1e-3, "v^2", "v");
     if placed {
-        p.terms =
-            Some([term("per_x_m", "1/m", 0.02, "x", "x_m"), term("per_y_m", "1/m", 0.02, "y", "y_m")]);
+        p.terms = Some([term("per_x_m", "1/m", 0.02, "x", "x_m"), term("per_y_m", "1/m", 0.02, "y", "y_m")]);
     }
 }

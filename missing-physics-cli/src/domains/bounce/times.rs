@@ -1,7 +1,7 @@
 //! The full model where only times were measured: when each impact is heard.
 //!
 //! Where the ball heads is not seen. A direction that scatters shortens its flights a little, which adds up along a drop: the
-//! errors of times are correlated, and the engine finds by how much.
+//! errors of times are correlated, and the engine finds by how much where there are drops enough.
 
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Scope, Spec};
@@ -23,6 +23,9 @@ pub(super) struct TimesModel {
     leaves: Option<At>,
     height_m: Option<f64>,
 }
+
+/// Impacts over which errors may hang together where there is one drop.
+const LONGEST_IN_ONE: f64 = 3.0;
 
 /// Inputs of a row: the impact's number, and how many impacts went unheard before it in its run: known ones, all.
 const KNOWN: usize = 1;
@@ -57,7 +60,14 @@ impl TimesModel {
     }
 
     /// Times of the impacts that are heard, of all that there are.
-    fn times(&self, run: &Run, shared: &[f64], own: &[f64], hidden: usize, out: &mut [f64]) -> Result<(), String> {
+    fn times(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        own: &[f64],
+        hidden: usize,
+        out: &mut [f64],
+    ) -> Result<(), String> {
         let p = &self.places;
         let drag = shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0);
         let squared = shared[p.squared.slot];
@@ -116,6 +126,11 @@ fn build_times(setup: &Setup, restitution: f64) -> (Spec, Places, At, Option<At>
 impl Model for TimesModel {
     fn spec(&self) -> &Spec {
         &self.spec
+    }
+
+    /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
+    fn longest_noise(&self) -> f64 {
+        if self.setup.unheard[1] > 1 { f64::INFINITY } else { LONGEST_IN_ONE }
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {

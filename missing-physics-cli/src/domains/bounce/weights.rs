@@ -153,7 +153,9 @@ impl Linear {
         // Steps of half a sigma keep times in their order.
         const STEP: f64 = 0.5;
         let axes: Vec<DVector<f64>> = (0..n)
-            .map(|k| eigen.eigenvectors.column(k).component_mul(&sigmas) * eigen.eigenvalues[k].max(0.0).sqrt())
+            .map(|k| {
+                eigen.eigenvectors.column(k).component_mul(&sigmas) * eigen.eigenvalues[k].max(0.0).sqrt()
+            })
             .collect();
         let rows = self.curved.len();
         let at = |step: &DVector<f64>| {
