@@ -2,6 +2,7 @@
 
 pub mod bounce;
 mod builder;
+pub mod dough_roll;
 pub mod indentation;
 pub mod liquid_tilt;
 mod reading;
@@ -67,11 +68,12 @@ pub fn all() -> &'static [&'static dyn Domain] {
         &slosh::Slosh,
         &indentation::Indentation,
         &bounce::Bounce,
+        &dough_roll::DoughRoll,
     ]
 }
 
 /// Domains of the format that this version does not have yet.
-const LATER: [&str; 2] = ["dough-roll", "grain-pour"];
+const LATER: [&str; 1] = ["grain-pour"];
 
 /// The domain of an identifier.
 ///

@@ -184,6 +184,17 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// A text, if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`].
+    pub fn optional_text(&self, key: &str, expected: &str) -> Result<Option<&'a str>, ReadError> {
+        match self.value(key) {
+            None => Ok(None),
+            Some(_) => self.text(key, expected).map(Some),
+        }
+    }
+
     /// A text.
     ///
     /// # Errors

@@ -1,0 +1,5 @@
+#![doc = include_str!("../README.md")]
+
+pub mod band;
+pub mod dynamics;
+pub mod features;
