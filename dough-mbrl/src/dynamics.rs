@@ -5,9 +5,10 @@
 
 use argmin::core::{CostFunction, Error, Executor, State as _};
 use argmin::solver::brent::BrentOpt;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen, Vector3};
 
 use crate::features::Polynomial;
+use crate::filter::{Fresh, Noise, Step, follow};
 
 /// Length, width and height of a dough, m.
 pub type State = [f64; 3];
@@ -27,12 +28,6 @@ pub struct Roll {
     pub action: Action,
     /// After it.
     pub next: State,
-}
-
-impl Roll {
-    fn inputs(state: &State, action: &Action) -> Vec<f64> {
-        state.iter().chain(action).copied().collect()
-    }
 }
 
 /// Why nothing could be learned.
@@ -117,6 +112,11 @@ impl Surface {
         Ok(Self { features, weights, outputs: [length, width, height] })
     }
 
+    fn change(&self, state: &Vector3<f64>, action: &Action) -> Vector3<f64> {
+        let terms = self.terms(&inputs(state, action));
+        Vector3::from_fn(|k, _| terms.dot(&self.outputs[k].coefficients))
+    }
+
     fn terms(&self, inputs: &[f64]) -> DVector<f64> {
         DVector::from_vec(self.features.terms(inputs)).component_mul(&self.weights)
     }
@@ -126,79 +126,125 @@ impl Surface {
 #[derive(Debug, Clone)]
 pub struct Dynamics {
     surface: Surface,
+    noise: Noise,
 }
 
-/// What a measured state says of the true one, learned from states that were measured twice.
-///
-/// Length, width and height hang together, so that each corrects the others' noise. A roll changes the true state; that the
-/// next measurement also undoes the noise of this one is no part of the change.
-#[derive(Debug, Clone)]
-pub struct Likely {
-    surface: Surface,
-}
-
-impl Likely {
-    /// Learns from pairs of independent measurements of the same states.
-    ///
-    /// # Errors
-    /// [`LearnError`].
-    pub fn learn(pairs: &[[State; 2]]) -> Result<Self, LearnError> {
-        let rows: Vec<Vec<f64>> = pairs.iter().map(|[state, _]| state.to_vec()).collect();
-        let changes: Vec<State> =
-            pairs.iter().map(|[state, again]| std::array::from_fn(|k| again[k] - state[k])).collect();
-        Ok(Self { surface: Surface::learn(&rows, &changes, [1, 2])? })
-    }
-
-    /// The mean of the true state, given a measured one.
-    pub fn state(&self, measured: &State) -> State {
-        let terms = self.surface.terms(measured);
-        std::array::from_fn(|k| measured[k] + terms.dot(&self.surface.outputs[k].coefficients))
-    }
-}
+/// Rounds of following the doughs with the dynamics, and learning these again from where the doughs then were.
+const ROUNDS: usize = 4;
+/// Smallest variance of what a roll does beyond its dynamics, by that of the measurements: what a polynomial cannot follow comes
+/// again roll by roll, and a filter that trusted it would add it up.
+const LEAST_PROCESS: f64 = 0.5;
 
 impl Dynamics {
-    /// Learns from rolls; the change of each dimension is what is learned.
+    /// Learns from the rolls of several doughs, each in its order.
+    ///
+    /// Measured states are noisy, and a regression on noisy states learns something else than the dynamics (Fuller 1987,
+    /// doi:10.1002/9780470316665). Each dough is therefore followed through its rolls, and what a roll changed is learned from
+    /// where the dough most likely was.
     ///
     /// # Errors
     /// [`LearnError`].
-    pub fn learn(rolls: &[Roll]) -> Result<Self, LearnError> {
-        let rows: Vec<Vec<f64>> = rolls.iter().map(|r| Roll::inputs(&r.state, &r.action)).collect();
-        let changes: Vec<State> =
-            rolls.iter().map(|r| std::array::from_fn(|k| r.next[k] - r.state[k])).collect();
-        Ok(Self { surface: Surface::learn(&rows, &changes, [DEGREE, REMAINDER])? })
+    pub fn learn(doughs: &[Vec<Roll>]) -> Result<Self, LearnError> {
+        let rolls: Vec<&Roll> = doughs.iter().flatten().collect();
+        let measured: Vec<Vector3<f64>> = rolls.iter().map(|r| Vector3::from(r.state)).collect();
+        let mut surface = changes(doughs, &measured)?;
+        let mut noise = Noise { measured: twice_measured(doughs, &surface), process: Vector3::zeros() };
+        for _ in 0..ROUNDS {
+            let first: Vec<State> = doughs.iter().filter_map(|d| Some(d.first()?.state)).collect();
+            let fresh = Fresh::of(&first, &noise);
+            let steps: Vec<Step> = doughs
+                .iter()
+                .flat_map(|dough| {
+                    follow(dough, &fresh, &noise, 0.0, |i, x| x + surface.change(x, &dough[i].action))
+                })
+                .collect();
+            let states: Vec<Vector3<f64>> = steps.iter().map(|s| s.state).collect();
+            surface = changes(doughs, &states)?;
+            // What a roll does beyond the dynamics: what its measurement scatters beyond noise and estimate.
+            let mut beyond = Vector3::zeros();
+            for (roll, step) in rolls.iter().zip(&steps) {
+                let expected = step.state + surface.change(&step.state, &roll.action);
+                let off = Vector3::from(roll.next) - expected;
+                let told = (step.gradient * step.covariance * step.gradient.transpose()).diagonal();
+                beyond += off.component_mul(&off) - told - noise.measured[1];
+            }
+            noise.process =
+                (beyond / rolls.len() as f64).zip_map(&noise.measured[1], |v, m| v.max(LEAST_PROCESS * m));
+        }
+        Ok(Self { surface, noise })
     }
 
-    fn terms(&self, state: &State, action: &Action) -> DVector<f64> {
-        self.surface.terms(&Roll::inputs(state, action))
+    /// The change of a state by a roll.
+    pub fn change(&self, state: &Vector3<f64>, action: &Action) -> Vector3<f64> {
+        self.surface.change(state, action)
     }
 
-    /// The next state.
-    pub fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
-        let terms = self.terms(state, action);
+    /// What scatters the measured states.
+    pub fn noise(&self) -> &Noise {
+        &self.noise
+    }
+
+    /// Number of coefficients of an output.
+    pub fn coefficients(&self) -> usize {
+        self.surface.weights.len()
+    }
+
+    /// By how much each output's change answers its coefficients, these in directions that are independent and of variance one.
+    ///
+    /// One vector an output, each of [`Self::coefficients`] entries.
+    pub fn told(&self, state: &Vector3<f64>, action: &Action) -> [DVector<f64>; 3] {
+        let terms = self.surface.terms(&inputs(state, action));
         std::array::from_fn(|k| {
             let output = &self.surface.outputs[k];
-            let spread = 1.0 + terms.dot(&output.precision.solve(&terms));
-            Prediction {
-                mean: state[k] + terms.dot(&output.coefficients),
-                sigma: output.sigma * spread.sqrt(),
-            }
+            let mut told = terms.clone();
+            output.precision.l_dirty().solve_lower_triangular_mut(&mut told);
+            told * output.sigma
         })
     }
 
-    /// One sigma of the noise of each output, measured states included.
-    pub fn noise(&self) -> [f64; 3] {
-        std::array::from_fn(|k| self.surface.outputs[k].sigma)
+    /// The next state, from a state that is known.
+    pub fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
+        let state = Vector3::from(*state);
+        let (change, told) = (self.change(&state, action), self.told(&state, action));
+        std::array::from_fn(|k| {
+            let variance = told[k].norm_squared() + self.noise.process[k] + self.noise.measured[1][k];
+            Prediction { mean: state[k] + change[k], sigma: variance.sqrt() }
+        })
     }
+}
 
-    /// Covariance of the errors of predictions of an output (0 to 2) at several rolls, in units of its noise's variance:
-    /// what was not learned is common to all of them, noise is each one's own.
-    pub fn covariance(&self, output: usize, rolls: &[(State, Action)]) -> DMatrix<f64> {
-        let terms: Vec<DVector<f64>> = rolls.iter().map(|(s, a)| self.terms(s, a)).collect();
-        let precision = &self.surface.outputs[output].precision;
-        let mut told = DMatrix::from_columns(&terms);
-        precision.l_dirty().solve_lower_triangular_mut(&mut told);
-        told.tr_mul(&told) + DMatrix::identity(rolls.len(), rolls.len())
+fn inputs(state: &Vector3<f64>, action: &Action) -> Vec<f64> {
+    state.iter().chain(action).copied().collect()
+}
+
+/// What rolls change, learned from where the doughs were before them; two measurements of the same state count as their mean.
+fn changes(doughs: &[Vec<Roll>], states: &[Vector3<f64>]) -> Result<Surface, LearnError> {
+    let mut states = states.iter();
+    let (mut rows, mut all) = (Vec::new(), Vec::new());
+    for dough in doughs {
+        for (i, (roll, state)) in dough.iter().zip(states.by_ref()).enumerate() {
+            let again = dough.get(i + 1).map_or(roll.next, |next| next.state);
+            rows.push(inputs(state, &roll.action));
+            all.push(std::array::from_fn(|k| 0.5 * (roll.next[k] + again[k]) - state[k]));
+        }
     }
+    Surface::learn(&rows, &all, [DEGREE, REMAINDER])
+}
+
+/// Variances of measurements, from states that were measured twice; from what the dynamics leave where none was.
+fn twice_measured(doughs: &[Vec<Roll>], surface: &Surface) -> [Vector3<f64>; 2] {
+    let pairs: Vec<Vector3<f64>> = doughs
+        .iter()
+        .flat_map(|d| d.windows(2))
+        .map(|w| Vector3::from(w[1].state) - Vector3::from(w[0].next))
+        .collect();
+    let variance = if pairs.len() < 8 {
+        Vector3::from_fn(|k, _| surface.outputs[k].sigma.powi(2))
+    } else {
+        pairs.iter().map(|d| d.component_mul(d)).sum::<Vector3<f64>>() / pairs.len() as f64
+    };
+    // Half each; never nothing, lest a filter believe a number to its last digit.
+    [variance.map(|v| (0.5 * v).max(1e-14)); 2]
 }
 
 /// The coefficients of one output; the first `free` columns have no prior.
@@ -232,6 +278,11 @@ fn learn_output(design: &DMatrix<f64>, free: usize, change: &DVector<f64>) -> Op
     let mut precision = design.tr_mul(design);
     for k in free..design.ncols() {
         precision[(k, k)] += (-log_ratio).exp();
+    }
+    // Terms that rounding makes alike are told apart by nothing; a prior far below every other does no harm.
+    let least = 1e-11 * precision.diagonal().amax();
+    for k in 0..design.ncols() {
+        precision[(k, k)] += least;
     }
     let precision = precision.cholesky()?;
     let coefficients = precision.solve(&design.tr_mul(change));

@@ -3,3 +3,4 @@
 pub mod band;
 pub mod dynamics;
 pub mod features;
+pub mod filter;

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
 use dough_mbrl::dynamics::{Dynamics, LearnError, Roll};
+use dough_mbrl::filter::{Fresh, Noise, follow};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,64 +16,105 @@ fn law(state: [f64; 3], action: [f64; 2], cubic: f64) -> [f64; 3] {
     [l + push, w - 0.3 * push, h - 0.4 * push * (w / 0.04)]
 }
 
-fn rolls(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Roll> {
+/// Doughs that are rolled eight times each; states are measured twice, after a roll and before the next.
+fn doughs(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Roll>> {
+    let measured = |state: [f64; 3], rng: &mut ChaCha8Rng| {
+        state.map(|x| {
+            let z: f64 = StandardNormal.sample(rng);
+            x + sigma * z
+        })
+    };
     (0..n)
         .map(|_| {
-            let state =
-                [rng.random_range(0.04..0.08), rng.random_range(0.03..0.042), rng.random_range(0.028..0.042)];
-            let action = [rng.random_range(0.04..0.12), rng.random_range(0.01..0.04)];
-            let next = law(state, action, cubic).map(|x| {
-                let z: f64 = StandardNormal.sample(rng);
-                x + sigma * z
-            });
-            Roll { state, action, next }
+            let mut state = [
+                rng.random_range(0.04..0.046),
+                rng.random_range(0.038..0.042),
+                rng.random_range(0.038..0.042),
+            ];
+            (0..8)
+                .map(|_| {
+                    let action = [rng.random_range(0.04..0.12), rng.random_range(0.01..0.04)];
+                    let before = measured(state, rng);
+                    state = law(state, action, cubic);
+                    Roll { state: before, action, next: measured(state, rng) }
+                })
+                .collect()
         })
         .collect()
 }
 
+/// Error of the learned change, against the law, over states and actions of other doughs: its root mean square, m.
+fn error(dynamics: &Dynamics, cubic: f64, rng: &mut ChaCha8Rng) -> f64 {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for roll in doughs(40, cubic, 0.0, rng).iter().flatten() {
+        let next = law(roll.state, roll.action, cubic);
+        for (k, p) in dynamics.predict(&roll.state, &roll.action).iter().enumerate() {
+            squares += (next[k] - p.mean).powi(2);
+            count += 1.0;
+        }
+    }
+    f64::sqrt(squares / count)
+}
+
 #[test]
-fn predictions_are_off_by_as_much_as_they_say() {
+fn the_law_is_learned_and_not_the_noise_of_the_states() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for cubic in [0.0, 0.5] {
-        let (mut squares, mut count) = (0.0, 0.0);
-        for _ in 0..20 {
-            let dynamics = Dynamics::learn(&rolls(300, cubic, SIGMA, &mut rng)).unwrap();
-            for roll in rolls(50, cubic, SIGMA, &mut rng) {
-                for (k, p) in dynamics.predict(&roll.state, &roll.action).iter().enumerate() {
-                    squares += ((roll.next[k] - p.mean) / p.sigma).powi(2);
-                    count += 1.0;
-                }
-            }
-            for sigma in dynamics.noise() {
-                assert!((0.85..1.15).contains(&(sigma / SIGMA)), "{sigma}");
+    for cubic in [0.0, 0.05] {
+        let training = doughs(60, cubic, SIGMA, &mut rng);
+        let dynamics = Dynamics::learn(&training).unwrap();
+        let own = error(&dynamics, cubic, &mut rng);
+        // Doughs of one roll each cannot be followed: the regression is on what was measured.
+        let apart: Vec<Vec<Roll>> = training.into_iter().flatten().map(|r| vec![r]).collect();
+        let naive = error(&Dynamics::learn(&apart).unwrap(), cubic, &mut rng);
+        assert!(own < 0.4 * SIGMA && own < 0.8 * naive, "cubic {cubic}: {own} m, plain regression {naive} m");
+        for measured in dynamics.noise().measured {
+            for variance in measured.iter() {
+                assert!((0.8..1.2).contains(&(variance.sqrt() / SIGMA)), "{}", variance.sqrt());
             }
         }
-        // 3,000 standardised errors: their mean square is 1 within 4 sigma, tied errors allowed for twice over.
-        let mean: f64 = squares / count;
-        assert!((mean - 1.0).abs() < 0.2, "cubic {cubic}: {mean}");
     }
 }
 
 #[test]
-fn what_was_not_learned_is_common_to_all_rolls() {
+fn what_was_not_learned_is_said() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let dynamics = Dynamics::learn(&rolls(60, 0.0, SIGMA, &mut rng)).unwrap();
-    let roll = ([0.06, 0.036, 0.034], [0.08, 0.02]);
-    let covariance = dynamics.covariance(0, &[roll, roll]);
-    let sigma = dynamics.predict(&roll.0, &roll.1)[0].sigma / dynamics.noise()[0];
-    approx::assert_relative_eq!(covariance[(0, 0)], sigma * sigma, max_relative = 1e-9);
-    approx::assert_relative_eq!(covariance[(0, 1)], sigma * sigma - 1.0, max_relative = 1e-6);
-    assert!(covariance[(0, 1)] > 0.01);
+    let dynamics = Dynamics::learn(&doughs(10, 0.0, SIGMA, &mut rng)).unwrap();
+    let sigma = |state: [f64; 3], action: [f64; 2]| dynamics.predict(&state, &action)[0].sigma;
+    // Far from all training a prediction is worth less.
+    assert!(sigma([0.14, 0.036, 0.034], [0.08, 0.05]) > 3.0 * sigma([0.06, 0.036, 0.034], [0.08, 0.02]));
 }
 
 #[test]
 fn too_few_rolls_and_rolls_that_are_all_alike_are_errors() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let few = rolls(30, 0.0, SIGMA, &mut rng);
+    let few = doughs(5, 0.0, SIGMA, &mut rng);
     assert!(matches!(
         Dynamics::learn(&few),
-        Err(LearnError::TooFew { rolls: 30, coefficients: 21, least: 42 })
+        Err(LearnError::TooFew { rolls: 40, coefficients: 21, least: 42 })
     ));
-    let alike = vec![few[0]; 100];
+    let alike = vec![vec![few[0][0]; 100]];
     assert!(matches!(Dynamics::learn(&alike), Err(LearnError::Undetermined { degree: 2 })));
+}
+
+/// A filter that knows the law and the noise leaves innovations that are white.
+#[test]
+fn innovations_are_white() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let doughs = doughs(200, 0.0, SIGMA, &mut rng);
+    let variance = nalgebra::Vector3::repeat(SIGMA * SIGMA);
+    let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros() };
+    let first: Vec<[f64; 3]> = doughs.iter().map(|d| d[0].state).collect();
+    let fresh = Fresh::of(&first, &noise);
+    let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);
+    for dough in &doughs {
+        let steps = follow(dough, &fresh, &noise, 0.0, |i, x| law((*x).into(), dough[i].action, 0.0).into());
+        for step in &steps {
+            squares += step.after.white().norm_squared();
+            tied += step.after.white().dot(&step.before.white());
+            count += 3.0;
+        }
+    }
+    // 4,800 innovations: 4 standard errors of their variance and of a correlation.
+    assert!((squares / count - 1.0f64).abs() < 4.0 * f64::sqrt(2.0 / count), "{}", squares / count);
+    assert!((tied / count).abs() < 4.0 / f64::sqrt(count), "{}", tied / count);
 }

@@ -1,14 +1,14 @@
 //! The domain `dough-roll`: a dough that is rolled, one row a roll.
 //!
-//! Learned dynamics are uncertain, and what was not learned is common to all rolls: their errors are taken apart by the
-//! covariance of the predictions before the engine sees them.
+//! Each dough is followed through its rolls by a filter, and what the engine sees are its innovations. What was not learned of
+//! the dynamics ties them over all doughs; they are taken apart by its covariance first.
 
 mod experiments;
 mod model;
 mod read;
 mod spec;
 
-use dough_mbrl::dynamics::{Dynamics, Likely};
+use dough_mbrl::dynamics::Dynamics;
 use missing_physics::data::Recording;
 use missing_physics::model::{Quantity, Spec};
 
@@ -71,12 +71,11 @@ impl Domain for DoughRoll {
         let dynamics = Dynamics::learn(&read.training).map_err(|e| ReadError::TooFewRows {
             file: read.blame.file.clone(),
             what: "the training".into(),
-            got: read.training.len(),
+            got: read.training.iter().map(Vec::len).sum(),
             expected: format!("rolls that determine the dynamics: {e}"),
         })?;
         let steps: Vec<_> = read.runs.iter().flat_map(|(_, steps)| steps.iter().copied()).collect();
-        let mut model =
-            DoughModel::new(read.band, dynamics, Likely::learn(&read.twice).ok(), read.timed, &steps);
+        let mut model = DoughModel::new(read.band, dynamics, read.timed, &steps);
         let runs = model.add(&read.runs);
         let experiments = experiments::experiments(&mut model, &read.runs);
         let variable = |name: &str, unit: &str| Quantity::new(name, unit);

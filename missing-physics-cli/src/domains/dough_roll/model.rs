@@ -1,184 +1,202 @@
 //! The full model of a rolled dough: learned dynamics, and what may have become of the response since.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use dough_mbrl::band::Band;
-use dough_mbrl::dynamics::{Action, Dynamics, Likely, State};
+use dough_mbrl::dynamics::{Dynamics, Roll};
+use dough_mbrl::filter::{Fresh, Step as Followed, follow};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, SymmetricEigen};
 
 use super::read::{RunOfRolls, Step};
 use super::spec::{Effects, Places, build};
 
-/// A roll whose place in the recording is known, with what was learned of it.
-#[derive(Debug, Clone, Copy)]
-struct Known {
-    step: Step,
-    /// The likely state before it, and the learned one after it.
-    likely: State,
-    learned: State,
-    force_n: f64,
-    /// Index of the roll before it, in the same run.
-    before: Option<usize>,
-}
-
-/// Rolls whose errors are taken apart together.
+/// Doughs whose errors are tied by what was not learned.
 #[derive(Debug)]
 struct Block {
-    rolls: Vec<Known>,
-    /// Inverse factors of the covariance of the errors of each output, in units of its noise.
-    apart: [DMatrix<f64>; 3],
+    doughs: Vec<Dough>,
+    fresh: Fresh,
+    /// Directions in which errors are tied, one a column, and by how much each is to be shortened.
+    tied: DMatrix<f64>,
+    shorter: DVector<f64>,
 }
 
-/// Where the rows of a run are: its block, and the first of its rows there.
-#[derive(Debug, Clone, Copy)]
-struct Place {
-    block: usize,
+/// A dough with its rolls; its first error among those of its block.
+#[derive(Debug)]
+struct Dough {
+    steps: Vec<Step>,
+    rolls: Vec<Roll>,
     first: usize,
 }
+
+/// The errors of a block, by the bits of the shared parameters.
+type Errors = Mutex<HashMap<(usize, Vec<u64>), Arc<DVector<f64>>>>;
+/// Errors that are kept.
+const MOST_KEPT: usize = 256;
 
 /// The model of the domain `dough-roll`.
 #[derive(Debug)]
 pub(super) struct DoughModel {
     band: Band,
     dynamics: Dynamics,
-    /// `None` where no state was measured twice.
-    likely: Option<Likely>,
     spec: Spec,
     places: Places,
     blocks: Vec<Block>,
-    runs: std::collections::HashMap<String, Place>,
+    /// Block and dough of each run.
+    runs: HashMap<String, (usize, usize)>,
+    kept: Errors,
+    /// Typical sigma of each channel: errors are shown in metres.
+    scale: [f64; 6],
 }
 
-/// Channels: the three dimensions after a roll, and how far each had moved when the next one began.
+/// Channels: the three dimensions after a roll, and before it.
 pub(super) const CHANNELS: [&str; 6] =
     ["next_length_m", "next_width_m", "next_height_m", "length_m", "width_m", "height_m"];
+/// Errors of a roll: of the measurement after it, and before it.
+const PER_ROLL: usize = CHANNELS.len();
 
 impl DoughModel {
-    pub(super) fn new(
-        band: Band,
-        dynamics: Dynamics,
-        likely: Option<Likely>,
-        timed: bool,
-        steps: &[Step],
-    ) -> Self {
+    pub(super) fn new(band: Band, dynamics: Dynamics, timed: bool, steps: &[Step]) -> Self {
         let strongest =
             steps.iter().map(|s| band.force_n(s.roll.action[0], s.roll.action[1])).fold(0.0, f64::max);
         let longest = steps.iter().map(|s| s.t_s).fold(0.0, f64::max);
         let last = steps.iter().map(|s| s.step).fold(1.0, f64::max);
         let (spec, places) = build(timed.then_some(longest.max(1.0)), strongest.max(1e-9), last);
-        Self {
-            band,
-            dynamics,
-            likely,
-            spec,
-            places,
-            blocks: Vec::new(),
-            runs: std::collections::HashMap::new(),
-        }
+        let noise = dynamics.noise();
+        let scale = std::array::from_fn(|c| {
+            (noise.measured[usize::from(c < 3)][c % 3] + noise.process[c % 3]).sqrt()
+        });
+        let (blocks, runs, kept) = (Vec::new(), HashMap::new(), Mutex::default());
+        Self { band, dynamics, spec, places, blocks, runs, kept, scale }
     }
 
-    /// Adds runs whose errors are tied by what was not learned, and says what the engine is to see of them.
+    /// Adds runs whose errors are tied, and says what the engine is to see of them.
     pub(super) fn add(&mut self, runs: &[RunOfRolls]) -> Vec<Run> {
-        let mut rolls = Vec::new();
-        for (label, steps) in runs {
-            self.runs.insert(label.clone(), Place { block: self.blocks.len(), first: rolls.len() });
-            let mut before = None;
-            for step in steps {
-                let learned = self.dynamics.predict(&step.roll.state, &step.roll.action).map(|p| p.mean);
-                let force_n = self.band.force_n(step.roll.action[0], step.roll.action[1]);
-                let likely = self.likely.as_ref().map_or(step.roll.state, |l| l.state(&step.roll.state));
-                rolls.push(Known { step: *step, likely, learned, force_n, before });
-                before = Some(rolls.len() - 1);
-            }
+        let mut doughs = Vec::new();
+        let mut first = 0;
+        for (k, (label, steps)) in runs.iter().enumerate() {
+            self.runs.insert(label.clone(), (self.blocks.len(), k));
+            doughs.push(Dough { steps: steps.clone(), rolls: steps.iter().map(|s| s.roll).collect(), first });
+            first += PER_ROLL * steps.len();
         }
-        let tried: Vec<(State, Action)> =
-            rolls.iter().map(|k| (k.step.roll.state, k.step.roll.action)).collect();
-        let apart = std::array::from_fn(|k| inverse_factor(self.dynamics.covariance(k, &tried)));
-        self.blocks.push(Block { rolls, apart });
-        runs.iter().map(|(label, steps)| self.run(label, steps.len())).collect()
+        let fresh: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
+        let fresh = Fresh::of(&fresh, self.dynamics.noise());
+        let mut block = Block { doughs, fresh, tied: DMatrix::zeros(first, 0), shorter: DVector::zeros(0) };
+        self.tie(&mut block, first);
+        self.blocks.push(block);
+        runs.iter().enumerate().map(|(k, (label, _))| self.shown(label, k)).collect()
     }
 
-    fn run(&self, label: &str, len: usize) -> Run {
-        let place = self.runs[label];
-        let rolls = &self.blocks[place.block].rolls[place.first..place.first + len];
-        let of = |f: &dyn Fn(&Known) -> f64| rolls.iter().map(f).collect::<Vec<f64>>();
-        let inputs = vec![
-            of(&|k| k.step.step),
-            of(&|k| k.step.t_s),
-            of(&|k| k.step.roll.state[0]),
-            of(&|k| k.step.roll.state[1]),
-            of(&|k| k.step.roll.state[2]),
-            of(&|k| k.step.roll.action[0]),
-            of(&|k| k.step.roll.action[1]),
-            of(&|k| k.force_n),
-        ];
-        let mut run = Run { label: label.into(), inputs, outputs: Vec::new(), kind: 0 };
-        let mut white = vec![0.0; CHANNELS.len() * len];
-        self.errors(&run, &Effects::OFF, &mut white);
-        run.outputs = white.chunks(len).map(<[f64]>::to_vec).collect();
-        for (row, known) in rolls.iter().enumerate() {
-            if known.before.is_none() {
-                run.outputs[3..].iter_mut().for_each(|channel| channel[row] = f64::NAN);
-            }
-        }
-        run
-    }
-
-    /// What is measured less what is expected under some effects, taken apart, channel by channel.
-    fn errors(&self, run: &Run, effects: &Effects, out: &mut [f64]) -> Option<()> {
-        let place = self.runs.get(&run.label)?;
-        let block = &self.blocks[place.block];
-        let n = run.len();
-        let until = place.first + n;
-        let noise = self.dynamics.noise();
-        for k in 0..3 {
-            let off = DVector::from_iterator(
-                until,
-                block.rolls[..until]
-                    .iter()
-                    .map(|known| known.step.roll.next[k] - self.after(known, effects)[k]),
-            );
-            let white = block.apart[k].view((place.first, 0), (n, until)) * off;
-            out[k * n..(k + 1) * n].copy_from_slice(white.as_slice());
-            debug_assert!(noise[k] > 0.0);
-            for (row, known) in block.rolls[place.first..until].iter().enumerate() {
-                out[(3 + k) * n + row] = match known.before {
-                    Some(before) => {
-                        // By the expected change: the measured one shares its noise with what is explained.
-                        let before = &block.rolls[before];
-                        let change = self.after(before, effects)[k] - before.likely[k];
-                        known.step.roll.state[k] - before.step.roll.next[k] + effects.springback * change
-                    }
-                    None => 0.0,
+    /// How the uncertainty of what was learned ties the errors of a block.
+    fn tie(&self, block: &mut Block, rows: usize) {
+        /// Below this part of its own variance nothing is said to be tied.
+        const LEAST: f64 = 1e-3;
+        let p = self.dynamics.coefficients();
+        let mut all = DMatrix::zeros(rows, 3 * p);
+        for dough in &block.doughs {
+            let mut sensitivity = OMatrix::<f64, Const<3>, Dyn>::zeros(3 * p);
+            for (i, step) in self.follow(dough, &block.fresh, &Effects::OFF).iter().enumerate() {
+                let row = dough.first + PER_ROLL * i;
+                let mut write = |offset: usize,
+                                 factor: &nalgebra::Matrix3<f64>,
+                                 sensitivity: &OMatrix<f64, Const<3>, Dyn>| {
+                    let mut white = -sensitivity.clone();
+                    factor.solve_lower_triangular_mut(&mut white);
+                    all.view_mut((row + offset, 0), (3, 3 * p)).copy_from(&white);
                 };
+                write(3, &step.before.factor, &sensitivity);
+                sensitivity -= step.before.gain * &sensitivity;
+                sensitivity = step.gradient * &sensitivity;
+                for (k, told) in self.dynamics.told(&step.state, &dough.rolls[i].action).iter().enumerate() {
+                    let mut own = sensitivity.view_mut((k, k * p), (1, p));
+                    own += told.transpose();
+                }
+                write(0, &step.after.factor, &sensitivity);
+                sensitivity -= step.after.gain * &sensitivity;
             }
         }
-        Some(())
+        let eigen = SymmetricEigen::new(all.tr_mul(&all));
+        let strong: Vec<usize> = (0..3 * p).filter(|&k| eigen.eigenvalues[k] > LEAST).collect();
+        block.tied = DMatrix::from_fn(rows, strong.len(), |_, _| 0.0);
+        block.shorter = DVector::from_iterator(
+            strong.len(),
+            strong.iter().map(|&k| 1.0 - 1.0 / (1.0 + eigen.eigenvalues[k]).sqrt()),
+        );
+        for (column, &k) in strong.iter().enumerate() {
+            let direction = &all * eigen.eigenvectors.column(k) / eigen.eigenvalues[k].sqrt();
+            block.tied.set_column(column, &direction);
+        }
     }
 
-    /// The state after a roll under some effects.
-    fn after(&self, known: &Known, effects: &Effects) -> State {
-        let response = effects.response(known.step.step, known.step.t_s, known.force_n)
-            * (1.0
-                + effects.parity * if (known.step.step.round() as i64) % 2 == 0 { 1.0 } else { -1.0 }
-                + effects.throw * (known.step.roll.action[0] - 0.08)
-                + effects.length * (known.step.roll.state[0] - 0.06));
+    fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
         let left = (1.0 - effects.volume_loss).max(0.0).cbrt();
-        std::array::from_fn(|k| {
-            let state = known.likely[k];
-            left * (state + response * (known.learned[k] - state))
+        follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, |i, x| {
+            let step = &dough.steps[i];
+            let [throw, depth] = step.roll.action;
+            let response =
+                effects.response(step.step, step.t_s, self.band.force_n(throw, depth), throw, x[0]);
+            left * (x + response * self.dynamics.change(x, &step.roll.action))
         })
     }
-}
 
-/// The inverse of the lower factor of a covariance.
-fn inverse_factor(covariance: DMatrix<f64>) -> DMatrix<f64> {
-    let n = covariance.nrows();
-    let mut inverse = DMatrix::identity(n, n);
-    if let Some(factor) = covariance.cholesky() {
-        factor.l_dirty().solve_lower_triangular_mut(&mut inverse);
+    /// The errors of a block under some effects: independent, of variance one.
+    fn errors(&self, block: usize, effects: &Effects) -> DVector<f64> {
+        let block = &self.blocks[block];
+        let mut errors = DVector::zeros(block.tied.nrows());
+        for dough in &block.doughs {
+            for (i, step) in self.follow(dough, &block.fresh, effects).iter().enumerate() {
+                let row = dough.first + PER_ROLL * i;
+                errors.fixed_rows_mut::<3>(row).copy_from(&step.after.white());
+                errors.fixed_rows_mut::<3>(row + 3).copy_from(&step.before.white());
+            }
+        }
+        let along = block.tied.tr_mul(&errors).component_mul(&block.shorter);
+        errors - &block.tied * along
     }
-    inverse
+
+    /// The same, kept for the other runs of the block.
+    fn kept_errors(&self, block: usize, shared: &[f64]) -> Arc<DVector<f64>> {
+        let key = (block, shared.iter().map(|v| v.to_bits()).collect::<Vec<u64>>());
+        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(errors) = lock().get(&key) {
+            return Arc::clone(errors);
+        }
+        let errors = Arc::new(self.errors(block, &self.places.effects(shared)));
+        let mut kept = lock();
+        if kept.len() >= MOST_KEPT {
+            kept.clear();
+        }
+        kept.insert(key, Arc::clone(&errors));
+        errors
+    }
+
+    /// What the engine is to see of a dough.
+    fn shown(&self, label: &str, dough: usize) -> Run {
+        let at = self.blocks.len() - 1;
+        let dough = &self.blocks[at].doughs[dough];
+        let of = |f: &dyn Fn(&Step) -> f64| dough.steps.iter().map(f).collect::<Vec<f64>>();
+        let inputs = vec![
+            of(&|s| s.step),
+            of(&|s| s.t_s),
+            of(&|s| s.roll.state[0]),
+            of(&|s| s.roll.state[1]),
+            of(&|s| s.roll.state[2]),
+            of(&|s| s.roll.action[0]),
+            of(&|s| s.roll.action[1]),
+            of(&|s| self.band.force_n(s.roll.action[0], s.roll.action[1])),
+        ];
+        let errors = self.errors(at, &Effects::OFF);
+        let channel = |c: usize| {
+            let of = |i| self.scale[c] * errors[dough.first + PER_ROLL * i + c];
+            (0..dough.steps.len()).map(of).collect::<Vec<f64>>()
+        };
+        let mut outputs: Vec<Vec<f64>> = (0..PER_ROLL).map(channel).collect();
+        // A fresh dough is what it is.
+        outputs[3..].iter_mut().for_each(|c| c[0] = f64::NAN);
+        Run { label: label.into(), inputs, outputs, kind: 0 }
+    }
 }
 
 impl Model for DoughModel {
@@ -187,11 +205,17 @@ impl Model for DoughModel {
     }
 
     fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        let wrong = || PredictError { run: run.label.clone(), reason: "no such rolls".into() };
-        let mut shown = vec![0.0; out.len()];
-        self.errors(run, &Effects::OFF, &mut shown).ok_or_else(wrong)?;
-        self.errors(run, &self.places.effects(shared), out).ok_or_else(wrong)?;
-        out.iter_mut().zip(&shown).for_each(|(o, s)| *o = s - *o);
+        let Some(&(block, dough)) = self.runs.get(&run.label) else {
+            return Err(PredictError { run: run.label.clone(), reason: "no such rolls".into() });
+        };
+        let off = self.kept_errors(block, &self.places.off);
+        let errors = self.kept_errors(block, shared);
+        let (n, first) = (run.len(), self.blocks[block].doughs[dough].first);
+        for (at, value) in out.iter_mut().enumerate() {
+            let (channel, roll) = (at / n, at % n);
+            let row = first + PER_ROLL * roll + channel;
+            *value = self.scale[channel] * (off[row] - errors[row]);
+        }
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! What the files of a recording say: the rig, and the rolls.
 
 use dough_mbrl::band::Band;
-use dough_mbrl::dynamics::{Roll, State};
+use dough_mbrl::dynamics::Roll;
 
 use super::COLUMNS;
 use super::model::CHANNELS;
@@ -24,9 +24,8 @@ pub(super) type RunOfRolls = (String, Vec<Step>);
 #[derive(Debug)]
 pub(super) struct Read {
     pub(super) band: Band,
-    /// From which the dynamics are learned, and what measured states say of true ones.
-    pub(super) training: Vec<Roll>,
-    pub(super) twice: Vec<[State; 2]>,
+    /// The doughs from which the dynamics are learned.
+    pub(super) training: Vec<Vec<Roll>>,
     pub(super) runs: Vec<RunOfRolls>,
     pub(super) timed: bool,
     /// The file and the row to blame where the training rolls do not do.
@@ -60,12 +59,7 @@ pub(super) fn read(header: &Header) -> Result<Read, ReadError> {
             (std::mem::replace(&mut runs, later), table)
         }
     };
-    let twice = training
-        .iter()
-        .flat_map(|(_, steps)| steps.windows(2))
-        .map(|pair| [pair[1].roll.state, pair[0].roll.next])
-        .collect();
-    let training: Vec<Roll> = training.into_iter().flat_map(|(_, steps)| steps).map(|s| s.roll).collect();
+    let training = training.into_iter().map(|(_, steps)| steps.iter().map(|s| s.roll).collect()).collect();
     if runs.is_empty() {
         return Err(ReadError::TooFewRows {
             file: blame.file,
@@ -74,7 +68,7 @@ pub(super) fn read(header: &Header) -> Result<Read, ReadError> {
             expected: "at least 2 runs, or rig.training: the first half of the runs is learned from".into(),
         });
     }
-    Ok(Read { band, training, twice, runs, timed, blame })
+    Ok(Read { band, training, runs, timed, blame })
 }
 
 fn band(header: &Header) -> Result<Band, ReadError> {

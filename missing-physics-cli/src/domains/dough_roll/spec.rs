@@ -7,14 +7,14 @@ use crate::domains::builder::{At, Builder};
 /// What may have become of the response since it was learned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effects {
-    factor: f64,
-    drying_per_s: f64,
-    slip_n: f64,
+    pub(super) factor: f64,
+    pub(super) drying_per_s: f64,
+    pub(super) slip_n: f64,
     /// Over which force the response sets in, N.
-    onset_n: f64,
+    pub(super) onset_n: f64,
     pub(super) springback: f64,
     pub(super) volume_loss: f64,
-    softening_per_roll: f64,
+    pub(super) softening_per_roll: f64,
     /// Candidate terms of an unknown law: on even and odd rolls, by the throw (1/m), by the length (1/m).
     pub(super) parity: f64,
     pub(super) throw: f64,
@@ -37,20 +37,24 @@ impl Effects {
     };
 
     /// By how much the response is larger than the learned one.
-    pub(super) fn response(&self, step: f64, t_s: f64, force_n: f64) -> f64 {
+    pub(super) fn response(&self, step: f64, t_s: f64, force_n: f64, throw_m: f64, length_m: f64) -> f64 {
         let faded = (-self.drying_per_s * t_s - self.softening_per_roll * (step - 1.0)).exp();
         let grips = if self.slip_n > 0.0 {
             1.0 / (1.0 + (-(force_n - self.slip_n) / self.onset_n).exp())
         } else {
             1.0
         };
-        self.factor * faded * grips
+        let even = if (step.round() as i64) % 2 == 0 { 1.0 } else { -1.0 };
+        let law = 1.0 + self.parity * even + self.throw * (throw_m - 0.08) + self.length * (length_m - 0.06);
+        self.factor * faded * grips * law
     }
 }
 
 /// Where each parameter stands.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Places {
+    /// All shared parameters where nothing has happened.
+    pub(super) off: Vec<f64>,
     factor: At,
     drying: Option<At>,
     slip: At,
@@ -161,6 +165,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
         &["drying", "stiffness-change"],
     );
     terms(&mut b, &mut p);
+    p.off = b.spec.parameters.iter().map(|p| p.start).collect();
     (b.spec, p)
 }
 

@@ -1,0 +1,141 @@
+//! A dough followed through its rolls: an extended Kalman filter (Särkkä 2013, doi:10.1017/CBO9781139344203) whose innovations
+//! say by how much each measurement is off what all earlier ones lead to expect.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::dynamics::{Roll, State};
+
+/// What scatters the measured states, variances in m^2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a measurement before a roll, and after it.
+    pub measured: [Vector3<f64>; 2],
+    /// Of what a roll does beyond its dynamics.
+    pub process: Vector3<f64>,
+}
+
+/// What is known of a fresh dough.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fresh {
+    /// Its mean state.
+    pub mean: Vector3<f64>,
+    /// How doughs differ.
+    pub covariance: Matrix3<f64>,
+}
+
+impl Fresh {
+    /// From the measured first states of several doughs; their own spread is what the noise leaves of theirs.
+    ///
+    /// With fewer than four doughs nothing is held to be known: the spread is as wide as the state itself.
+    pub fn of(first: &[State], noise: &Noise) -> Self {
+        let n = first.len().max(1) as f64;
+        let mean = first.iter().map(|s| Vector3::from(*s)).sum::<Vector3<f64>>() / n;
+        if first.len() < 4 {
+            return Self { mean, covariance: Matrix3::identity() * mean.norm_squared() };
+        }
+        let scatter = |s: &State| {
+            let d = Vector3::from(*s) - mean;
+            d * d.transpose()
+        };
+        let spread = first.iter().map(scatter).sum::<Matrix3<f64>>() / (n - 1.0);
+        let eigen = (spread - Matrix3::from_diagonal(&noise.measured[0])).symmetric_eigen();
+        // What the noise hides of the spread: a hundredth of the noise at least.
+        let least = 1e-2 * noise.measured[0].mean();
+        let values = eigen.eigenvalues.map(|v| v.max(least));
+        let covariance =
+            eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose();
+        // The mean itself is known from so many doughs.
+        Self { mean, covariance: covariance + spread / n }
+    }
+}
+
+/// One measurement against what was expected of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Measured less expected.
+    pub off: Vector3<f64>,
+    /// Lower factor of its covariance.
+    pub factor: Matrix3<f64>,
+    /// What of it goes into the estimate.
+    pub gain: Matrix3<f64>,
+}
+
+impl Innovation {
+    /// Standardised: independent, of variance one.
+    pub fn white(&self) -> Vector3<f64> {
+        self.factor.solve_lower_triangular(&self.off).unwrap_or_default()
+    }
+}
+
+/// A roll with the estimate before it and the two innovations around it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Of the measurement before it.
+    pub before: Innovation,
+    /// Estimate before it, that measurement included, and its covariance.
+    pub state: Vector3<f64>,
+    /// See `state`.
+    pub covariance: Matrix3<f64>,
+    /// Derivative of the state after it with respect to the state before.
+    pub gradient: Matrix3<f64>,
+    /// Of the measurement after it.
+    pub after: Innovation,
+}
+
+/// Follows a dough through its rolls.
+///
+/// `next(i, x)` is the state after roll `i` from the state `x`; a part `undone` of each change is undone before the next roll.
+pub fn follow(
+    rolls: &[Roll],
+    fresh: &Fresh,
+    noise: &Noise,
+    undone: f64,
+    next: impl Fn(usize, &Vector3<f64>) -> Vector3<f64>,
+) -> Vec<Step> {
+    const STEP_M: f64 = 1e-6;
+    let (mut x, mut p) = (fresh.mean, fresh.covariance);
+    let mut steps = Vec::with_capacity(rolls.len());
+    for (i, roll) in rolls.iter().enumerate() {
+        let before = innovation(&Vector3::from(roll.state), &x, &p, &noise.measured[0]);
+        (x, p) = updated(&x, &p, &before);
+        let (state, covariance) = (x, p);
+        let there = next(i, &x);
+        let mut gradient = Matrix3::zeros();
+        for k in 0..3 {
+            let mut moved = x;
+            moved[k] += STEP_M;
+            gradient.set_column(k, &((next(i, &moved) - there) / STEP_M));
+        }
+        p = gradient * p * gradient.transpose() + Matrix3::from_diagonal(&noise.process);
+        x = there;
+        let after = innovation(&Vector3::from(roll.next), &x, &p, &noise.measured[1]);
+        (x, p) = updated(&x, &p, &after);
+        if undone != 0.0 {
+            x = (1.0 - undone) * x + undone * state;
+            p *= (1.0 - undone).powi(2);
+        }
+        steps.push(Step { before, state, covariance, gradient, after });
+    }
+    steps
+}
+
+fn innovation(
+    measured: &Vector3<f64>,
+    x: &Vector3<f64>,
+    p: &Matrix3<f64>,
+    noise: &Vector3<f64>,
+) -> Innovation {
+    let covariance = p + Matrix3::from_diagonal(noise);
+    match covariance.cholesky() {
+        Some(factor) => {
+            Innovation { off: measured - x, factor: factor.l(), gain: factor.solve(p).transpose() }
+        }
+        // A covariance that is no longer one: the measurement tells nothing.
+        None => Innovation { off: measured - x, factor: Matrix3::identity(), gain: Matrix3::zeros() },
+    }
+}
+
+fn updated(x: &Vector3<f64>, p: &Matrix3<f64>, innovation: &Innovation) -> (Vector3<f64>, Matrix3<f64>) {
+    let p = p - innovation.gain * p;
+    (x + innovation.gain * innovation.off, 0.5 * (p + p.transpose()))
+}
