@@ -276,13 +276,10 @@ fn learn_output(design: &DMatrix<f64>, free: usize, change: &DVector<f64>) -> Op
     let log_ratio = evidence.best();
     let sigma = evidence.variance(log_ratio).sqrt();
     let mut precision = design.tr_mul(design);
-    for k in free..design.ncols() {
-        precision[(k, k)] += (-log_ratio).exp();
-    }
     // Terms that rounding makes alike are told apart by nothing; a prior far below every other does no harm.
     let least = 1e-11 * precision.diagonal().amax();
     for k in 0..design.ncols() {
-        precision[(k, k)] += least;
+        precision[(k, k)] += if k < free { least } else { least + (-log_ratio).exp() };
     }
     let precision = precision.cholesky()?;
     let coefficients = precision.solve(&design.tr_mul(change));
