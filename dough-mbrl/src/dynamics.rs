@@ -67,6 +67,8 @@ struct Output {
     sigma: f64,
     /// Factor of the precision of the coefficients, in units of the noise.
     precision: Cholesky<f64, Dyn>,
+    /// Variance of what each dough does for itself, beyond the dynamics that all share.
+    own: f64,
 }
 
 /// Three outputs of some inputs, learned.
@@ -79,8 +81,14 @@ struct Surface {
 }
 
 impl Surface {
-    /// Learns the changes `outputs` of the rows of inputs: a polynomial of one degree, and a remainder up to another.
-    fn learn(rows: &[Vec<f64>], changes: &[State], [degree, remainder]: [u8; 2]) -> Result<Self, LearnError> {
+    /// Learns the changes of the rows of inputs: a polynomial of one degree, and a remainder up to another. Rows come in groups
+    /// of the given lengths.
+    fn learn(
+        rows: &[Vec<f64>],
+        changes: &[State],
+        groups: &[usize],
+        [degree, remainder]: [u8; 2],
+    ) -> Result<Self, LearnError> {
         let features = Polynomial::standardised(rows, remainder);
         let free = features.up_to(degree);
         let least = 2 * free;
@@ -104,7 +112,7 @@ impl Surface {
         }
         let output = |k: usize| {
             let change = DVector::from_iterator(rows.len(), changes.iter().map(|c| c[k]));
-            learn_output(&design, free, &change)
+            learn_output(&design, free, &change, groups)
         };
         let [Some(length), Some(width), Some(height)] = [output(0), output(1), output(2)] else {
             return Err(undetermined);
@@ -184,6 +192,11 @@ impl Dynamics {
         &self.noise
     }
 
+    /// Sigma of what each dough does for itself, an output each: a level and a slope ([`courses`]) along its rolls, m a roll.
+    pub fn own(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.surface.outputs[k].own.sqrt())
+    }
+
     /// Number of coefficients of an output.
     pub fn coefficients(&self) -> usize {
         self.surface.weights.len()
@@ -228,7 +241,8 @@ fn changes(doughs: &[Vec<Roll>], states: &[Vector3<f64>]) -> Result<Surface, Lea
             all.push(std::array::from_fn(|k| 0.5 * (roll.next[k] + again[k]) - state[k]));
         }
     }
-    Surface::learn(&rows, &all, [DEGREE, REMAINDER])
+    let groups: Vec<usize> = doughs.iter().map(Vec::len).collect();
+    Surface::learn(&rows, &all, &groups, [DEGREE, REMAINDER])
 }
 
 /// Variances of measurements, from states that were measured twice; from what the dynamics leave where none was.
@@ -248,7 +262,12 @@ fn twice_measured(doughs: &[Vec<Roll>], surface: &Surface) -> [Vector3<f64>; 2] 
 }
 
 /// The coefficients of one output; the first `free` columns have no prior.
-fn learn_output(design: &DMatrix<f64>, free: usize, change: &DVector<f64>) -> Option<Output> {
+fn learn_output(
+    design: &DMatrix<f64>,
+    free: usize,
+    change: &DVector<f64>,
+    groups: &[usize],
+) -> Option<Output> {
     let rows = design.nrows();
     let polynomial = design.columns(0, free).into_owned();
     let qr = polynomial.qr();
@@ -283,11 +302,56 @@ fn learn_output(design: &DMatrix<f64>, free: usize, change: &DVector<f64>) -> Op
     }
     let precision = precision.cholesky()?;
     let coefficients = precision.solve(&design.tr_mul(change));
-    (sigma.is_finite() && coefficients.iter().all(|c| c.is_finite())).then_some(Output {
-        coefficients,
+    (sigma.is_finite() && coefficients.iter().all(|c| c.is_finite())).then(|| Output {
+        own: own_variance(design, &coefficients, &precision, sigma * sigma, change, groups),
         sigma: sigma.max(f64::MIN_POSITIVE),
+        coefficients,
         precision,
     })
+}
+
+/// How each group's course differs from what the others teach of it, a level and a slope along it: the variance of these
+/// beyond what noise and coefficients make of them.
+fn own_variance(
+    design: &DMatrix<f64>,
+    coefficients: &DVector<f64>,
+    precision: &Cholesky<f64, Dyn>,
+    noise: f64,
+    change: &DVector<f64>,
+    groups: &[usize],
+) -> f64 {
+    let left = change - design * coefficients;
+    let (mut first, mut sum, mut count) = (0, 0.0, 0.0);
+    for &n in groups {
+        let rows = design.rows(first, n).into_owned();
+        let mut told = rows.transpose();
+        precision.l_dirty().solve_lower_triangular_mut(&mut told);
+        // What the group's own rows contribute to its fit; without them it would be off by this much more.
+        let apart = DMatrix::identity(n, n) - told.tr_mul(&told);
+        if let Some(apart) = apart.cholesky() {
+            let off = apart.solve(&left.rows(first, n).into_owned());
+            for course in courses(n) {
+                let size = n as f64;
+                sum += (course.dot(&off) / size).powi(2)
+                    - noise * course.dot(&apart.solve(&course)) / (size * size);
+                count += 1.0;
+            }
+        }
+        first += n;
+    }
+    if groups.len() > 2 && count > 0.0 { f64::max(sum / count, 0.0) } else { 0.0 }
+}
+
+/// A level and a slope over the rolls of a dough, each of unit mean square.
+pub fn courses(rolls: usize) -> Vec<DVector<f64>> {
+    let level = DVector::repeat(rolls, 1.0);
+    if rolls < 3 {
+        return vec![level];
+    }
+    let middle = 0.5 * (rolls as f64 - 1.0);
+    let slope = DVector::from_fn(rolls, |i, _| i as f64 - middle);
+    let size = (slope.norm_squared() / rolls as f64).sqrt();
+    vec![level, slope / size]
 }
 
 /// Marginal likelihood of what the polynomial leaves.

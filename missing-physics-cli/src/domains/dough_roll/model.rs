@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dough_mbrl::band::Band;
-use dough_mbrl::dynamics::{Dynamics, Roll};
+use dough_mbrl::dynamics::{Dynamics, Roll, courses};
 use dough_mbrl::filter::{Fresh, Step as Followed, follow};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
@@ -94,9 +94,13 @@ impl DoughModel {
         /// Below this part of its own variance nothing is said to be tied.
         const LEAST: f64 = 1e-3;
         let p = self.dynamics.coefficients();
-        let mut all = DMatrix::zeros(rows, 3 * p);
-        for dough in &block.doughs {
-            let mut sensitivity = OMatrix::<f64, Const<3>, Dyn>::zeros(3 * p);
+        // Coefficients of all doughs, then each one's own level and slope.
+        let columns = 3 * p + 6 * block.doughs.len();
+        let own = self.dynamics.own();
+        let mut all = DMatrix::zeros(rows, columns);
+        for (at, dough) in block.doughs.iter().enumerate() {
+            let courses = courses(dough.rolls.len());
+            let mut sensitivity = OMatrix::<f64, Const<3>, Dyn>::zeros(columns);
             for (i, step) in self.follow(dough, &block.fresh, &Effects::OFF).iter().enumerate() {
                 let row = dough.first + PER_ROLL * i;
                 let mut write = |offset: usize,
@@ -104,21 +108,26 @@ impl DoughModel {
                                  sensitivity: &OMatrix<f64, Const<3>, Dyn>| {
                     let mut white = -sensitivity.clone();
                     factor.solve_lower_triangular_mut(&mut white);
-                    all.view_mut((row + offset, 0), (3, 3 * p)).copy_from(&white);
+                    all.view_mut((row + offset, 0), (3, columns)).copy_from(&white);
                 };
                 write(3, &step.before.factor, &sensitivity);
                 sensitivity -= step.before.gain * &sensitivity;
                 sensitivity = step.gradient * &sensitivity;
                 for (k, told) in self.dynamics.told(&step.state, &dough.rolls[i].action).iter().enumerate() {
-                    let mut own = sensitivity.view_mut((k, k * p), (1, p));
-                    own += told.transpose();
+                    let mut coefficients = sensitivity.view_mut((k, k * p), (1, p));
+                    coefficients += told.transpose();
+                }
+                for (c, course) in courses.iter().enumerate() {
+                    for (k, own) in own.iter().enumerate() {
+                        sensitivity[(k, 3 * p + 6 * at + 3 * c + k)] += own * course[i];
+                    }
                 }
                 write(0, &step.after.factor, &sensitivity);
                 sensitivity -= step.after.gain * &sensitivity;
             }
         }
         let eigen = SymmetricEigen::new(all.tr_mul(&all));
-        let strong: Vec<usize> = (0..3 * p).filter(|&k| eigen.eigenvalues[k] > LEAST).collect();
+        let strong: Vec<usize> = (0..columns).filter(|&k| eigen.eigenvalues[k] > LEAST).collect();
         block.tied = DMatrix::from_fn(rows, strong.len(), |_, _| 0.0);
         block.shorter = DVector::from_iterator(
             strong.len(),
