@@ -198,6 +198,12 @@ pub trait Model: Sync {
         f64::INFINITY
     }
 
+    /// Whether a residual may depend on the prediction itself; false where predictions are made with measured inputs, and share
+    /// their noise with the residual.
+    fn prediction_is_clean(&self) -> bool {
+        true
+    }
+
     /// Fills in good starting values of the run's own parameters; `own` holds each parameter's `start`.
     fn start(&self, _run: &Run, _own: &mut [f64]) {}
 

@@ -127,6 +127,8 @@ pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
     let interval = match (&l.variable, l.from, l.to) {
         (Some(v), Some(from), Some(to)) => {
             format!(", {v} from {} to {} {}", significant(from, 3), significant(to, 3), unit(v))
+                .trim_end()
+                .to_owned()
         }
         _ => String::new(),
     };

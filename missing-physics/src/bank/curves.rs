@@ -42,7 +42,8 @@ impl Curves {
                     .iter()
                     .flatten()
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-                let moves = high - low > least(v).max(1e-12 * high.abs().max(low.abs()));
+                let shown = v < inputs || problem.model.prediction_is_clean();
+                let moves = shown && high - low > least(v).max(1e-12 * high.abs().max(low.abs()));
                 (moves && (high - low).is_finite()).then(|| {
                     runs.into_iter()
                         .map(|r| r.into_iter().map(|v| 2.0 * (v - low) / (high - low) - 1.0).collect())

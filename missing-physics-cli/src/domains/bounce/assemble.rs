@@ -66,7 +66,11 @@ fn placed(heard: &[Heard], setup: Setup, restitution: f64, known: Known) -> Resu
         unheard: 0.0,
         terms: [0.0; 3],
     };
-    let drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
+    let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
+    // A tilted table, or a hand, may send all of them one way.
+    let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.first_heading(&nominal)).collect();
+    let usual = [0, 1].map(|k| headings.iter().map(|h| h[k]).sum::<f64>() / headings.len().max(1) as f64);
+    drops.iter_mut().for_each(|d| d.usual = usual);
     let senseless = |h: &Heard| {
         let label = crate::recording::quoted(&h.label);
         (h.row, format!("times and places of a bouncing ball in run {label}"))

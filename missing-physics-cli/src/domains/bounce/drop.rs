@@ -64,6 +64,8 @@ pub(super) struct Drop {
     /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known), in
     /// the recording's units of length and time.
     pub(super) came: [f64; 2],
+    /// Where balls head on average after the first impact, where their fall is not known.
+    pub(super) usual: [f64; 2],
     /// How many impacts went unheard before the first one heard (only with a known height) and within each flight.
     pub(super) unheard: Vec<usize>,
     /// Of those, how many are known because the file's numbers jump.
@@ -191,7 +193,7 @@ impl Drop {
                 at += 1;
             } else if self.lead() > 0 {
                 let now = heading(&after);
-                (0..2).for_each(|k| out[k] = angles * now[k] - self.came[k]);
+                (0..2).for_each(|k| out[k] = angles * now[k] - self.usual[k] - self.came[k]);
             }
             before = Some(landing);
         }
@@ -209,6 +211,11 @@ impl Drop {
             self.fill(effects, true, &mut apart);
             out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
         }
+    }
+
+    /// Where the ball heads after the first impact that was heard.
+    pub(super) fn first_heading(&self, effects: &Effects) -> [f64; 2] {
+        heading(&self.flight(0, effects, self.unheard.get(1).copied().unwrap_or(0), Part::First).0)
     }
 
     /// Where the ball heads after each of those impacts.

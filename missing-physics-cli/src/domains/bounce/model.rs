@@ -104,6 +104,10 @@ impl Model for BounceModel {
         &self.spec
     }
 
+    fn prediction_is_clean(&self) -> bool {
+        false
+    }
+
     /// Errors come apart by their own covariance.
     fn longest_noise(&self) -> f64 {
         0.0

@@ -70,6 +70,7 @@ pub(super) fn heard(table: &Table, rig: &Rig) -> Result<Vec<Heard>, ReadError> {
             places_m: places.map(|(x, y)| rows.iter().map(|&r| [x[r], y[r]]).collect()).unwrap_or_default(),
             height_m: rig.drop_height_m,
             came: [0.0; 2],
+            usual: [0.0; 2],
             unheard: known.clone(),
             known,
         };

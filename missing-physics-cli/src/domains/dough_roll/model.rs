@@ -228,6 +228,10 @@ impl Model for DoughModel {
         Ok(())
     }
 
+    fn prediction_is_clean(&self) -> bool {
+        false
+    }
+
     /// Errors come apart by their own covariance.
     fn longest_noise(&self) -> f64 {
         0.0
