@@ -1,0 +1,66 @@
+//! What the tool says of drops in which something is hidden, and how often it doubts drops in which nothing is.
+//!
+//! `cargo run --release -p examples --example 04_bounces` (60 null recordings of each kind and 20 of each effect; `--small`: 3)
+#![allow(clippy::print_stdout, reason = "printing is what an example is for")]
+
+use missing_physics::diagnosis::{Diagnosis, Verdict};
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use rayon::prelude::*;
+use worlds::bounce::{BounceWorld, Effects};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let none = Effects::default();
+    let drops = BounceWorld::drops();
+    let known = BounceWorld { height_known: true, ..drops };
+    let of = |effects: Effects| BounceWorld { effects, ..drops };
+    let kinds = [
+        ("nothing; height not known", 60, drops),
+        ("nothing; height known", 60, known),
+        ("nothing; noise not known", 60, BounceWorld { noise_known: false, ..drops }),
+        ("air-drag", 20, of(Effects { drag_per_m: 0.05, ..none })),
+        ("velocity-dependent-restitution", 20, of(Effects { slope_s_m: 0.01, ..none })),
+        ("table-tilt", 20, of(Effects { table: [0.01, -0.02], ..none })),
+        ("tangential-friction", 20, of(Effects { friction: 0.25, ..none })),
+        ("clock-rate", 20, BounceWorld { effects: Effects { clock_rate: 0.003, ..none }, ..known }),
+        ("missed-impact", 20, of(Effects { unheard: 0.2, ..none })),
+        ("unlisted: one side is dead", 20, of(Effects { dead_side: 0.006, ..none })),
+    ];
+    println!(
+        "{:32} {:>6} {:>8} {:>6} {:>12} {:>8} {:>11}",
+        "hidden in 30 drops", "number", "adequate", "named", "among rivals", "another", "unexplained"
+    );
+    for (k, (name, count, world)) in kinds.iter().enumerate() {
+        let count: u64 = if examples::small() { 3 } else { *count };
+        let answers: Result<Vec<Diagnosis>, String> =
+            (0..count).into_par_iter().map(|i| diagnosed(world, 4_000_000 + 1000 * k as u64 + i)).collect();
+        let mut tally = [0; 5];
+        answers?.iter().for_each(|answer| tally[kind(answer, name)] += 1);
+        let [adequate, named, rivals, another, unexplained] = tally;
+        println!("{name:32} {count:>6} {adequate:>8} {named:>6} {rivals:>12} {another:>8} {unexplained:>11}");
+    }
+    Ok(())
+}
+
+/// Which column an answer counts in, where `hidden` is what is hidden.
+fn kind(answer: &Diagnosis, hidden: &str) -> usize {
+    let is = |set: &[String]| set.len() == 1 && set[0] == hidden;
+    match answer.verdict {
+        Verdict::Adequate => 0,
+        Verdict::Explained if is(&answer.chosen) => 1,
+        Verdict::Ambiguous if is(&answer.chosen) || answer.confused_with.iter().any(|s| is(s)) => 2,
+        Verdict::Explained | Verdict::Ambiguous => 3,
+        Verdict::Unexplained => 4,
+    }
+}
+
+/// The tool's answer on a drawn world.
+fn diagnosed(world: &BounceWorld, seed: u64) -> Result<Diagnosis, String> {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+    for (name, text) in ["recording.toml", "data.csv"].iter().zip(world.files(seed)) {
+        std::fs::write(folder.path().join(name), text).map_err(|e| e.to_string())?;
+    }
+    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    let options = Options { seed, replicates: 499, ..Options::default() };
+    diagnose(&*loaded.model, &loaded.recording, &[], &options, &Silent).map_err(|e| e.to_string())
+}

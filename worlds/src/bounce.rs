@@ -1,0 +1,251 @@
+//! A ball that bounces on a table, as its impacts are heard.
+
+use std::fmt::Write as _;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const GRAVITY_M_S2: f64 = 9.80665;
+type Vec3 = [f64; 3];
+
+/// Everything that may act beside gravity and a constant restitution; all zero is a level table in a vacuum.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effects {
+    /// Quadratic drag in 1/m.
+    pub drag_per_m: f64,
+    /// By how much the restitution falls for each m/s above 1 m/s, in s/m.
+    pub slope_s_m: f64,
+    /// Slopes of the table along x and y.
+    pub table: [f64; 2],
+    /// Share of the speed along the table that each impact takes.
+    pub friction: f64,
+    /// Stated times are this much too long, relative to 1.
+    pub clock_rate: f64,
+    /// Stated places are this much too far apart, relative to 1.
+    pub position_scale: f64,
+    /// Share of the runs in which one impact after the first goes unheard.
+    pub unheard: f64,
+    /// Unlisted: the restitution is less by this much where x is above 2 cm.
+    pub dead_side: f64,
+}
+
+/// How drops are recorded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BounceWorld {
+    /// Number of runs.
+    pub runs: usize,
+    /// Impacts that are heard in a run.
+    pub impacts: usize,
+    /// Height of the drops in m.
+    pub height_m: f64,
+    /// Whether the height is the same in all runs and stated; else it varies by two fifths, and is not.
+    pub height_known: bool,
+    /// Restitution at 1 m/s.
+    pub restitution: f64,
+    /// Concentration of the directions (von Mises and Fisher).
+    pub kappa: f64,
+    /// One sigma of the velocity along the table with which a ball is let go, along each axis, in m/s.
+    pub release_m_s: f64,
+    /// One sigma of the times in s, and of the places in m.
+    pub noise: [f64; 2],
+    /// Whether these are stated.
+    pub noise_known: bool,
+    /// What acts.
+    pub effects: Effects,
+}
+
+impl BounceWorld {
+    /// Thirty drops from 0.3 m, six impacts each, heard to 30 us and 6 mm.
+    pub fn drops() -> Self {
+        Self {
+            runs: 30,
+            impacts: 6,
+            height_m: 0.3,
+            height_known: false,
+            restitution: 0.8,
+            kappa: 5000.0,
+            release_m_s: 0.05,
+            noise: [3e-5, 6e-3],
+            noise_known: true,
+            effects: Effects::default(),
+        }
+    }
+
+    /// The contents of `recording.toml` and `data.csv`.
+    pub fn files(&self, seed: u64) -> [String; 2] {
+        let mut header = String::from("format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n");
+        if self.noise_known {
+            let [time, place] = self.noise;
+            let _ = write!(header, "\n[noise]\nt_s = {time}\nx_m = {place}\ny_m = {place}\n");
+        }
+        if self.height_known {
+            let _ = write!(header, "\n[rig]\ndrop_height_m = {}\n", self.height_m);
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut data = String::from("run,bounce,t_s,x_m,y_m\n");
+        for run in 1..=self.runs {
+            let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
+            let unheard = (rng.random::<f64>() < self.effects.unheard)
+                .then(|| rng.random_range(1..self.impacts.max(3) - 1));
+            let impacts = self.impacts + usize::from(unheard.is_some());
+            let heard = self.drop(self.height_m * spread, impacts, &mut rng);
+            let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
+            for (number, (_, [t, x, y])) in kept.enumerate() {
+                let _ = writeln!(data, "{run},{},{t:.7},{x:.5},{y:.5}", number + 1);
+            }
+        }
+        [header, data]
+    }
+
+    /// Time and place of each impact of one drop, as they are heard.
+    fn drop(&self, height_m: f64, impacts: usize, rng: &mut ChaCha8Rng) -> Vec<Vec3> {
+        let e = &self.effects;
+        let normal = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
+        let mut place = [0.0; 3];
+        let mut velocity = [self.release_m_s * normal(rng), self.release_m_s * normal(rng), 0.0];
+        // The stated height is that above the place where it lands.
+        place[2] = height_m;
+        let mut t = rng.random_range(0.0..1.0);
+        let mut level = Self { effects: *e, ..*self };
+        level.effects.table = [0.0; 2];
+        let mut heard = Vec::with_capacity(impacts);
+        for impact in 0..impacts {
+            let table = if impact == 0 { &level } else { self };
+            t += table.fly(&mut place, &mut velocity);
+            place[2] = e.table[0] * place[0] + e.table[1] * place[1];
+            heard.push([
+                t * (1.0 + e.clock_rate) + self.noise[0] * normal(rng),
+                place[0] * (1.0 + e.position_scale) + self.noise[1] * normal(rng),
+                place[1] * (1.0 + e.position_scale) + self.noise[1] * normal(rng),
+            ]);
+            velocity = self.rebound(&place, &velocity, rng);
+        }
+        heard
+    }
+
+    /// Flies until the table is reached; the time it took.
+    fn fly(&self, place: &mut Vec3, velocity: &mut Vec3) -> f64 {
+        const STEP_S: f64 = 1e-3;
+        let [sx, sy] = self.effects.table;
+        let above = |p: &Vec3| p[2] - sx * p[0] - sy * p[1];
+        let mut t = 0.0;
+        loop {
+            let (p, v) = self.step(place, velocity, STEP_S);
+            if above(&p) <= 0.0 && v[2] - sx * v[0] - sy * v[1] < 0.0 {
+                break;
+            }
+            (*place, *velocity) = (p, v);
+            t += STEP_S;
+        }
+        let (mut early, mut late) = (0.0, STEP_S);
+        for _ in 0..50 {
+            let middle = 0.5 * (early + late);
+            if above(&self.step(place, velocity, middle).0) > 0.0 { early = middle } else { late = middle }
+        }
+        (*place, *velocity) = self.step(place, velocity, late);
+        t + late
+    }
+
+    /// One step of a classical Runge-Kutta method.
+    fn step(&self, place: &Vec3, velocity: &Vec3, h: f64) -> (Vec3, Vec3) {
+        let pull = |v: &Vec3| {
+            let k = self.effects.drag_per_m * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+            [-k * v[0], -k * v[1], -k * v[2] - GRAVITY_M_S2]
+        };
+        let add = |v: &Vec3, a: &Vec3, h: f64| [v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]];
+        let a1 = pull(velocity);
+        let v2 = add(velocity, &a1, 0.5 * h);
+        let a2 = pull(&v2);
+        let v3 = add(velocity, &a2, 0.5 * h);
+        let a3 = pull(&v3);
+        let v4 = add(velocity, &a3, h);
+        let a4 = pull(&v4);
+        let mean =
+            |a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3, i: usize| (a[i] + 2.0 * (b[i] + c[i]) + d[i]) / 6.0;
+        let moved = std::array::from_fn(|i| place[i] + h * mean(velocity, &v2, &v3, &v4, i));
+        (moved, std::array::from_fn(|i| velocity[i] + h * mean(&a1, &a2, &a3, &a4, i)))
+    }
+
+    /// The velocity after an impact.
+    fn rebound(&self, place: &Vec3, v: &Vec3, rng: &mut ChaCha8Rng) -> Vec3 {
+        let e = &self.effects;
+        let speed = norm(v);
+        let mut restitution = self.restitution - e.slope_s_m * (speed - 1.0);
+        if place[0] > 0.02 {
+            restitution -= e.dead_side;
+        }
+        let up = unit(&[-e.table[0], -e.table[1], 1.0]);
+        let into = v[0] * up[0] + v[1] * up[1] + v[2] * up[2];
+        let mirrored: Vec3 =
+            std::array::from_fn(|i| (1.0 - e.friction) * (v[i] - into * up[i]) - into * up[i]);
+        let size = restitution * norm(&mirrored);
+        scattered(&unit(&mirrored), self.kappa, rng).map(|x| size * x)
+    }
+}
+
+fn norm(v: &Vec3) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+fn unit(v: &Vec3) -> Vec3 {
+    let size = norm(v);
+    v.map(|x| x / size)
+}
+
+/// A direction about a mean one (von Mises and Fisher; Ulrich 1984, doi:10.2307/2347441, in closed form on the sphere).
+fn scattered(mean: &Vec3, kappa: f64, rng: &mut ChaCha8Rng) -> Vec3 {
+    let u: f64 = rng.random();
+    let along = 1.0 + (u + (1.0 - u) * (-2.0 * kappa).exp()).ln() / kappa;
+    let across = (1.0 - along * along).max(0.0).sqrt();
+    let turn = rng.random_range(0.0..std::f64::consts::TAU);
+    let helper = if mean[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let cross = |a: &Vec3, b: &Vec3| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let first = unit(&cross(mean, &helper));
+    let second = cross(mean, &first);
+    std::array::from_fn(|i| along * mean[i] + across * (turn.cos() * first[i] + turn.sin() * second[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use super::*;
+
+    #[test]
+    fn without_noise_flights_shorten_by_the_restitution() {
+        let world = BounceWorld {
+            runs: 1,
+            noise: [0.0; 2],
+            kappa: 1e14,
+            release_m_s: 0.0,
+            height_known: true,
+            ..BounceWorld::drops()
+        };
+        let [header, data] = world.files(3);
+        assert!(header.contains("drop_height_m = 0.3"));
+        let times: Vec<f64> =
+            data.lines().skip(1).map(|l| l.split(',').nth(2).unwrap().parse().unwrap()).collect();
+        let flights: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+        approx::assert_relative_eq!(flights[0], 0.8 * (8.0 * 0.3 / GRAVITY_M_S2).sqrt(), max_relative = 1e-6);
+        for pair in flights.windows(2) {
+            approx::assert_relative_eq!(pair[1] / pair[0], 0.8, max_relative = 2e-6);
+        }
+    }
+
+    #[test]
+    fn directions_scatter_by_one_over_kappa() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let n = 20_000;
+        let square = (0..n)
+            .map(|_| {
+                let d = scattered(&[0.0, 0.0, 1.0], 400.0, &mut rng);
+                d[0] * d[0]
+            })
+            .sum::<f64>()
+            / f64::from(n);
+        // Four standard errors of a variance.
+        assert!((square * 400.0 - 1.0).abs() < 4.0 * (2.0 / f64::from(n)).sqrt() + 1.0 / 400.0, "{square}");
+    }
+}
