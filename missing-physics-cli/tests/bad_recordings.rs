@@ -163,6 +163,65 @@ fn every_rule_of_the_table_has_its_line() {
 }
 
 #[test]
+fn bounces_and_doughs_have_rules_of_their_own() {
+    let bounce = "format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n";
+    let dough = "format = 1\ndomain = \"dough-roll\"\ndata = \"data.csv\"\n";
+    let rolls =
+        "run,step,length_m,width_m,height_m,throw_m,depth_m,next_length_m,next_width_m,next_height_m\n";
+    let roll = |run: &str, step: u32, length: &str| {
+        format!("{run},{step},{length},0.04,0.04,0.08,0.02,0.05,0.038,0.037\n")
+    };
+    let cases: Vec<(&str, String, &str)> = vec![
+        (bounce, "run,bounce,t_s\na,1,0.1\na,2,0.5\na,3,0.8\n".into(), "fine"),
+        (bounce, "run,bounce,t_s\na,1,0.1\na,2,0.5\n".into(), ": run \"a\" has 2 rows, expected at least 3"),
+        (
+            bounce,
+            "run,bounce,t_s\na,1,0.1\na,2.5,0.5\na,3,0.8\n".into(),
+            ", row 3, column bounce: 2.5, expected a whole number above 1, the one before it",
+        ),
+        (
+            bounce,
+            "run,bounce,t_s\na,1,0.1\na,1,0.5\na,3,0.8\n".into(),
+            ", row 3, column bounce: 1, expected a whole number above 1, the one before it",
+        ),
+        (
+            bounce,
+            "run,bounce,t_s,x_m\na,1,0.1,0\na,2,0.5,0\na,3,0.8,0\n".into(),
+            ", row 1: column y_m is missing, expected the other coordinate of each place",
+        ),
+        (
+            bounce,
+            "run,bounce,t_s\na,1,0.5\na,2,0.1\na,3,0.8\n".into(),
+            ", row 3, column t_s: 0.1, expected more than 0.5, the time before it",
+        ),
+        (
+            dough,
+            format!("{rolls}{}{}", roll("a", 1, "0"), roll("b", 1, "0.05")),
+            ", row 2, column length_m: 0, expected above 0",
+        ),
+        (
+            dough,
+            format!("{rolls}{}{}", roll("a", 2, "0.05"), roll("a", 2, "0.05")),
+            ", row 3, column step: 2, expected more than 2, the one before it",
+        ),
+        (
+            dough,
+            format!("{rolls}{}", roll("a", 1, "0.05")),
+            ": the file has 1 rows, expected at least 2 runs, or rig.training: the first half of the runs is learned from",
+        ),
+        (
+            dough,
+            format!("{rolls}{}{}", roll("a", 1, "0.05"), roll("b", 1, "0.05")),
+            ": the training has 1 rows, expected rolls that determine the dynamics: 1 rolls are too few for 21 coefficients: at least 42 are needed",
+        ),
+    ];
+    for (header, csv, expected) in cases {
+        let got = said(header, csv.as_bytes());
+        assert_eq!(got.strip_prefix("data.csv").unwrap_or(&got), expected);
+    }
+}
+
+#[test]
 fn rows_of_different_runs_may_be_mixed() {
     let csv = good();
     let lines: Vec<&str> = csv.lines().collect();
