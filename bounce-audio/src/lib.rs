@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
 pub mod flight;
 pub mod impact;
+pub mod localise;
 pub mod missed;
+pub mod wav;
