@@ -18,6 +18,8 @@ pub struct HearSettings {
     pub reach: f64,
     /// How far time differences may be from adding up around triangles, s.
     pub closure_s: f64,
+    /// Least agreement of the channels' phases ([`Location::coherence`]).
+    pub coherence: f64,
 }
 
 impl Default for HearSettings {
@@ -25,9 +27,10 @@ impl Default for HearSettings {
         Self {
             onset: OnsetSettings::default(),
             lead_s: 1.2e-3,
-            length_s: 7e-3,
+            length_s: 5e-3,
             reach: 0.3,
-            closure_s: 1.5e-4,
+            closure_s: 5e-5,
+            coherence: 0.6,
         }
     }
 }
@@ -92,6 +95,8 @@ pub enum StrayReason {
     Outside(f64),
     /// The time differences do not add up, by this much, s: no single source.
     Scattered(f64),
+    /// The channels did not hear one sound: this little of it is common to them, 1 at best.
+    Incoherent(f64),
 }
 
 /// What was heard in a recording.
@@ -161,13 +166,15 @@ pub fn hear(
             Ok(location) => location,
             // A channel that is dead just then says nothing about where the sound came from.
             Err(LocaliseError::Energy { .. }) => {
-                heard.strays.push(Stray { t_s: first, reason: StrayReason::Scattered(f64::INFINITY) });
+                heard.strays.push(Stray { t_s: first, reason: StrayReason::Incoherent(0.0) });
                 continue;
             }
             Err(error) => return Err(error.into()),
         };
         let outside = array.outside_m(location.x_m, location.y_m);
-        let reason = if !(location.closure_s <= settings.closure_s) {
+        let reason = if !(location.coherence >= settings.coherence) {
+            Some(StrayReason::Incoherent(location.coherence))
+        } else if !(location.closure_s <= settings.closure_s) {
             Some(StrayReason::Scattered(location.closure_s))
         } else if !(outside <= settings.reach * array.diagonal_m()) {
             Some(StrayReason::Outside(outside))

@@ -98,6 +98,9 @@ pub struct Location {
     pub residual_s: Option<f64>,
     /// How far the time differences are from adding up around triangles, root mean square over the pairs, s.
     pub closure_s: f64,
+    /// How well the phases of the channels agree with delays of one sound, mean over the pairs: 1 for one source without noise
+    /// or echoes, near 0.3 for sounds that have nothing to do with each other.
+    pub coherence: f64,
 }
 
 /// Localises impacts from buffers of one length: planned once, then run without allocation.
@@ -171,6 +174,7 @@ impl Localiser {
             arrival_sigma_s: sigma,
             residual_s: (dof > 0).then(|| (place.sum_squares / dof as f64).sqrt()),
             closure_s,
+            coherence: self.correlator.coherence(),
         })
     }
 

@@ -2,7 +2,8 @@
 //!
 //! The sound is high-passed by a causal filter, so that nothing rings before an onset, and its short-time energy over the noise
 //! floor, summed over the channels, is searched for jumps: above the noise, above what came just before, and above the echoes that
-//! the impacts before it may still send. The onset itself is the change point of the variance: the instant that splits the sound
+//! the impacts before it may still send (a wall at 1.7 m answers after 10 ms, in the real sound that this was tried on with half
+//! the amplitude or more). The onset itself is the change point of the variance: the instant that splits the sound
 //! around it into two stretches of white Gaussian noise most probably (Maeda 1985's picker of seismic arrivals,
 //! `L(k) = -(k ln v_before + (n - k) ln v_after) / 2`), its mean and spread taken over all instants, on eighths of a sample. A
 //! bank's delay leaves a common bias of some 20 to 40 us, which times between impacts do not see.
@@ -24,6 +25,8 @@ const AROUND_S: (f64, f64) = (3e-3, 1e-3);
 const OVERSAMPLING: f64 = 8.0;
 /// Blocks of the noise floor, s; their quantile that is taken, and what it is of the mean for such blocks of noise.
 const FLOOR: (f64, f64, f64) = (2e-3, 0.2, 0.85);
+/// What counts as no sound next to an onset: this part of the noise's power, and of the mean power around the onset.
+const QUIET: (f64, f64) = (1e-2, 1e-4);
 /// The noise is at least this part of a channel's root mean square, so that digital silence is a floor too.
 const LEAST_NOISE: f64 = 1e-4;
 
@@ -38,10 +41,10 @@ pub struct OnsetSettings {
     pub rise: f64,
     /// No impact this soon after another, s.
     pub refractory_s: f64,
-    /// Amplitude of an impact's loudest echo over its own, at once.
-    pub echo: f64,
-    /// How fast echoes fade, dB/s.
-    pub echo_decay_db_s: f64,
+    /// Single echoes off walls and table: their amplitude over the impact's, at once, and how fast they fade, dB/s.
+    pub early_echo: (f64, f64),
+    /// The reverberation that follows, likewise.
+    pub reverberation: (f64, f64),
 }
 
 impl Default for OnsetSettings {
@@ -51,8 +54,8 @@ impl Default for OnsetSettings {
             threshold_sigmas: 3.5,
             rise: 2.2,
             refractory_s: 8e-3,
-            echo: 0.3,
-            echo_decay_db_s: 100.0,
+            early_echo: (1.3, 350.0),
+            reverberation: (0.3, 100.0),
         }
     }
 }
@@ -196,7 +199,8 @@ impl Listened {
                 .fold((0.0, k), |a, b| if b.0 > a.0 { b } else { a });
             let echo = |&(_, level, at): &(usize, f64, usize)| {
                 let passed = (loudest.1.saturating_sub(at)) as f64 / self.rate_hz;
-                level * s.echo.powi(2) * 10f64.powf(-0.1 * s.echo_decay_db_s * passed)
+                let left = |(part, decay): (f64, f64)| part * 10f64.powf(-0.05 * decay * passed);
+                level * left(s.early_echo).max(left(s.reverberation)).powi(2)
             };
             if found.iter().map(echo).fold(0.0, f64::max) > loudest.0 {
                 k += 1;
@@ -265,7 +269,8 @@ impl Listened {
         let total = Running::new(&energy);
         // A stretch of a few samples has no variance to speak of.
         let edge = (4.0 * OVERSAMPLING) as usize;
-        let log = |a: usize, b: usize| (total.mean(a, b) / count + 1e-2).ln();
+        let quiet = QUIET.0 + QUIET.1 * total.mean(0, n) / count;
+        let log = |a: usize, b: usize| (total.mean(a, b) / count + quiet).ln();
         let likelihood = |k: usize| {
             let (before, after) = (k as f64, (n - k) as f64);
             -0.5 * count * (before * log(0, k) + after * log(k, n)) / OVERSAMPLING

@@ -58,8 +58,8 @@ fn the_practice_taps_are_found() {
     );
     assert_eq!(mm.len(), 30);
     assert!(median <= 0.5 && worst <= 2.0, "median {median} mm, worst {worst} mm");
-    // The sigmas are honest to a factor of 2.
-    assert!((0.25..4.0).contains(&z), "mean square of z {z}");
+    // The sigmas are honest to a factor of 2 or so.
+    assert!((0.1..2.5).contains(&z), "mean square of z {z}");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn made_taps_are_found_and_their_sigmas_hold() {
             microphones.len()
         );
         assert!(median < 0.5, "median {median} mm");
-        assert!((0.25..4.0).contains(&z), "mean square of z {z}");
+        assert!((0.1..2.5).contains(&z), "mean square of z {z}");
     }
 }
 
