@@ -24,6 +24,19 @@ pub struct Loaded {
     pub experiments: Vec<Experiment>,
     /// What such data cannot determine, one sentence each.
     pub undetermined: Vec<String>,
+    /// Impacts, where they were heard in sound.
+    pub impacts: Vec<Impact>,
+}
+
+/// An impact that was heard.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Impact {
+    /// Label of the run.
+    pub run: String,
+    /// When, s since the beginning of the sound.
+    pub t_s: f64,
+    /// Where on the table, m, where there were microphones enough.
+    pub place_m: Option<[f64; 2]>,
 }
 
 impl std::fmt::Debug for Loaded {

@@ -184,6 +184,43 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// A list of texts, if it is there; at least one.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`].
+    pub fn texts(&self, key: &str) -> Result<Option<Vec<&'a str>>, ReadError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let texts: Option<Vec<&str>> =
+            value.as_array().map(|list| list.iter().map(Value::as_str).collect()).unwrap_or_default();
+        match texts.filter(|t| !t.is_empty()) {
+            Some(texts) => Ok(Some(texts)),
+            None => Err(self.header.wrong(&format!("{}{key}", self.path), value, "a list of texts")),
+        }
+    }
+
+    /// A list of points in space (m), if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`].
+    pub fn points(&self, key: &str) -> Result<Option<Vec<[f64; 3]>>, ReadError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let number = |v: &Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+        let point = |v: &Value| -> Option<[f64; 3]> {
+            let list: Option<Vec<f64>> = v.as_array()?.iter().map(number).collect();
+            let point: [f64; 3] = list?.try_into().ok()?;
+            point.iter().all(|x| x.abs() <= 1e3).then_some(point)
+        };
+        let points: Option<Vec<[f64; 3]>> =
+            value.as_array().map(|list| list.iter().map(point).collect()).unwrap_or_default();
+        match points.filter(|p| !p.is_empty()) {
+            Some(points) => Ok(Some(points)),
+            None => {
+                let expected = "a list of points [x, y, z] in metres";
+                Err(self.header.wrong(&format!("{}{key}", self.path), value, expected))
+            }
+        }
+    }
+
     /// A text, if it is there.
     ///
     /// # Errors

@@ -105,7 +105,7 @@ fn placed(heard: &[Heard], setup: Setup, restitution: f64, known: Known) -> Resu
         undetermined.push(UNTIED.into());
     }
     let experiments = experiments(&mut model);
-    Ok(Loaded { recording, model: Box::new(model), experiments, undetermined })
+    Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
 }
 
 const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
@@ -140,5 +140,5 @@ fn timed(heard: &[Heard], rig: &Rig, setup: Setup, restitution: f64, known: Know
         );
     }
     let experiments = of_times(&model, restitution, setup.gravity_m_s2);
-    Loaded { recording, model: Box::new(model), experiments, undetermined }
+    Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() }
 }

@@ -8,6 +8,7 @@ mod drop;
 mod experiments;
 mod model;
 mod read;
+mod sound;
 mod spec;
 mod spread;
 mod times;
@@ -29,6 +30,7 @@ const COLUMNS: [Column; 5] = [
     number("x_m", "place in metres"),
     number("y_m", "place in metres"),
 ];
+const THREE_MICROPHONES: &str = "with three microphones a wrong place of one, or a wrong speed of sound, leaves no trace: a fourth would show it";
 const GRAVITY_M_S2: f64 = 9.80665;
 
 /// The domain.
@@ -48,6 +50,9 @@ impl Domain for Bounce {
         &[
             ("run, bounce, t_s", "when each impact was heard; bounce counts from the first that was"),
             ("x_m, y_m", "optional: where, on the table"),
+            ("[audio] files", "in place of data: one WAV a run"),
+            ("[audio] microphones_m", "optional: [[x, y, z], ...] in the table's frame, one a channel; times only if absent"),
+            ("[audio] speed_of_sound_m_s", "or temperature_k; 343 m/s if absent"),
             ("[rig] drop_height_m", "optional: it fell from rest to the first impact; taken as exact"),
             ("[rig] mass_kg, diameter_m", "optional: of the ball; both give the drag coefficient"),
             ("[rig] gravity_m_s2", "optional: 9.80665 m/s^2 if absent"),
@@ -72,12 +77,24 @@ impl Domain for Bounce {
 
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
         let rig = Rig::read(header)?;
-        let name = header.root().text("data", "the name of a CSV file")?;
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
-        let heard = heard(&table, &rig)?;
         let noise = header.section("noise")?;
         let sigma = |name: &str| noise.number(name, f64::MIN_POSITIVE, 1e3);
         let known = Known { time_s: sigma("t_s")?, place_m: [sigma("x_m")?, sigma("y_m")?] };
+        if let Some(listened) = sound::listen(header, &rig)? {
+            let impacts = sound::impacts(&listened.heard);
+            let unfit = |(_, expected): (usize, String)| {
+                header.root().unfit("audio", "sound", expected)
+            };
+            let mut loaded = assemble::assemble(listened.heard, &rig, known).map_err(unfit)?;
+            loaded.impacts = impacts;
+            if listened.microphones == 3 {
+                loaded.undetermined.push(THREE_MICROPHONES.into());
+            }
+            return Ok(loaded);
+        }
+        let name = header.root().text("data", "the name of a CSV file (or [audio] files)")?;
+        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+        let heard = heard(&table, &rig)?;
         assemble::assemble(heard, &rig, known).map_err(|(row, what)| {
             let time = table.numbers("t_s").map_or(f64::NAN, |t| t[row]);
             table.cell(row, "t_s", time, what)

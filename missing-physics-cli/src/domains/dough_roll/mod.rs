@@ -104,6 +104,6 @@ impl Domain for DoughRoll {
             undetermined
                 .push("without t_s, drying is not told from a band that tires or another stiffness".into());
         }
-        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined })
+        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
     }
 }

@@ -171,7 +171,7 @@ impl Domain for Indentation {
             undetermined
                 .push("without t_s a body that relaxes cannot be told: viscoelasticity was not tried".into());
         }
-        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined })
+        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
     }
 }
 

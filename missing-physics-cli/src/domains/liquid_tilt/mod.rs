@@ -134,7 +134,7 @@ impl Domain for LiquidTilt {
                 "mass and volume are free in each run: a known liquid (density_kg_m3) or measured volumes (volume_m3) would tell more mechanisms apart".into(),
             );
         }
-        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined })
+        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
     }
 }
 

@@ -110,7 +110,7 @@ impl Domain for Slosh {
             "the amplitude of the wave and the lever to the sensor are one number: neither is known alone"
                 .into(),
         ];
-        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined })
+        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
     }
 }
 
