@@ -5,6 +5,9 @@ use crate::onset::{Instant, Listened, Onset, OnsetError, OnsetSettings};
 use crate::wav::Sound;
 use thiserror::Error;
 
+/// Power, in the noise's, of a sound of which half the agreement of the channels is asked for.
+const EXCUSED: f64 = 4.0;
+
 /// How impacts are heard.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HearSettings {
@@ -18,7 +21,7 @@ pub struct HearSettings {
     pub reach: f64,
     /// How far time differences may be from adding up around triangles, s.
     pub closure_s: f64,
-    /// Least agreement of the channels' phases ([`Location::coherence`]).
+    /// Least agreement of the channels' phases ([`Location::coherence`]) for a loud sound; noise excuses a weak one.
     pub coherence: f64,
 }
 
@@ -172,7 +175,9 @@ pub fn hear(
             Err(error) => return Err(error.into()),
         };
         let outside = array.outside_m(location.x_m, location.y_m);
-        let reason = if !(location.coherence >= settings.coherence) {
+        let power = onset.amplitude_sigmas.powi(2);
+        let coherence = settings.coherence * power / (power + EXCUSED);
+        let reason = if !(location.coherence >= coherence) {
             Some(StrayReason::Incoherent(location.coherence))
         } else if !(location.closure_s <= settings.closure_s) {
             Some(StrayReason::Scattered(location.closure_s))

@@ -10,6 +10,7 @@
 
 mod array;
 mod correlate;
+mod peak;
 
 pub use array::{Array, ArrayError};
 
@@ -98,7 +99,7 @@ pub struct Location {
     pub residual_s: Option<f64>,
     /// How far the time differences are from adding up around triangles, root mean square over the pairs, s.
     pub closure_s: f64,
-    /// How well the phases of the channels agree with delays of one sound, mean over the pairs: 1 for one source without noise
+    /// How well the phases of the channels agree with delays of one sound, in the pair that agrees least: 1 for one source without noise
     /// or echoes, near 0.3 for sounds that have nothing to do with each other.
     pub coherence: f64,
 }

@@ -5,13 +5,15 @@
 //! the impacts before it may still send (a wall at 1.7 m answers after 10 ms, in the real sound that this was tried on with half
 //! the amplitude or more). The onset itself is the change point of the variance: the instant that splits the sound
 //! around it into two stretches of white Gaussian noise most probably (Maeda 1985's picker of seismic arrivals,
-//! `L(k) = -(k ln v_before + (n - k) ln v_after) / 2`), its mean and spread taken over all instants, on eighths of a sample. A
-//! bank's delay leaves a common bias of some 20 to 40 us, which times between impacts do not see.
+//! `L(k) = -(k ln v_before + (n - k) ln v_after) / 2`), its mean and spread taken over all instants, on eighths of a sample. The
+//! filter and the rise of the sound leave a common bias of some 20 to 40 us, which times between impacts do not see.
 
 mod filter;
+mod settings;
+
+pub use settings::{OnsetError, OnsetSettings};
 
 use filter::{at, high_pass};
-use thiserror::Error;
 
 /// Stretch over which the energy is averaged, s.
 const SHORT_S: f64 = 0.5e-3;
@@ -29,73 +31,6 @@ const FLOOR: (f64, f64, f64) = (2e-3, 0.2, 0.85);
 const QUIET: (f64, f64) = (1e-2, 1e-4);
 /// The noise is at least this part of a channel's root mean square, so that digital silence is a floor too.
 const LEAST_NOISE: f64 = 1e-4;
-
-/// How impacts are told from the rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OnsetSettings {
-    /// Corner of the high-pass, Hz.
-    pub high_pass_hz: f64,
-    /// Least short-time amplitude, in standard deviations of the noise.
-    pub threshold_sigmas: f64,
-    /// Least jump of the amplitude over the milliseconds before, a ratio.
-    pub rise: f64,
-    /// No impact this soon after another, s.
-    pub refractory_s: f64,
-    /// Single echoes off walls and table: their amplitude over the impact's, at once, and how fast they fade, dB/s.
-    pub early_echo: (f64, f64),
-    /// The reverberation that follows, likewise.
-    pub reverberation: (f64, f64),
-}
-
-impl Default for OnsetSettings {
-    fn default() -> Self {
-        Self {
-            high_pass_hz: 1_500.0,
-            threshold_sigmas: 3.5,
-            rise: 2.2,
-            refractory_s: 8e-3,
-            early_echo: (1.3, 350.0),
-            reverberation: (0.3, 100.0),
-        }
-    }
-}
-
-/// Why onsets cannot be looked for.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum OnsetError {
-    /// There is no channel.
-    #[error("no channel, expected at least one")]
-    NoChannel,
-    /// The channels differ in length.
-    #[error("channel {channel} has {got} samples, expected {expected} as in channel 0")]
-    Length {
-        /// Channel, from 0.
-        channel: usize,
-        /// Samples of channel 0.
-        expected: usize,
-        /// Its samples.
-        got: usize,
-    },
-    /// A sample is no number.
-    #[error("channel {channel}, sample {sample}: expected a finite number")]
-    NotFinite {
-        /// Channel, from 0.
-        channel: usize,
-        /// Sample, from 0.
-        sample: usize,
-    },
-    /// A setting or the sample rate is out of its range.
-    #[error("{what} is {got}, expected {expected}")]
-    Setting {
-        /// The setting.
-        what: &'static str,
-        /// What is taken.
-        expected: &'static str,
-        /// The value stated.
-        got: f64,
-    },
-}
 
 /// A sound in which impacts are looked for: high-passed, its noise measured.
 pub struct Listened {

@@ -107,6 +107,6 @@ fn a_real_ball_is_heard_when_its_author_heard_it() {
     assert!(at.len() >= times.len());
     assert!(off.iter().all(|o| (-5.0..0.5).contains(o)), "{off:.1?} ms");
     // The flights shorten as a ball's do, beyond the author's last time: no echo was taken for an impact.
-    let flights: Vec<f64> = at.windows(2).take(36).map(|w| w[1] - w[0]).collect();
+    let flights: Vec<f64> = at.windows(2).map(|w| w[1] - w[0]).collect();
     assert!(flights.windows(2).all(|f| (0.85..1.0).contains(&(f[1] / f[0]))), "{flights:.4?} s");
 }

@@ -1,6 +1,7 @@
 //! Time differences of arrival between channels, by the phase transform.
 
 use super::LocaliseError;
+use super::peak::{OVERSAMPLING, Peak, candidates};
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::TAU;
@@ -19,12 +20,6 @@ const NOISE_WEIGHT: f64 = 5.0;
 /// What errors are over what the scatter of the phases says: echoes disturb neighbouring frequencies and all channels alike.
 /// Measured on the practice sounds (1.8 to 2.6; 0.9 without echoes).
 const SIGMA_SCALE: f64 = 2.0;
-/// Lattice points a sample on which the peak is looked for.
-const OVERSAMPLING: usize = 2;
-/// Peaks of the lattice that are refined, if they reach this part of the highest.
-const RIVALS: (usize, f64) = (3, 0.7);
-/// Newton steps on a peak.
-const STEPS: usize = 5;
 
 pub(super) struct Correlator {
     channels: usize,
@@ -133,9 +128,9 @@ impl Correlator {
         SIGMA_SCALE * (0.5 * mean).sqrt()
     }
 
-    /// Mean over the pairs of how well the phases agree, 1 at best.
+    /// How well the phases of the pair that agrees least do so, 1 at best.
     pub(super) fn coherence(&self) -> f64 {
-        self.pairs.iter().map(|p| p.coherence).sum::<f64>() / self.pairs.len() as f64
+        self.pairs.iter().map(|p| p.coherence).fold(1.0, f64::min)
     }
 
     pub(super) fn listen(&mut self, channels: &[&[f64]]) -> Result<(), LocaliseError> {
@@ -237,73 +232,5 @@ impl Correlator {
             self.lattice[n - self.band.0 - k] = a.conj() + i_b_conj;
         }
         self.inverse.process_with_scratch(&mut self.lattice, &mut self.scratch);
-    }
-}
-
-/// Lags (s) of the highest peaks on the lattice, highest first; a peak on the edge counts.
-fn candidates(lattice: &[Complex64], part: usize, longest_s: f64, rate_hz: f64) -> [Option<f64>; RIVALS.0] {
-    let n = lattice.len() as isize;
-    let step = 1.0 / (rate_hz * OVERSAMPLING as f64);
-    let reach = (longest_s / step).ceil() as isize;
-    let at = |m: isize| {
-        let z = lattice[m.rem_euclid(n) as usize];
-        if part == 0 { z.re } else { z.im }
-    };
-    let mut top: [(f64, Option<f64>); RIVALS.0] = [(f64::NEG_INFINITY, None); RIVALS.0];
-    for m in -reach..=reach {
-        let here = at(m);
-        let peak = (m == -reach || here >= at(m - 1)) && (m == reach || here > at(m + 1));
-        if peak && here > top[RIVALS.0 - 1].0 {
-            let place = top.iter().position(|t| here > t.0).unwrap_or(RIVALS.0 - 1);
-            top[place..].rotate_right(1);
-            top[place] = (here, Some(m as f64 * step));
-        }
-    }
-    let enough = RIVALS.1 * top[0].0;
-    top.map(|(height, lag)| lag.filter(|_| height >= enough))
-}
-
-/// A peak of a correlation.
-struct Peak {
-    lag_s: f64,
-    height: f64,
-    /// Minus the second derivative at the peak, 1/s^2.
-    curvature: f64,
-    /// Sum of the squares of the frequencies' parts of the first derivative, 1/s^2.
-    scatter: f64,
-}
-
-impl Peak {
-    /// Newton's method from a point of the lattice, on the sum over frequencies.
-    fn climb(cross: &[Complex64], first: usize, radians: f64, start_s: f64) -> Self {
-        let mut peak = Self { lag_s: start_s, height: 0.0, curvature: 0.0, scatter: 0.0 };
-        // The lattice's spacing is well below the width of a peak.
-        let bound = 0.1 * TAU / (radians * (first + cross.len()) as f64);
-        for round in 0..=STEPS {
-            let t = peak.lag_s;
-            let turn = Complex64::from_polar(1.0, radians * t);
-            let mut phase = Complex64::from_polar(1.0, radians * first as f64 * t);
-            let (mut height, mut slope, mut curvature, mut scatter) = (0.0, 0.0, 0.0, 0.0);
-            for (k, g) in cross.iter().enumerate() {
-                let omega = radians * (first + k) as f64;
-                let z = g * phase;
-                phase *= turn;
-                let part = omega * z.im;
-                height += z.re;
-                slope -= part;
-                curvature += omega * omega * z.re;
-                scatter += part * part;
-            }
-            (peak.height, peak.curvature, peak.scatter) = (height, curvature, scatter);
-            if round == STEPS || !(curvature > 0.0) {
-                break;
-            }
-            let step = (slope / curvature).clamp(-bound, bound);
-            if step.abs() < 1e-11 {
-                break;
-            }
-            peak.lag_s = t + step;
-        }
-        peak
     }
 }
