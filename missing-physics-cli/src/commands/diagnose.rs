@@ -57,6 +57,7 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
             .folder
             .file_name()
             .map_or_else(|| "recording".into(), |n| n.to_string_lossy().into_owned()),
+        impacts: loaded.impacts,
     };
     if let Some(path) = &arguments.json {
         write_whole(path, &report::json(&diagnosis, &context))?;

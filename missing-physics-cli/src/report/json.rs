@@ -24,6 +24,8 @@ struct Answer<'a> {
     fit: Value,
     law: Value,
     next_experiment: Value,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    impacts: Vec<Value>,
     // Beyond the fixed part.
     p_floor: f64,
     final_p_value: Option<f64>,
@@ -41,6 +43,14 @@ struct Answer<'a> {
 pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
     let answer = Answer {
         format: 1,
+        impacts: context
+            .impacts
+            .iter()
+            .map(|i| match i.place_m {
+                Some([x, y]) => value!({"run": i.run, "t_s": i.t_s, "x_m": x, "y_m": y}),
+                None => value!({"run": i.run, "t_s": i.t_s}),
+            })
+            .collect(),
         domain: &context.domain,
         recording: &context.recording,
         verdict: d.verdict.word(),

@@ -11,8 +11,10 @@ pub use html::html;
 pub use json::json;
 pub use text::text;
 
+use crate::domains::Impact;
+
 /// What a report says of the recording beside the diagnosis.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ReportContext {
     /// Identifier of the domain.
     pub domain: String,
@@ -20,4 +22,6 @@ pub struct ReportContext {
     pub recording: String,
     /// Title of the page.
     pub title: String,
+    /// Impacts, where they were heard.
+    pub impacts: Vec<Impact>,
 }

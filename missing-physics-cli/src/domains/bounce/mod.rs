@@ -51,7 +51,10 @@ impl Domain for Bounce {
             ("run, bounce, t_s", "when each impact was heard; bounce counts from the first that was"),
             ("x_m, y_m", "optional: where, on the table"),
             ("[audio] files", "in place of data: one WAV a run"),
-            ("[audio] microphones_m", "optional: [[x, y, z], ...] in the table's frame, one a channel; times only if absent"),
+            (
+                "[audio] microphones_m",
+                "optional: [[x, y, z], ...] in the table's frame, one a channel; times only if absent",
+            ),
             ("[audio] speed_of_sound_m_s", "or temperature_k; 343 m/s if absent"),
             ("[rig] drop_height_m", "optional: it fell from rest to the first impact; taken as exact"),
             ("[rig] mass_kg, diameter_m", "optional: of the ball; both give the drag coefficient"),
@@ -82,9 +85,7 @@ impl Domain for Bounce {
         let known = Known { time_s: sigma("t_s")?, place_m: [sigma("x_m")?, sigma("y_m")?] };
         if let Some(listened) = sound::listen(header, &rig)? {
             let impacts = sound::impacts(&listened.heard);
-            let unfit = |(_, expected): (usize, String)| {
-                header.root().unfit("audio", "sound", expected)
-            };
+            let unfit = |(_, expected): (usize, String)| header.root().unfit("audio", "sound", expected);
             let mut loaded = assemble::assemble(listened.heard, &rig, known).map_err(unfit)?;
             loaded.impacts = impacts;
             if listened.microphones == 3 {

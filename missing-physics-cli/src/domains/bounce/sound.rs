@@ -55,8 +55,8 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
             ..Drop::default()
         };
         let numbers = (1..=impacts.len()).map(|n| n as f64).collect();
-        let label = name.strip_suffix(".wav").unwrap_or(name).to_owned();
-        heard.push(Heard { label, row: 0, drop, numbers });
+        // Runs are counted from 1, in the order of the files.
+        heard.push(Heard { label: (heard.len() + 1).to_string(), row: 0, drop, numbers });
     }
     Ok(Some(Listened { heard, microphones: microphones.map_or(0, |m| m.len()) }))
 }

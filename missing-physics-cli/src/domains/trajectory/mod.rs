@@ -124,7 +124,13 @@ impl Domain for Trajectory {
             resolution: columns.iter().map(|c| resolution(c)).collect(),
         };
         let experiments = experiments::experiments(axes, gravity_m_s2, &recording);
-        Ok(Loaded { recording, model: Box::new(model), experiments, undetermined: undetermined(axes), impacts: Vec::new() })
+        Ok(Loaded {
+            recording,
+            model: Box::new(model),
+            experiments,
+            undetermined: undetermined(axes),
+            impacts: Vec::new(),
+        })
     }
 }
 
