@@ -4,6 +4,7 @@ use bounce_audio::missed::{typical_restitution, unheard};
 use missing_physics::data::Recording;
 use missing_physics::model::Quantity;
 
+use super::array::Microphones;
 use super::drop::{Drop, Effects};
 use super::experiments::{experiments, of_times};
 use super::model::{BounceModel, Setup};
@@ -17,7 +18,12 @@ use crate::domains::reading::resolution;
 const LIKELY_RESTITUTION: [f64; 2] = [0.05, 1.2];
 
 /// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
-pub(super) fn assemble(mut heard: Vec<Heard>, rig: &Rig, known: Known) -> Result<Loaded, (usize, String)> {
+pub(super) fn assemble(
+    mut heard: Vec<Heard>,
+    rig: &Rig,
+    known: Known,
+    microphones: &Microphones,
+) -> Result<Loaded, (usize, String)> {
     let (restitution, missed) = listen(&mut heard, rig);
     let setup = Setup {
         gravity_m_s2: rig.gravity_m_s2,
@@ -25,9 +31,10 @@ pub(super) fn assemble(mut heard: Vec<Heard>, rig: &Rig, known: Known) -> Result
         placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
         dropped: rig.drop_height_m.is_some(),
         unheard: [missed, heard.len()],
+        microphones: microphones.places_m.len(),
     };
     if setup.placed {
-        placed(&heard, setup, restitution, known)
+        placed(&heard, setup, restitution, known, microphones)
     } else {
         Ok(timed(&heard, rig, setup, restitution, known))
     }
@@ -53,7 +60,13 @@ fn listen(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
 }
 
 /// Times and places: impact by impact.
-fn placed(heard: &[Heard], setup: Setup, restitution: f64, known: Known) -> Result<Loaded, (usize, String)> {
+fn placed(
+    heard: &[Heard],
+    setup: Setup,
+    restitution: f64,
+    known: Known,
+    microphones: &Microphones,
+) -> Result<Loaded, (usize, String)> {
     let nominal = Effects {
         gravity_m_s2: setup.gravity_m_s2,
         restitution,
@@ -77,13 +90,24 @@ fn placed(heard: &[Heard], setup: Setup, restitution: f64, known: Known) -> Resu
     };
     let (spread, linear) =
         judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
-    let mut model = BounceModel::new(setup, nominal, spread);
+    let mut model = BounceModel::new(setup, nominal, spread, microphones.clone());
     let mut runs = Vec::new();
     for (h, linear) in heard.iter().zip(linear) {
         runs.push(model.run(&h.label, linear, &h.drop, &h.numbers).ok_or_else(|| senseless(h))?);
     }
+    let mut channels = vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")];
+    channels.extend((0..microphones.spare()).map(|k| {
+        let name =
+            if microphones.spare() == 1 { "arrival_s".to_owned() } else { format!("arrival_{}_s", k + 1) };
+        Quantity::new(name, "s")
+    }));
+    let mut calibration = vec![None; channels.len()];
+    // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
+    calibration[0] = known.time_s;
     let recording = Recording {
-        channels: vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")],
+        resolution: vec![0.0; channels.len()],
+        calibration,
+        channels,
         variables: vec![
             Quantity::new("bounce", ""),
             Quantity::new("speed_m_s", "m/s"),
@@ -92,9 +116,6 @@ fn placed(heard: &[Heard], setup: Setup, restitution: f64, known: Known) -> Resu
         ],
         runs,
         noise_along: Some(0),
-        // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
-        calibration: vec![known.time_s, None, None],
-        resolution: vec![0.0; 3],
     };
     let mut undetermined = vec![format!(
         "how a direction was scattered and how a place was misheard are told apart by the lengths of the flights alone \

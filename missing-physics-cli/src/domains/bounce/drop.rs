@@ -66,6 +66,8 @@ pub(super) struct Drop {
     pub(super) came: [f64; 2],
     /// Where balls head on average after the first impact, where their fall is not known.
     pub(super) usual: [f64; 2],
+    /// When each microphone heard each impact, s; empty where there are fewer than four.
+    pub(super) arrivals_s: Vec<Vec<f64>>,
     /// How many impacts went unheard before the first one heard (only with a known height) and within each flight.
     pub(super) unheard: Vec<usize>,
     /// Of those, how many are known because the file's numbers jump.

@@ -3,6 +3,7 @@
 //! An impact is judged by the flights before and after it. These share measured times and places with the neighbouring
 //! impacts', so the errors of a drop are tied; they are taken apart by their own covariance before the engine sees them.
 
+mod array;
 mod assemble;
 mod drop;
 mod experiments;
@@ -16,6 +17,7 @@ mod weights;
 
 use missing_physics::model::Spec;
 
+use self::array::Microphones;
 use self::model::Setup;
 use self::read::{Rig, heard};
 use self::spread::Known;
@@ -70,6 +72,7 @@ impl Domain for Bounce {
             placed: true,
             dropped: true,
             unheard: [1, 10],
+            microphones: 4,
         };
         spec::build(&setup, 0.8).0.spec
     }
@@ -86,9 +89,10 @@ impl Domain for Bounce {
         if let Some(listened) = sound::listen(header, &rig)? {
             let impacts = sound::impacts(&listened.heard);
             let unfit = |(_, expected): (usize, String)| header.root().unfit("audio", "sound", expected);
-            let mut loaded = assemble::assemble(listened.heard, &rig, known).map_err(unfit)?;
+            let mut loaded =
+                assemble::assemble(listened.heard, &rig, known, &listened.microphones).map_err(unfit)?;
             loaded.impacts = impacts;
-            if listened.microphones == 3 {
+            if listened.microphones.places_m.len() == 3 {
                 loaded.undetermined.push(THREE_MICROPHONES.into());
             }
             return Ok(loaded);
@@ -96,7 +100,7 @@ impl Domain for Bounce {
         let name = header.root().text("data", "the name of a CSV file (or [audio] files)")?;
         let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
         let heard = heard(&table, &rig)?;
-        assemble::assemble(heard, &rig, known).map_err(|(row, what)| {
+        assemble::assemble(heard, &rig, known, &Microphones::default()).map_err(|(row, what)| {
             let time = table.numbers("t_s").map_or(f64::NAN, |t| t[row]);
             table.cell(row, "t_s", time, what)
         })

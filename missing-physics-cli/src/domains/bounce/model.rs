@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
 
+use super::array::{Microphones, Wrong};
 use super::drop::{Drop, Effects, PER_IMPACT};
 use super::spec::{Places, build};
 use super::weights::{Linear, Spread, Weights};
@@ -22,6 +23,8 @@ pub(super) struct Setup {
     pub(super) dropped: bool,
     /// Runs in which an impact went unheard, and runs.
     pub(super) unheard: [usize; 2],
+    /// Microphones whose places are known.
+    pub(super) microphones: usize,
 }
 
 /// A drop with its weights and the errors that the engine is shown as its data.
@@ -29,6 +32,8 @@ pub(super) struct Setup {
 struct Known {
     weights: Weights,
     shown: Vec<f64>,
+    /// Where each impact was heard, and when by each microphone.
+    arrivals: Vec<([f64; 2], Vec<f64>)>,
 }
 
 /// The model of the domain `bounce`.
@@ -39,13 +44,14 @@ pub(super) struct BounceModel {
     places: Places,
     spread: Spread,
     nominal: Effects,
+    microphones: Microphones,
     drops: HashMap<String, Known>,
 }
 
 impl BounceModel {
-    pub(super) fn new(setup: Setup, nominal: Effects, spread: Spread) -> Self {
+    pub(super) fn new(setup: Setup, nominal: Effects, spread: Spread, microphones: Microphones) -> Self {
         let (builder, places) = build(&setup, nominal.restitution);
-        Self { setup, spec: builder.spec, places, spread, nominal, drops: HashMap::new() }
+        Self { setup, spec: builder.spec, places, spread, microphones, nominal, drops: HashMap::new() }
     }
 
     pub(super) fn setup(&self) -> &Setup {
@@ -76,9 +82,28 @@ impl BounceModel {
         let mut inputs = vec![numbers[first..first + n].to_vec(), speeds];
         // Likely places: their errors, unlike the measured ones', have nothing to do with those of the impacts.
         inputs.extend((0..2).map(|k| places[first..first + n].iter().map(|p| p[k]).collect()));
-        let outputs = (0..PER_IMPACT).map(of).collect();
-        self.drops.insert(label.to_owned(), Known { weights, shown });
+        let mut outputs: Vec<Vec<f64>> = (0..PER_IMPACT).map(of).collect();
+        let arrivals: Vec<([f64; 2], Vec<f64>)> = (first..first + n)
+            .filter_map(|i| Some((*drop.places_m.get(i)?, drop.arrivals_s.get(i)?.clone())))
+            .collect();
+        outputs.extend((0..self.microphones.spare()).map(|k| {
+            // A drop that is only imagined is heard as it should be.
+            let heard = |i: usize| {
+                arrivals.get(i).map_or(0.0, |(p, t)| self.microphones.misfit(*p, t, &Wrong::default())[k])
+            };
+            (0..n).map(heard).collect::<Vec<f64>>()
+        }));
+        self.drops.insert(label.to_owned(), Known { weights, shown, arrivals });
         Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
+    }
+
+    fn wrong(&self, shared: &[f64]) -> Wrong {
+        let p = &self.places;
+        let scale = p.position.map_or(0.0, |at| shared[at.slot]);
+        let Some([x, y, which]) = p.microphone else { return Wrong { scale, ..Wrong::default() } };
+        let which = shared[which.slot];
+        let microphone = (which >= 0.0).then_some(which as usize);
+        Wrong { microphone, offset_m: [shared[x.slot], shared[y.slot]], scale }
     }
 
     fn effects(&self, shared: &[f64]) -> Effects {
@@ -104,6 +129,15 @@ impl Model for BounceModel {
         &self.spec
     }
 
+    fn starts(&self, mechanism: usize, _runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
+        match self.places.microphone {
+            Some([.., which]) if self.spec.mechanisms[mechanism].places.contains(&which.index) => {
+                (0..self.setup.microphones).map(|k| vec![(which.index, k as f64)]).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
     fn prediction_is_clean(&self) -> bool {
         false
     }
@@ -121,7 +155,17 @@ impl Model for BounceModel {
             .errors(&self.effects(shared))
             .ok_or_else(|| wrong("the covariance of its errors has no root"))?;
         let n = run.len();
-        for (channel, values) in out.chunks_exact_mut(n.max(1)).enumerate() {
+        let (impacts, heard) = out.split_at_mut(PER_IMPACT * n);
+        let wrong = self.wrong(shared);
+        let listened = if heard.is_empty() { &[][..] } else { &known.arrivals[..] };
+        for (i, (place, arrivals)) in listened.iter().enumerate() {
+            let right = self.microphones.misfit(*place, arrivals, &Wrong::default());
+            let now = self.microphones.misfit(*place, arrivals, &wrong);
+            for (k, (right, now)) in right.iter().zip(&now).enumerate() {
+                heard[k * n + i] = right - now;
+            }
+        }
+        for (channel, values) in impacts.chunks_exact_mut(n.max(1)).enumerate() {
             for (impact, value) in values.iter_mut().enumerate() {
                 let at = known.weights.linear.drop.row(impact, channel);
                 *value = known.shown[at] - errors[at];

@@ -71,6 +71,7 @@ pub(super) fn heard(table: &Table, rig: &Rig) -> Result<Vec<Heard>, ReadError> {
             height_m: rig.drop_height_m,
             came: [0.0; 2],
             usual: [0.0; 2],
+            arrivals_s: Vec::new(),
             unheard: known.clone(),
             known,
         };

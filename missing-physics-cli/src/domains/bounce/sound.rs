@@ -3,14 +3,15 @@
 use bounce_audio::hear::{HearSettings, hear, hear_times};
 use bounce_audio::wav::Sound;
 
+use super::array::Microphones;
 use super::drop::Drop;
 use super::read::{Heard, Rig};
 use crate::recording::{Header, ReadError, inside};
 
-/// What was heard, and with how many microphones whose places are known.
+/// What was heard, and with which microphones.
 pub(super) struct Listened {
     pub(super) heard: Vec<Heard>,
-    pub(super) microphones: usize,
+    pub(super) microphones: Microphones,
 }
 
 /// Listens to the files of a recording; `None` where it has no sound.
@@ -50,6 +51,7 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
             times_s: impacts.iter().map(|i| i.t_s).collect(),
             places_m: places,
             height_m: rig.drop_height_m,
+            arrivals_s: impacts.iter().map(|i| i.arrivals_s.clone()).collect(),
             unheard: vec![0; impacts.len()],
             known: vec![0; impacts.len()],
             ..Drop::default()
@@ -58,7 +60,8 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
         // Runs are counted from 1, in the order of the files.
         heard.push(Heard { label: (heard.len() + 1).to_string(), row: 0, drop, numbers });
     }
-    Ok(Some(Listened { heard, microphones: microphones.map_or(0, |m| m.len()) }))
+    let microphones = Microphones { places_m: microphones.unwrap_or_default(), speed_of_sound_m_s: speed };
+    Ok(Some(Listened { heard, microphones }))
 }
 
 /// The impacts, as they were heard.

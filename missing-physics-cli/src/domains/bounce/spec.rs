@@ -18,6 +18,8 @@ pub(super) struct Places {
     pub(super) clock: Option<At>,
     pub(super) position: Option<At>,
     pub(super) unheard: Option<At>,
+    /// Offsets along x and y of a microphone, and which it is.
+    pub(super) microphone: Option<[At; 3]>,
     /// Candidate terms of an unknown law: linear in x and y, and in the speed squared.
     pub(super) terms: Option<[At; 2]>,
     pub(super) squared: At,
@@ -64,6 +66,9 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
             &["clock-rate", "table-tilt"],
         );
         p.position = Some(scale);
+    }
+    if setup.placed && setup.microphones > 3 {
+        microphone(&mut b, &mut p, setup.microphones);
     }
     let [missed, runs] = setup.unheard;
     if missed > 0 {
@@ -168,6 +173,29 @@ fn table(b: &mut Builder, p: &mut Places) {
         &["table-tilt"],
     );
     p.friction = Some(friction);
+}
+
+fn microphone(b: &mut Builder, p: &mut Places, count: usize) {
+    let [x, y] = ["offset_x_m", "offset_y_m"].map(|name| b.shared(name, "m", 0.0, [-0.3, 0.3], 0.005));
+    let which = b.shared("microphone", "", -1.0, [-1.0, count as f64 - 1.0], 1.0);
+    let mechanism = b.mechanism(
+        "microphone-offset",
+        &[x, y, which],
+        [
+            "a microphone that stands elsewhere",
+            "One microphone is not where it is stated to be.",
+            "true place = stated place + offset (microphones counted from 0)",
+            "Plinge et al. 2016, doi:10.1109/MSP.2016.2555198",
+        ],
+        &["position-scale"],
+    );
+    mechanism.places = vec![which.index];
+    mechanism.derived.push(Derived {
+        name: "offset_m".into(),
+        unit: "m".into(),
+        value: Arc::new(move |shared| shared[x.slot].hypot(shared[y.slot])),
+    });
+    p.microphone = Some([x, y, which]);
 }
 
 /// What the logarithm of the restitution could depend on, should no mechanism hold.

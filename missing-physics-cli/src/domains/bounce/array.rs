@@ -1,0 +1,93 @@
+//! What four microphones and more know beyond place and time: whether their arrivals fit together.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Microphones as they are stated.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Microphones {
+    pub(super) places_m: Vec<[f64; 3]>,
+    pub(super) speed_of_sound_m_s: f64,
+}
+
+/// A microphone that stands elsewhere than stated (its index, true less stated along x and y), and by how much the stated speed of
+/// sound is too large, relative to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Wrong {
+    pub(super) microphone: Option<usize>,
+    pub(super) offset_m: [f64; 2],
+    pub(super) scale: f64,
+}
+
+impl Microphones {
+    /// Arrivals that place and time of an impact leave free.
+    pub(super) fn spare(&self) -> usize {
+        self.places_m.len().saturating_sub(3)
+    }
+
+    fn distances(&self, place: [f64; 2], wrong: &Wrong) -> DVector<f64> {
+        DVector::from_iterator(
+            self.places_m.len(),
+            self.places_m.iter().enumerate().map(|(k, m)| {
+                let [x, y] = if wrong.microphone == Some(k) { wrong.offset_m } else { [0.0; 2] };
+                let (dx, dy) = (place[0] - m[0] - x, place[1] - m[1] - y);
+                (dx * dx + dy * dy + m[2] * m[2]).sqrt()
+            }),
+        )
+    }
+
+    /// Combinations of arrivals, one a column, that do not change with place and time of an impact near a place.
+    fn free(&self, place: [f64; 2]) -> DMatrix<f64> {
+        let distances = self.distances(place, &Wrong::default());
+        let design = DMatrix::from_fn(self.places_m.len(), 3, |k, j| match j {
+            0 => 1.0,
+            _ => (place[j - 1] - self.places_m[k][j - 1]) / distances[k],
+        });
+        let eigen = SymmetricEigen::new(&design * design.transpose());
+        let mut order: Vec<usize> = (0..self.places_m.len()).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let columns: Vec<DVector<f64>> = order[..self.spare()]
+            .iter()
+            .map(|&k| {
+                let column = eigen.eigenvectors.column(k).into_owned();
+                // One sign, that neighbouring places agree.
+                let sign = if column[0] < 0.0 { -1.0 } else { 1.0 };
+                column * sign
+            })
+            .collect();
+        DMatrix::from_columns(&columns)
+    }
+
+    /// What arrivals (s) keep of their own after place and time, less what a wrong array would make of them.
+    pub(super) fn misfit(&self, place: [f64; 2], arrivals_s: &[f64], wrong: &Wrong) -> Vec<f64> {
+        let first = arrivals_s.first().copied().unwrap_or_default();
+        let arrivals = DVector::from_iterator(arrivals_s.len(), arrivals_s.iter().map(|t| t - first));
+        let travel = self.distances(place, wrong) * ((1.0 + wrong.scale) / self.speed_of_sound_m_s);
+        self.free(place).tr_mul(&(arrivals - travel)).as_slice().to_vec()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn place_and_time_leave_no_trace_and_a_wrong_microphone_does() {
+        let microphones = Microphones {
+            places_m: vec![[0.0, 0.0, 0.07], [0.55, 0.0, 0.07], [0.55, 0.55, 0.07], [0.0, 0.55, 0.07]],
+            speed_of_sound_m_s: 340.0,
+        };
+        let wrong = Wrong { microphone: Some(2), offset_m: [0.01, -0.005], scale: 0.0 };
+        let heard = |place: [f64; 2], wrong: &Wrong| -> Vec<f64> {
+            microphones.distances(place, wrong).iter().map(|d| 0.3 + d / 340.0).collect()
+        };
+        let place = [0.2, 0.3];
+        let none = Wrong::default();
+        let right = heard(place, &none);
+        assert!(microphones.misfit(place, &right, &none)[0].abs() < 1e-15);
+        // A place that is a little off changes nothing to first order.
+        assert!(microphones.misfit([0.201, 0.3], &right, &none)[0].abs() < 2e-8);
+        let moved = heard(place, &wrong);
+        assert!(microphones.misfit(place, &moved, &none)[0].abs() > 3e-6);
+        assert!(microphones.misfit(place, &moved, &wrong)[0].abs() < 1e-15);
+    }
+}
