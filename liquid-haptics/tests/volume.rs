@@ -142,6 +142,27 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!(errors[errors.len() / 2] < 2e-6, "{}", errors[errors.len() / 2]);
 }
 
+/// The estimated noise is right on average, however few the poses: its degrees of freedom count volume and mass.
+#[test]
+fn the_noise_is_estimated_without_bias() {
+    const SWEEPS: usize = 400;
+    let bottle = bottle();
+    let mass = 1000.0 * 0.4 * CAVITY.capacity();
+    let clean = sweep(&[0.5, 1.0, 1.5, 2.0, 2.5], mass, 0.4);
+    let mut rng = ChaCha8Rng::seed_from_u64(23);
+    // A mass that is exact, one that the torques know better than the forces do, and a density.
+    let loose = Liquid::Mass { mass_kg: mass, error_kg: 0.2 };
+    for (liquid, freedom) in [(exact(mass), 4.0), (loose, 3.0), (Liquid::Density(1000.0), 4.0)] {
+        let fit = fit(&bottle, liquid, None);
+        let sum: f64 =
+            (0..SWEEPS).map(|_| fit.estimate(&noisy(&clean, &mut rng)).unwrap().sigma_nm.powi(2)).sum();
+        let ratio = sum / SWEEPS as f64 / (SIGMA_NM * SIGMA_NM);
+        println!("variance over the true one: {ratio:.3}");
+        // Three standard errors of a mean of chi-square over its degrees of freedom: 0.11 to 0.12.
+        assert!((ratio - 1.0).abs() < 3.0 * (2.0 / freedom / SWEEPS as f64).sqrt(), "{liquid:?}: {ratio}");
+    }
+}
+
 /// The thesis's trap: no liquid weighs nothing wherever it lies, so that every volume explains the torque; it is empty.
 #[test]
 fn nothing_inside_is_empty() {
