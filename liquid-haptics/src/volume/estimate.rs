@@ -55,12 +55,12 @@ impl VolumeFit<'_> {
         let mass = self.mass(&profile, sigma_nm);
         let quantile = quantile(freedom).powi(2);
         let (valleys, deepest) = grid.valleys(mass, quantile * sigma_nm * sigma_nm)?;
-        let misfit_p = match freedom {
-            None if poses.len() > 1 => {
-                let chi_square = deepest.misfit / (sigma_nm * sigma_nm);
-                ChiSquared::new((poses.len() - 1) as f64).ok().map(|d| d.sf(chi_square))
-            }
-            _ => None,
+        let checks = poses.len() - 1 + usize::from(matches!(self.liquid, Liquid::MassAndDensity { .. }));
+        let misfit_p = if freedom.is_none() && checks > 0 {
+            let chi_square = deepest.misfit / (sigma_nm * sigma_nm);
+            ChiSquared::new(checks as f64).ok().map(|d| d.sf(chi_square))
+        } else {
+            None
         };
         let misfits = misfit_p.is_some_and(|p| p < MISFIT_P);
         let verdict = if misfits { Verdict::Misfit } else { self.verdict(poses, &valleys) };
@@ -87,19 +87,26 @@ impl VolumeFit<'_> {
         checked(poses)?;
         let range = |name, got, expected| Err(VolumeError::Range { name, got, expected });
         match self.liquid {
-            Liquid::Density(got) if !(got > 0.0 && got.is_finite()) => {
+            Liquid::Density(got) | Liquid::MassAndDensity { density_kg_m3: got, .. }
+                if !(got > 0.0 && got.is_finite()) =>
+            {
                 return range("density_kg_m3", got, "above 0");
             }
-            Liquid::Mass { mass_kg, .. } if !mass_kg.is_finite() => {
+            Liquid::Mass { mass_kg, .. } | Liquid::MassAndDensity { mass_kg, .. } if !mass_kg.is_finite() => {
                 return range("mass_kg", mass_kg, "a number");
             }
             Liquid::Mass { error_kg, .. } if !(error_kg >= 0.0 && error_kg.is_finite()) => {
                 return range("error_kg", error_kg, "0 or more");
             }
-            Liquid::Mass { mass_kg, error_kg } if mass_kg < -quantile(None) * error_kg => {
+            Liquid::MassAndDensity { error_kg, .. } if !(error_kg > 0.0 && error_kg.is_finite()) => {
+                return range("error_kg", error_kg, "above 0");
+            }
+            Liquid::Mass { mass_kg, error_kg } | Liquid::MassAndDensity { mass_kg, error_kg, .. }
+                if mass_kg < -quantile(None) * error_kg =>
+            {
                 return Err(VolumeError::NegativeMass { mass_kg, error_kg });
             }
-            Liquid::Mass { .. } | Liquid::Density(_) => {}
+            Liquid::Mass { .. } | Liquid::Density(_) | Liquid::MassAndDensity { .. } => {}
         }
         if !(self.widest_share > 0.0 && self.widest_share <= 1.0) {
             return range("widest_share", self.widest_share, "above 0, at most 1");
@@ -121,7 +128,9 @@ impl VolumeFit<'_> {
         let mut freedom = profile.poses() as f64 - 1.0;
         let mut mass = match self.liquid {
             Liquid::Mass { mass_kg, .. } => Mass::Exact(mass_kg),
-            Liquid::Density(_) => self.mass(profile, sigma),
+            Liquid::Density(density) => Mass::Share(density * profile.capacity_m3()),
+            // To begin with the mass alone says which of the volumes it is.
+            Liquid::MassAndDensity { .. } => self.mass(profile, sigma),
         };
         for _ in 0..NOISE_ROUNDS {
             let (share, _) = grid.best(mass)?;
@@ -134,7 +143,7 @@ impl VolumeFit<'_> {
             freedom = profile.poses() as f64 - 1.0 - from_torques;
             sigma = (profile.squares(&levers, share, mass).0 / freedom).sqrt().max(least);
             match self.mass(profile, sigma) {
-                prior @ Mass::Prior(..) => mass = prior,
+                prior @ (Mass::Prior(..) | Mass::ShareAndPrior(..)) => mass = prior,
                 // Without a prior there is nothing to settle.
                 Mass::Exact(_) | Mass::Share(_) => break,
             }
@@ -163,11 +172,13 @@ impl VolumeFit<'_> {
         let (low, high) = poses.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| {
             (low.min(p.tilt_rad), high.max(p.tilt_rad))
         });
+        // The mass checks the torque, then.
+        let both = matches!(self.liquid, Liquid::MassAndDensity { .. });
         match valleys {
             _ if wide => open(Cause::Flat),
-            _ if high - low < ALIKE_RAD => open(Cause::AlikePoses),
+            _ if high - low < ALIKE_RAD && !both => open(Cause::AlikePoses),
             [valley] if valley.reach[0] <= 0.0 => match self.liquid {
-                Liquid::Density(_) => Verdict::Empty,
+                Liquid::Density(_) | Liquid::MassAndDensity { .. } => Verdict::Empty,
                 Liquid::Mass { .. } => Verdict::Determined,
             },
             [valley] if valley.reach[1] >= 1.0 => Verdict::Full,

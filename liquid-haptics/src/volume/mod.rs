@@ -38,7 +38,19 @@ pub enum Liquid {
         error_kg: f64,
     },
     /// Its density is known, kg/m^3.
+    ///
+    /// This leaves twins: gripped at half its height, a cylinder's torque is the same at every tilt with a volume of liquid as with
+    /// all but that volume.
     Density(f64),
+    /// Both are known.
+    MassAndDensity {
+        /// The mass, kg.
+        mass_kg: f64,
+        /// Its standard error, kg, above 0.
+        error_kg: f64,
+        /// The density, kg/m^3; taken as exact.
+        density_kg_m3: f64,
+    },
 }
 
 impl From<&MassEstimate> for Liquid {
@@ -99,7 +111,7 @@ pub struct VolumeEstimate {
     pub mass_kg: f64,
     /// The torque's noise, given or estimated, N m.
     pub sigma_nm: f64,
-    /// The chance of a misfit as large as this one; none where the noise was estimated or there is but one pose.
+    /// The chance of a misfit as large as this one; none where the noise was estimated or nothing is left to check it.
     pub misfit_p: Option<f64>,
     /// What the poses say.
     pub verdict: Verdict,

@@ -16,6 +16,9 @@ pub struct NextTilt {
     pub tilt_rad: f64,
     /// The standard error of the volume that is expected with one more pose there, m^3.
     pub expected_error_m3: f64,
+    /// Where separate volumes explain the poses so far: by how many standard deviations of the noise their torques differ there; a
+    /// small number says that no tilt tells them apart.
+    pub separation: Option<f64>,
 }
 
 /// Information (per unit of share and kilogram) about share and mass.
@@ -87,10 +90,12 @@ impl VolumeFit<'_> {
             }
             let gap = gap(&profile, tilt_rad, &separate, mass, estimate.mass_kg)?;
             // First what tells volumes apart, as far as that counts, then the variance.
-            let worth = [(gap / estimate.sigma_nm).min(DECISIVE), -variance];
+            let gap = gap / estimate.sigma_nm;
+            let worth = [gap.min(DECISIVE), -variance];
             if best.is_none_or(|(most, _)| worth > most) {
                 let expected_error_m3 = variance.sqrt() * capacity;
-                best = Some((worth, NextTilt { tilt_rad, expected_error_m3 }));
+                let separation = (!separate.is_empty()).then_some(gap);
+                best = Some((worth, NextTilt { tilt_rad, expected_error_m3, separation }));
             }
         }
         // No better than a volume that might be anything.
@@ -116,6 +121,9 @@ impl VolumeFit<'_> {
         {
             sum.mass = error_kg.powi(-2);
         }
+        if let Liquid::MassAndDensity { error_kg, density_kg_m3, .. } = self.liquid {
+            sum.share = (density_kg_m3 * profile.capacity_m3() / error_kg).powi(2);
+        }
         for pose in poses {
             let (by_share, by_mass) = slopes(profile, pose.tilt_rad, share, mass, estimate.mass_kg)?;
             sum = sum.with(by_share, by_mass, estimate.sigma_nm.powi(-2));
@@ -125,7 +133,7 @@ impl VolumeFit<'_> {
 }
 
 fn mass_at(share: f64, mass: Mass, best: f64) -> f64 {
-    if let Mass::Share(full) = mass { share * full } else { best }
+    if let Mass::Share(full) | Mass::ShareAndPrior(full, ..) = mass { share * full } else { best }
 }
 
 /// Derivatives of the torque by the share (N m) and by a mass that is not exact (N m / kg).

@@ -13,6 +13,8 @@ pub(super) enum Mass {
     Prior(f64, f64),
     /// The capacity's mass, kg, times the share of it that is filled.
     Share(f64),
+    /// That (the capacity's mass first), with a prior as above.
+    ShareAndPrior(f64, f64, f64),
 }
 
 impl Mass {
@@ -24,6 +26,9 @@ impl Mass {
             }
             Liquid::Mass { mass_kg, .. } => Self::Exact(mass_kg),
             Liquid::Density(density) => Self::Share(density * capacity_m3),
+            Liquid::MassAndDensity { mass_kg, error_kg, density_kg_m3 } => {
+                Self::ShareAndPrior(density_kg_m3 * capacity_m3, mass_kg, (sigma_nm / error_kg).powi(2))
+            }
         }
     }
 }
@@ -94,7 +99,7 @@ impl<'a> Profile<'a> {
     pub(super) fn mass(&self, levers: &[f64], share: f64, mass: Mass) -> f64 {
         match mass {
             Mass::Exact(mass) => mass,
-            Mass::Share(full) => share * full,
+            Mass::Share(full) | Mass::ShareAndPrior(full, ..) => share * full,
             Mass::Prior(prior, weight) => {
                 let (mut top, mut bottom) = (weight * prior, weight);
                 for (lever, excess) in levers.iter().zip(&self.excess) {
@@ -111,7 +116,9 @@ impl<'a> Profile<'a> {
         let best = self.mass(levers, share, mass);
         let poses = levers.iter().zip(&self.excess).map(|(b, d)| (d - best * b).powi(2)).sum();
         let prior = match mass {
-            Mass::Prior(prior, weight) => weight * (best - prior).powi(2),
+            Mass::Prior(prior, weight) | Mass::ShareAndPrior(_, prior, weight) => {
+                weight * (best - prior).powi(2)
+            }
             Mass::Exact(_) | Mass::Share(_) => 0.0,
         };
         (poses, prior)
