@@ -1,7 +1,8 @@
 //! Settled poses, simulated by quadrature.
-#![allow(dead_code, reason = "not every test needs all")]
+#![allow(dead_code, clippy::unwrap_used, reason = "not every test needs all; a test stops where it fails")]
 
-use liquid_haptics::volume::Pose;
+use liquid_haptics::container::Cylinder;
+use liquid_haptics::volume::{Liquid, Pose, VolumeEstimate, VolumeFit};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -62,4 +63,21 @@ pub(crate) fn noisy(poses: &[Pose], rng: &mut ChaCha8Rng) -> Vec<Pose> {
         wrench.tau_z_nm += draw(SIGMA_NM);
     }
     out
+}
+
+pub(crate) fn bottle() -> Cylinder {
+    Cylinder::new(0.040, 0.160, 0.001).unwrap()
+}
+
+pub(crate) fn fit<'a>(container: &'a Cylinder, liquid: Liquid, sigma_nm: Option<f64>) -> VolumeFit<'a> {
+    VolumeFit { container, grasp: GRASP, departures: NONE, liquid, sigma_nm, widest_share: 0.5 }
+}
+
+pub(crate) fn exact(mass_kg: f64) -> Liquid {
+    Liquid::Mass { mass_kg, error_kg: 0.0 }
+}
+
+pub(crate) fn holds(estimate: &VolumeEstimate, truth: f64) -> bool {
+    let [low, high] = estimate.interval_m3;
+    low <= truth && truth <= high
 }
