@@ -1,4 +1,7 @@
 #![doc = include_str!("../README.md")]
 pub mod container;
+pub mod pour;
+mod root;
 pub mod slosh;
+pub mod volume;
 pub mod wrench;

@@ -45,6 +45,11 @@ impl Cylinder {
         self.length_m - 2.0 * self.wall_m
     }
 
+    /// Thickness of wall, base and lid, m.
+    pub fn wall_m(&self) -> f64 {
+        self.wall_m
+    }
+
     /// Liquid in the cavity at a tilt of sine and cosine, the former not negative: where the centre of mass lies sideways
     /// (towards the lower wall) and along the axis from the cavity's bottom, and the surface's height above the point of the
     /// axis at that bottom. All in m.
