@@ -9,7 +9,7 @@ use crate::container::ContainerError;
 use crate::root::root;
 
 /// Cells of the grid; narrower towards empty and full, where the torque changes fastest.
-const CELLS: usize = 32;
+const CELLS: usize = 64;
 /// To which a minimum is found, as a share of the capacity.
 const MINIMUM_TOLERANCE: f64 = 1e-9;
 /// To which an end of an interval is found, likewise.
@@ -64,8 +64,14 @@ impl<'a> Grid<'a> {
         self.shares.iter().zip(&self.levers).map(sum).collect()
     }
 
-    fn refine(&self, at: usize, misfits: &[f64], mass: Mass) -> Result<(f64, f64), VolumeError> {
-        let (low, high) = (self.shares[at.saturating_sub(1)], self.shares[(at + 1).min(CELLS)]);
+    fn refine(
+        &self,
+        at: usize,
+        [from, to]: [usize; 2],
+        misfits: &[f64],
+        mass: Mass,
+    ) -> Result<(f64, f64), VolumeError> {
+        let (low, high) = (self.shares[from], self.shares[to]);
         let solver = BrentOpt::new(low, high).set_tolerance(f64::EPSILON.sqrt(), MINIMUM_TOLERANCE);
         let slice = Slice { profile: self.profile, mass };
         let found = Executor::new(slice, solver).configure(|state| state.max_iters(100)).run();
@@ -86,7 +92,7 @@ impl<'a> Grid<'a> {
     pub(super) fn best(&self, mass: Mass) -> Result<(f64, f64), VolumeError> {
         let misfits = self.misfits(mass);
         let at = (0..=CELLS).min_by(|a, b| misfits[*a].total_cmp(&misfits[*b])).unwrap_or(0);
-        self.refine(at, &misfits, mass)
+        self.refine(at, [at.saturating_sub(1), (at + 1).min(CELLS)], &misfits, mass)
     }
 
     /// All valleys that come within `level` (N m)^2 of the least misfit, rising, and which is the deepest.
@@ -97,7 +103,12 @@ impl<'a> Grid<'a> {
             let falls = k == 0 || *here < misfits[k - 1];
             let rises = k == CELLS || *here <= misfits[k + 1];
             if falls && rises {
-                minima.push(self.refine(k, &misfits, mass)?);
+                // Twins that are about to meet may lie to either side of the point.
+                for cell in [[k.saturating_sub(1), k], [k, (k + 1).min(CELLS)]] {
+                    if cell[0] < cell[1] {
+                        minima.push(self.refine(k, cell, &misfits, mass)?);
+                    }
+                }
             }
         }
         let least = minima.iter().map(|m| m.1).fold(f64::INFINITY, f64::min);
