@@ -80,10 +80,7 @@ fn placed(
         terms: [0.0; 3],
     };
     let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
-    // A tilted table, or a hand, may send all of them one way.
-    let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.first_heading(&nominal)).collect();
-    let usual = [0, 1].map(|k| headings.iter().map(|h| h[k]).sum::<f64>() / headings.len().max(1) as f64);
-    drops.iter_mut().for_each(|d| d.usual = usual);
+    expect_first(&mut drops, &nominal);
     let senseless = |h: &Heard| {
         let label = crate::recording::quoted(&h.label);
         (h.row, format!("times and places of a bouncing ball in run {label}"))
@@ -127,6 +124,34 @@ fn placed(
     }
     let experiments = experiments(&mut model);
     Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
+}
+
+/// Where balls are expected to head first. A tilted table, or a hand, may send all of them one way; and a ball that was let go
+/// above one point heads the further out the further out it lands.
+fn expect_first(drops: &mut [Drop], nominal: &Effects) {
+    /// Fewer drops say nothing of it.
+    const FEWEST: usize = 5;
+    let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.first_heading(nominal)).collect();
+    let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
+    let mean =
+        |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);
+    let (usual, middle) = (mean(&headings), mean(&places));
+    let (mut together, mut square) = (0.0, 0.0);
+    for (heading, place) in headings.iter().zip(&places) {
+        for k in 0..2 {
+            together += (heading[k] - usual[k]) * (place[k] - middle[k]);
+            square += (place[k] - middle[k]).powi(2);
+        }
+    }
+    let slope = if drops.len() >= FEWEST && square > 0.0 { together / square } else { 0.0 };
+    for (drop, place) in drops.iter_mut().zip(&places) {
+        let outwards = [0, 1].map(|k| slope * (place[k] - middle[k]));
+        if drop.height_m.is_some() {
+            drop.came = outwards;
+        } else {
+            drop.usual = [usual[0] + outwards[0], usual[1] + outwards[1]];
+        }
+    }
 }
 
 const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
