@@ -10,10 +10,12 @@ use super::{
 pub(crate) struct History {
     /// Tangential spring's force in N.
     pub(crate) shear: V3,
-    /// s at the step before; 0 where there is no contact.
+    /// s at the step before; 0 for a contact that begins.
     pub(crate) size: f64,
     /// Rolling spring's couple in N m.
     pub(crate) couple: V3,
+    /// The round of forces in which the contact last was.
+    pub(crate) round: u64,
 }
 
 /// What two bodies are together, worked out when they become neighbours.
@@ -52,6 +54,8 @@ pub(crate) struct Touch {
     pub(crate) normal: V3,
     /// Overlap in m, positive.
     pub(crate) overlap: f64,
+    /// s and q of [`sizes`].
+    pub(crate) sizes: (f64, f64),
     /// Velocity of the first centre less that of the second, m/s.
     pub(crate) velocity: V3,
     /// Sum of angular velocities times the distances from centre to contact, m/s.
@@ -71,6 +75,17 @@ pub(crate) struct Reaction {
     pub(crate) couple: V3,
 }
 
+/// `s = sqrt(R* delta)` and `q = sqrt(s)` for Hertz, 1 and 1 for the linear law.
+#[inline(always)]
+pub(crate) fn sizes(hertz: bool, radius: f64, overlap: f64) -> (f64, f64) {
+    if hertz {
+        let s = (radius * overlap).sqrt();
+        (s, s.sqrt())
+    } else {
+        (1.0, 1.0)
+    }
+}
+
 /// Forces of a contact, its history moved on by one step.
 ///
 /// The tangential spring holds its force, which falls with the stiffness while the contact unloads: kept as a displacement it
@@ -79,36 +94,28 @@ pub(crate) struct Reaction {
 #[inline(always)]
 pub(crate) fn react(f: &Factors, pair: &Pair, touch: &Touch, history: &mut History, step: f64) -> Reaction {
     let n = touch.normal;
-    let (s, q) = if f.hertz {
-        let s = (pair.radius * touch.overlap).sqrt();
-        (s, s.sqrt())
-    } else {
-        (1.0, 1.0)
-    };
+    let (s, q) = touch.sizes;
     let damping = q * pair.root_mass;
     let approach = dot(touch.velocity, n);
     let pressed = f.elastic * s * touch.overlap - f.damping_n * damping * approach;
     let held = pressed.max(0.0);
 
-    if s < history.size {
-        let less = s / history.size;
-        history.shear = scale(history.shear, less);
-        history.couple = scale(history.couple, less);
-    }
+    // A contact that begins has size 0 and springs at 0.
+    let less = (s / history.size).min(1.0);
+    let before = along(scale(history.shear, less), -less * dot(history.shear, n), n);
     history.size = s;
 
     let stiffness = f.shear * s;
     let slip = sub(along(touch.velocity, -approach, n), cross(touch.surface, n));
-    let shear = along(history.shear, -dot(history.shear, n), n);
-    let (shear, tangential) =
-        spring(along(shear, -stiffness * step, slip), f.damping_t * damping, slip, f.friction * held);
-    history.shear = shear;
+    let trial = along(before, -stiffness * step, slip);
+    let tangential;
+    (history.shear, tangential) = spring(trial, f.damping_t * damping, slip, f.friction * held);
 
     let mut couple = [0.0; 3];
     if f.rolling > 0.0 {
         let rate = stiffness * step * pair.radius * pair.radius;
         let dashpot = f.damping_r * q * pair.radius * pair.root_inertia;
-        let trial = along(history.couple, -rate, touch.rotation);
+        let trial = along(scale(history.couple, less), -rate, touch.rotation);
         (history.couple, couple) = spring(trial, dashpot, touch.rotation, f.rolling * pair.radius * held);
     }
     Reaction {

@@ -5,6 +5,7 @@ mod contact;
 mod energy;
 mod error;
 mod fill;
+mod forces;
 mod grains;
 mod heap;
 mod material;

@@ -2,10 +2,9 @@
 
 use super::{
     cells::Cells,
-    contact::{History, Pair, Touch, react},
+    contact::{History, Pair},
     grains::Grains,
-    material::Factors,
-    vector::{V3, add, along, dot, scale, sub},
+    vector::{V3, dot, sub},
 };
 
 /// Margin of a grain at rest over the largest radius.
@@ -37,17 +36,18 @@ pub(crate) struct Neighbours {
     /// Where each grain was when the list was made, and how far it may go from there.
     reference: Vec<V3>,
     pub(crate) margin: Vec<f64>,
-    list: List,
+    pub(crate) list: List,
     before: List,
     found: Vec<[u32; 2]>,
 }
 
+/// Rows of neighbours, one after another.
 #[derive(Debug, Clone)]
-struct List {
+pub(crate) struct List {
     start: Vec<u32>,
-    other: Vec<u32>,
-    pair: Vec<Pair>,
-    history: Vec<History>,
+    pub(crate) other: Vec<u32>,
+    pub(crate) pair: Vec<Pair>,
+    pub(crate) history: Vec<History>,
 }
 
 impl List {
@@ -61,7 +61,7 @@ impl List {
         }
     }
 
-    fn row(&self, grain: usize) -> std::ops::Range<usize> {
+    pub(crate) fn row(&self, grain: usize) -> std::ops::Range<usize> {
         self.start[grain] as usize..self.start[grain + 1] as usize
     }
 }
@@ -177,67 +177,6 @@ impl Neighbours {
                 }
             }
         }
-    }
-
-    /// Adds the forces between grains; returns how many pairs touch.
-    pub(crate) fn react(&mut self, grains: &mut Grains, factors: &Factors, step: f64) -> u64 {
-        if factors.hertz {
-            self.react_as(grains, &Factors { hertz: true, ..*factors }, step)
-        } else {
-            self.react_as(grains, &Factors { hertz: false, ..*factors }, step)
-        }
-    }
-
-    #[inline(always)]
-    fn react_as(&mut self, grains: &mut Grains, factors: &Factors, step: f64) -> u64 {
-        let mut touching = 0;
-        let n = grains.len();
-        let (place, motion, load) = (&grains.place[..n], &grains.motion[..n], &mut grains.load[..n]);
-        for i in 0..n {
-            let row = self.list.row(i);
-            let [x, y, z, radius] = place[i];
-            let own = motion[i];
-            let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
-            let others = &self.list.other[row.clone()];
-            let pairs = &self.list.pair[row.clone()];
-            let histories = &mut self.list.history[row];
-            for ((&j, pair), history) in others.iter().zip(pairs).zip(histories) {
-                let j = j as usize;
-                let p = place[j];
-                let d = sub([x, y, z], [p[0], p[1], p[2]]);
-                let square = dot(d, d);
-                let sum = radius + p[3];
-                if square >= sum * sum {
-                    history.size = 0.0;
-                    continue;
-                }
-                if history.size == 0.0 {
-                    *history = History::default();
-                }
-                touching += 1;
-                let distance = square.sqrt();
-                let overlap = sum - distance;
-                let (lever, lever_j) = (radius - 0.5 * overlap, p[3] - 0.5 * overlap);
-                let other = &motion[j];
-                let touch = Touch {
-                    normal: scale(d, 1.0 / distance),
-                    overlap,
-                    velocity: sub(own.velocity, other.velocity),
-                    surface: along(scale(own.spin, lever), lever_j, other.spin),
-                    rotation: sub(own.spin, other.spin),
-                };
-                let r = react(factors, pair, &touch, history, step);
-                force = add(force, r.force);
-                torque = add(along(torque, -lever, r.turn), r.couple);
-                let to = &mut load[j];
-                to.force = sub(to.force, r.force);
-                to.torque = sub(along(to.torque, -lever_j, r.turn), r.couple);
-            }
-            let to = &mut load[i];
-            to.force = add(to.force, force);
-            to.torque = add(to.torque, torque);
-        }
-        touching
     }
 
     /// How many pairs are listed.

@@ -3,6 +3,7 @@
 use super::{
     energy::{Energy, energy, kinetic},
     error::{DemError, finite, positive, within},
+    forces::Forces,
     grains::{Grains, Load},
     material::{Coefficients, Factors, Law, stable_step_s},
     neighbours::{Counters, Neighbours},
@@ -63,6 +64,7 @@ pub struct Simulation {
     factors: Factors,
     grains: Grains,
     neighbours: Neighbours,
+    forces: Forces,
     walls: Walls,
     counters: Counters,
     fresh: bool,
@@ -103,6 +105,7 @@ impl Simulation {
             steps: 0,
             factors: setup.law.factors(&setup.grains),
             neighbours: Neighbours::new(&grains),
+            forces: Forces::default(),
             walls: Walls::new(&shapes, factors, n),
             grains,
             counters: Counters::default(),
@@ -210,7 +213,7 @@ impl Simulation {
             }
             *load = Load { force: scale(acceleration, *mass), torque: [0.0; 3] };
         }
-        self.counters.contacts += self.neighbours.react(&mut self.grains, &self.factors, self.step);
+        self.counters.contacts += self.forces.react(&mut self.neighbours, &mut self.grains, &self.factors, self.step);
         self.counters.pairs += self.neighbours.len() as u64;
         self.walls.react(&mut self.grains, self.step);
     }

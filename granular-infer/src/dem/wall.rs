@@ -1,7 +1,7 @@
 //! Walls: planes, cone frustums, tubes; the contacts of grains with them.
 
 use super::{
-    contact::{History, Pair, Touch, react},
+    contact::{History, Pair, Touch, react, sizes},
     error::{DemError, finite, positive, within},
     grains::Grains,
     material::{Coefficients, Factors},
@@ -268,14 +268,16 @@ impl Walls {
                 }
             };
             let motion = &grains.motion[g];
+            let factors = &self.factors[near.wall as usize];
             let touch = Touch {
                 normal,
                 overlap: radius - distance,
+                sizes: sizes(factors.hertz, radius, radius - distance),
                 velocity: motion.velocity,
                 surface: scale(motion.spin, distance),
                 rotation: motion.spin,
             };
-            let r = react(&self.factors[near.wall as usize], &near.pair, &touch, &mut near.history, step);
+            let r = react(factors, &near.pair, &touch, &mut near.history, step);
             let load = &mut grains.load[g];
             load.force = along(load.force, 1.0, r.force);
             load.torque = sub(along(load.torque, -distance, r.turn), scale(r.couple, -1.0));
