@@ -1,10 +1,12 @@
 //! Cells for finding neighbours, wrapped around so that grains may be anywhere.
 
+use std::ops::Range;
+
 /// A cubic grid of cells, its counts a power of two along each axis; cells a whole grid apart are one.
 #[derive(Debug, Clone)]
 pub(crate) struct Cells {
     bits: u32,
-    edge: f64,
+    per_edge: f64,
     start: Vec<u32>,
     entries: Vec<u32>,
     cell: Vec<u32>,
@@ -21,7 +23,7 @@ impl Cells {
         };
         Self {
             bits,
-            edge,
+            per_edge: 1.0 / edge,
             start: vec![0; (1 << (3 * bits)) + 1],
             entries: vec![0; grains],
             cell: vec![0; grains],
@@ -36,7 +38,10 @@ impl Cells {
     /// The cell's number along one axis, before wrapping.
     #[inline(always)]
     pub(crate) fn along(&self, x: f64) -> i64 {
-        (x / self.edge).floor() as i64
+        // Rounded down, without a call: what is below zero and not whole was cut towards zero.
+        let scaled = x * self.per_edge;
+        let cut = scaled as i64;
+        cut - i64::from(scaled < cut as f64)
     }
 
     /// The index of a cell.
@@ -47,10 +52,22 @@ impl Cells {
         ((z << (2 * self.bits)) | (y << self.bits) | x) as usize
     }
 
-    /// The grains in a cell.
+    /// Where the grains of a row of cells from `low` to `high` along x are in [`Cells::entries`]: two runs, as the row wraps.
     #[inline(always)]
-    pub(crate) fn members(&self, cell: usize) -> &[u32] {
-        &self.entries[self.start[cell] as usize..self.start[cell + 1] as usize]
+    pub(crate) fn runs(&self, low: i64, high: i64, y: i64, z: i64) -> [Range<usize>; 2] {
+        let (first, last) = (self.index([low, y, z]), self.index([high, y, z]));
+        let at = |cell: usize| self.start[cell] as usize;
+        if first <= last {
+            [at(first)..at(last + 1), 0..0]
+        } else {
+            let row = self.index([0, y, z]);
+            [at(row)..at(last + 1), at(first)..at(row + (1 << self.bits))]
+        }
+    }
+
+    /// The grains, cell by cell.
+    pub(crate) fn entries(&self) -> &[u32] {
+        &self.entries
     }
 
     /// Sorts the grains into cells; within a cell they keep their order.

@@ -39,6 +39,8 @@ pub(crate) struct Neighbours {
     pub(crate) list: List,
     before: List,
     found: Vec<[u32; 2]>,
+    /// Places cell by cell, each with the radius and margin.
+    sorted: Vec<[f64; 4]>,
 }
 
 /// Rows of neighbours, one after another.
@@ -77,6 +79,7 @@ impl Neighbours {
             margin: vec![0.0; n],
             list: List::new(n),
             before: List::new(n),
+            sorted: Vec::with_capacity(n),
             found: Vec::with_capacity(12 * n),
         }
     }
@@ -151,26 +154,29 @@ impl Neighbours {
     fn find(&mut self, grains: &Grains) {
         self.found.clear();
         let cells = &self.cells;
-        for i in 0..grains.len() {
-            let [x, y, z, radius] = grains.place[i];
-            let margin = self.margin[i];
-            let reach = radius + self.largest + 2.0 * margin;
-            let range = |c: f64| cells.along(c - reach)..=cells.along(c + reach);
-            for cz in range(z) {
-                for cy in range(y) {
-                    for cx in range(x) {
-                        for &j in cells.members(cells.index([cx, cy, cz])) {
-                            let k = j as usize;
-                            let other = self.margin[k];
-                            if other > margin || (other == margin && k <= i) {
-                                continue;
-                            }
-                            let p = grains.place[k];
+        self.sorted.clear();
+        self.sorted.extend(cells.entries().iter().map(|&j| {
+            let [x, y, z, radius] = grains.place[j as usize];
+            [x, y, z, radius + self.margin[j as usize]]
+        }));
+        for (own, &i) in cells.entries().iter().enumerate() {
+            let [x, y, z, extent] = self.sorted[own];
+            let margin = self.margin[i as usize];
+            let reach = extent + self.largest + margin;
+            let range = |c: f64| (cells.along(c - reach), cells.along(c + reach));
+            let (low, high) = range(x);
+            for cz in range(z).0..=range(z).1 {
+                for cy in range(y).0..=range(y).1 {
+                    for run in cells.runs(low, high, cy, cz) {
+                        for (&j, p) in cells.entries()[run.clone()].iter().zip(&self.sorted[run]) {
                             let d = sub([x, y, z], [p[0], p[1], p[2]]);
-                            let cut = radius + p[3] + margin + other;
+                            let cut = extent + p[3];
+                            // Distance first: it says no most of the time, which is guessed well.
                             if dot(d, d) < cut * cut {
-                                let i = i as u32;
-                                self.found.push([i.min(j), i.max(j)]);
+                                let other = self.margin[j as usize];
+                                if other < margin || (other == margin && j > i) {
+                                    self.found.push([i.min(j), i.max(j)]);
+                                }
                             }
                         }
                     }
