@@ -57,7 +57,9 @@ fn lying(setup: &Setup) -> Simulation {
 }
 
 fn accelerates(mut s: Simulation, setup: &Setup) -> (f64, f64) {
-    let at = |s: &Simulation| (s.time_s(), s.velocities_m_s().next().unwrap()[0], s.spins_rad_s().next().unwrap()[1]);
+    let at = |s: &Simulation| {
+        (s.time_s(), s.velocities_m_s().next().unwrap()[0], s.spins_rad_s().next().unwrap()[1])
+    };
     let a = at(&s);
     s.run((0.2 / setup.step_s) as u64).unwrap();
     let b = at(&s);
@@ -179,14 +181,17 @@ fn energy_is_never_created_in_a_box() {
                 setup.walls.push(Wall { shape: Shape::Plane { point_m, normal }, coefficients: with });
             }
         }
-        let places: Vec<_> = (0..50)
-            .map(|i| [i % 5, i / 5 % 5, i / 25].map(|k| 2.2e-3 + 4.5e-3 * f64::from(k)))
-            .collect();
+        let places: Vec<_> =
+            (0..50).map(|i| [i % 5, i / 5 % 5, i / 25].map(|k| 2.2e-3 + 4.5e-3 * f64::from(k))).collect();
         let mut s = Simulation::new(&setup, &[R; 50], &places).unwrap();
         for i in 0..50 {
             let a = i as f64;
-            s.set_motion(i, [0.8 * (7.0 * a).sin(), 0.8 * (3.0 * a).cos(), 0.5 * (5.0 * a).sin()], [40.0 * a.sin(); 3])
-                .unwrap();
+            s.set_motion(
+                i,
+                [0.8 * (7.0 * a).sin(), 0.8 * (3.0 * a).cos(), 0.5 * (5.0 * a).sin()],
+                [40.0 * a.sin(); 3],
+            )
+            .unwrap();
         }
         let first = s.energy().total_j();
         let mut lowest = first;

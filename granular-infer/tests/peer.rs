@@ -1,5 +1,9 @@
 //! Speed and shape of a pour for which numbers of another simulator are known.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test stops where it fails, and says what it saw")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use granular_infer::dem::{Coefficients, Funnel, Law, Pour, Rest};
 

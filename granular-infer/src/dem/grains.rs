@@ -35,11 +35,8 @@ impl Grains {
     /// Solid spheres at rest.
     pub(crate) fn new(radii: &[f64], positions: &[V3], density: f64, step: f64) -> Self {
         let mass: Vec<f64> = radii.iter().map(|r| 4.0 / 3.0 * PI * r.powi(3) * density).collect();
-        let kick = radii
-            .iter()
-            .zip(&mass)
-            .map(|(r, m)| [0.5 * step / m, 0.5 * step / (0.4 * m * r * r)])
-            .collect();
+        let kick =
+            radii.iter().zip(&mass).map(|(r, m)| [0.5 * step / m, 0.5 * step / (0.4 * m * r * r)]).collect();
         Self {
             place: positions.iter().zip(radii).map(|(p, &r)| [p[0], p[1], p[2], r]).collect(),
             motion: vec![Motion::default(); radii.len()],

@@ -120,7 +120,9 @@ impl Law {
     pub(crate) fn factors(&self, with: &Coefficients) -> Factors {
         let ratio = with.damping_ratio();
         let (hertz, elastic, tangent, shear, damping) = match *self {
-            Self::Linear { stiffness_n_m: k, tangential_ratio } => (false, k, k, k * tangential_ratio, 2.0 * ratio),
+            Self::Linear { stiffness_n_m: k, tangential_ratio } => {
+                (false, k, k, k * tangential_ratio, 2.0 * ratio)
+            }
             Self::Hertz { modulus_pa, poisson_ratio } => {
                 let (e, g) = Self::reduced_moduli(modulus_pa, poisson_ratio);
                 (true, 4.0 / 3.0 * e, 2.0 * e, 8.0 * g, 2.0 * (5.0_f64 / 6.0).sqrt() * ratio)
@@ -160,10 +162,11 @@ pub fn stable_step_s(
         Law::Linear { stiffness_n_m, .. } => 0.1 * PI * (reduced_mass / stiffness_n_m).sqrt(),
         Law::Hertz { modulus_pa, poisson_ratio } => {
             let shear = 0.5 * modulus_pa / (1.0 + poisson_ratio);
-            let rayleigh = PI * smallest_radius_m * (density_kg_m3 / shear).sqrt() / (0.1631 * poisson_ratio + 0.8766);
+            let rayleigh =
+                PI * smallest_radius_m * (density_kg_m3 / shear).sqrt() / (0.1631 * poisson_ratio + 0.8766);
             let (e, _) = Law::reduced_moduli(modulus_pa, poisson_ratio);
-            let contact =
-                2.87 * (reduced_mass * reduced_mass / (0.5 * smallest_radius_m * e * e * fastest_m_s)).powf(0.2);
+            let contact = 2.87
+                * (reduced_mass * reduced_mass / (0.5 * smallest_radius_m * e * e * fastest_m_s)).powf(0.2);
             (0.3 * rayleigh).min(0.2 * contact)
         }
     })

@@ -4,7 +4,7 @@ use super::{
     cells::Cells,
     contact::{History, Pair},
     grains::Grains,
-    vector::{V3, dot, sub},
+    vector::{V3, dot, scale, sub},
 };
 
 /// Margin of a grain at rest over the largest radius.
@@ -163,10 +163,10 @@ impl Neighbours {
             let [x, y, z, extent] = self.sorted[own];
             let margin = self.margin[i as usize];
             let reach = extent + self.largest + margin;
-            let range = |c: f64| (cells.along(c - reach), cells.along(c + reach));
-            let (low, high) = range(x);
-            for cz in range(z).0..=range(z).1 {
-                for cy in range(y).0..=range(y).1 {
+            let range = |c: f64| cells.along(c - reach)..=cells.along(c + reach);
+            let (low, high) = range(x).into_inner();
+            for cz in range(z) {
+                for cy in range(y) {
                     for run in cells.runs(low, high, cy, cz) {
                         for (&j, p) in cells.entries()[run.clone()].iter().zip(&self.sorted[run]) {
                             let d = sub([x, y, z], [p[0], p[1], p[2]]);
@@ -190,16 +190,17 @@ impl Neighbours {
         self.list.other.len()
     }
 
-    /// Calls back with pair, history and overlap in m of each contact.
-    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Pair, &History, f64)) {
+    /// Calls back with pair, history, overlap in m and normal of each contact.
+    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Pair, &History, f64, V3)) {
         for i in 0..grains.len() {
             let a = grains.place[i];
             for k in self.list.row(i) {
                 let b = grains.place[self.list.other[k] as usize];
                 let d = sub([a[0], a[1], a[2]], [b[0], b[1], b[2]]);
-                let overlap = a[3] + b[3] - dot(d, d).sqrt();
+                let distance = dot(d, d).sqrt();
+                let overlap = a[3] + b[3] - distance;
                 if overlap > 0.0 {
-                    each(&self.list.pair[k], &self.list.history[k], overlap);
+                    each(&self.list.pair[k], &self.list.history[k], overlap, scale(d, 1.0 / distance));
                 }
             }
         }

@@ -118,11 +118,11 @@ impl Simulation {
         finite("velocity_m_s", velocity_m_s)?;
         finite("spin_rad_s", spin_rad_s)?;
         let count = self.grains.len();
-        let motion = self
-            .grains
-            .motion
-            .get_mut(grain)
-            .ok_or(DemError::Index { name: "grain", received: grain, count })?;
+        let motion = self.grains.motion.get_mut(grain).ok_or(DemError::Index {
+            name: "grain",
+            received: grain,
+            count,
+        })?;
         (motion.velocity, motion.spin) = (velocity_m_s, spin_rad_s);
         self.fresh = true;
         Ok(())
@@ -156,7 +156,9 @@ impl Simulation {
             self.rebuild();
         }
         self.react();
-        for ((motion, load), kick) in self.grains.motion.iter_mut().zip(&self.grains.load).zip(&self.grains.kick) {
+        for ((motion, load), kick) in
+            self.grains.motion.iter_mut().zip(&self.grains.load).zip(&self.grains.kick)
+        {
             motion.velocity = along(motion.velocity, kick[0], load.force);
             motion.spin = along(motion.spin, kick[1], load.torque);
         }
@@ -205,7 +207,9 @@ impl Simulation {
 
     /// All forces at the present places.
     fn react(&mut self) {
-        for ((load, mass), motion) in self.grains.load.iter_mut().zip(&self.grains.mass).zip(&self.grains.motion) {
+        for ((load, mass), motion) in
+            self.grains.load.iter_mut().zip(&self.grains.mass).zip(&self.grains.motion)
+        {
             let mut acceleration = self.gravity;
             if self.drag > 0.0 {
                 let v = motion.velocity;
@@ -213,7 +217,8 @@ impl Simulation {
             }
             *load = Load { force: scale(acceleration, *mass), torque: [0.0; 3] };
         }
-        self.counters.contacts += self.forces.react(&mut self.neighbours, &mut self.grains, &self.factors, self.step);
+        self.counters.contacts +=
+            self.forces.react(&mut self.neighbours, &mut self.grains, &self.factors, self.step);
         self.counters.pairs += self.neighbours.len() as u64;
         self.walls.react(&mut self.grains, self.step);
     }

@@ -122,9 +122,18 @@ impl Shape {
 /// A surface made ready for looking up distances.
 #[derive(Debug, Clone, Copy)]
 enum Surface {
-    Plane { offset: f64, normal: V3 },
+    Plane {
+        offset: f64,
+        normal: V3,
+    },
     /// A straight line in the half plane through the axis: from `start` along `direction`.
-    Turned { axis: [f64; 2], start: [f64; 2], direction: [f64; 2], length: f64, rim: bool },
+    Turned {
+        axis: [f64; 2],
+        start: [f64; 2],
+        direction: [f64; 2],
+        length: f64,
+        rim: bool,
+    },
 }
 
 impl Surface {
@@ -248,7 +257,8 @@ impl Walls {
                 }
                 let key = (w as u32, g as u32);
                 while old.next_if(|o| (o.wall, o.grain) < key).is_some() {}
-                let history = old.next_if(|o| (o.wall, o.grain) == key).map(|o| o.history).unwrap_or_default();
+                let history =
+                    old.next_if(|o| (o.wall, o.grain) == key).map(|o| o.history).unwrap_or_default();
                 let pair = Pair::wall(radius, grains.mass[g]);
                 self.near.push(Near { wall: key.0, grain: key.1, pair, history });
             }
@@ -284,15 +294,15 @@ impl Walls {
         }
     }
 
-    /// Calls back with factors, pair, history and overlap in m of each contact.
-    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Factors, &Pair, &History, f64)) {
+    /// Calls back with factors, pair, history, overlap in m and normal of each contact.
+    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Factors, &Pair, &History, f64, V3)) {
         for near in &self.near {
             let [x, y, z, radius] = grains.place[near.grain as usize];
             let wall = near.wall as usize;
-            if let Some((distance, _)) = self.surfaces[wall].nearest([x, y, z])
+            if let Some((distance, normal)) = self.surfaces[wall].nearest([x, y, z])
                 && distance < radius
             {
-                each(&self.factors[wall], &near.pair, &near.history, radius - distance);
+                each(&self.factors[wall], &near.pair, &near.history, radius - distance, normal);
             }
         }
     }
