@@ -6,8 +6,8 @@ use rand_distr::{Distribution, LogNormal, Uniform};
 use super::{
     cells::Cells,
     error::DemError,
+    funnel::Funnel,
     vector::{V3, dot, sub},
-    wall::Funnel,
 };
 
 /// Share of the funnel's volume that the grains are to take up at first.

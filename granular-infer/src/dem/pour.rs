@@ -6,12 +6,13 @@ use rand_chacha::ChaCha8Rng;
 use super::{
     error::{DemError, finite, positive, within},
     fill::{fill, radii},
+    funnel::Funnel,
     heap::{Heap, heap},
     material::{Coefficients, Law, stable_step_s},
     neighbours::Counters,
     simulation::{MAX_GRAINS, Rest, Setup, Simulation},
     vector::dot,
-    wall::{Funnel, Shape, Wall},
+    wall::{Shape, Wall},
 };
 
 /// Grains that are poured from a funnel onto the plane z = 0.
