@@ -1,4 +1,4 @@
-//! One contact: normal force, tangential spring, rolling and twisting springs.
+//! One contact: normal force, tangential spring, rolling spring, twisting dashpot.
 
 use super::{
     material::Factors,
@@ -12,7 +12,7 @@ pub(crate) struct History {
     pub(crate) shear: V3,
     /// s at the step before; 0 for a contact that begins.
     pub(crate) size: f64,
-    /// Couple of the rolling spring and, along the normal, of the twisting spring in N m.
+    /// Rolling spring's couple in N m.
     pub(crate) couple: V3,
     /// The round of forces in which the contact last was.
     pub(crate) round: u64,
@@ -114,23 +114,18 @@ pub(crate) fn react(f: &Factors, pair: &Pair, touch: &Touch, history: &mut Histo
     let mut couple = [0.0; 3];
     if f.rolling > 0.0 {
         let spin = dot(touch.rotation, n);
-        let held_twist = dot(history.couple, n);
-        let dashpot = f.damping_r * q * pair.root_inertia;
-
         let rolls = along(touch.rotation, -spin, n);
-        let before = along(scale(history.couple, less), -less * held_twist, n);
-        let trial = along(before, -stiffness * step * pair.radius * pair.radius, rolls);
+        let dashpot = f.damping_r * q * pair.root_inertia;
+        let rate = stiffness * step * pair.radius * pair.radius;
+        let trial = along(scale(history.couple, less), -rate, rolls);
         let limit = f.rolling * pair.radius * held;
-        let (load, rolling) = spring(trial, dashpot * pair.radius, rolls, limit);
+        (history.couple, couple) = spring(trial, dashpot * pair.radius, rolls, limit);
 
-        // Twisting: stiffness S_t a^2 / 2, at most 2/3 mu_s a F_n, inertia 2/7 of that of rolling.
+        // Twisting: damped as a spring S_t a^2 / 2 with 2/7 of rolling's inertia would be, at most 2/3 mu_s a F_n.
         let a = if f.hertz { s } else { (pair.radius * touch.overlap).sqrt() };
-        let limit = 2.0 / 3.0 * f.friction * a * held;
-        let trial = held_twist * less * less - 0.5 * stiffness * a * a * step * spin;
-        let twist = trial.min(limit).max(-limit);
-        let acting = (twist - (1.0 / 7.0_f64).sqrt() * dashpot * a * spin).min(limit).max(-limit);
-        history.couple = along(load, twist, n);
-        couple = along(rolling, acting, n);
+        let most = 2.0 / 3.0 * f.friction * a * held;
+        let twist = (1.0 / 7.0_f64).sqrt() * dashpot * a * spin;
+        couple = along(couple, -twist.min(most).max(-most), n);
     }
     Reaction {
         force: along(tangential, pressed - f.adhesion * pair.radius, n),

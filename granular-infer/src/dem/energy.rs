@@ -49,9 +49,8 @@ pub(crate) fn energy(
     walls: &Walls,
 ) -> Energy {
     let mut elastic = 0.0;
-    neighbours
-        .contacts(grains, |pair, history, overlap, n| elastic += stored(factors, pair, history, overlap, n));
-    walls.contacts(grains, |f, pair, history, overlap, n| elastic += stored(f, pair, history, overlap, n));
+    neighbours.contacts(grains, |pair, history, overlap| elastic += stored(factors, pair, history, overlap));
+    walls.contacts(grains, |f, pair, history, overlap| elastic += stored(f, pair, history, overlap));
     let weight = |(p, m): (&[f64; 4], &f64)| -m * dot(gravity, [p[0], p[1], p[2]]);
     Energy {
         kinetic_j: kinetic(grains),
@@ -61,13 +60,10 @@ pub(crate) fn energy(
 }
 
 /// The springs of one contact.
-fn stored(f: &Factors, pair: &Pair, history: &History, overlap: f64, normal: V3) -> f64 {
+fn stored(f: &Factors, pair: &Pair, history: &History, overlap: f64) -> f64 {
     let ((s, _), share) = (sizes(f.hertz, pair.radius, overlap), if f.hertz { 0.4 } else { 0.5 });
     let shear = f.shear * s;
-    let twist = dot(history.couple, normal).powi(2);
-    let roll = dot(history.couple, history.couple) - twist;
     share * f.elastic * s * overlap * overlap - f.adhesion * pair.radius * overlap
         + 0.5 * dot(history.shear, history.shear) / shear
-        + 0.5 * roll / (shear * pair.radius * pair.radius)
-        + twist / (shear * pair.radius * overlap)
+        + 0.5 * dot(history.couple, history.couple) / (shear * pair.radius * pair.radius)
 }

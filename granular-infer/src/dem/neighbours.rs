@@ -4,7 +4,7 @@ use super::{
     cells::Cells,
     contact::{History, Pair},
     grains::Grains,
-    vector::{V3, dot, scale, sub},
+    vector::{V3, dot, sub},
 };
 
 /// Margin of a grain at rest over the largest radius.
@@ -190,17 +190,16 @@ impl Neighbours {
         self.list.other.len()
     }
 
-    /// Calls back with pair, history, overlap in m and normal of each contact.
-    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Pair, &History, f64, V3)) {
+    /// Calls back with pair, history and overlap in m of each contact.
+    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Pair, &History, f64)) {
         for i in 0..grains.len() {
             let a = grains.place[i];
             for k in self.list.row(i) {
                 let b = grains.place[self.list.other[k] as usize];
                 let d = sub([a[0], a[1], a[2]], [b[0], b[1], b[2]]);
-                let distance = dot(d, d).sqrt();
-                let overlap = a[3] + b[3] - distance;
+                let overlap = a[3] + b[3] - dot(d, d).sqrt();
                 if overlap > 0.0 {
-                    each(&self.list.pair[k], &self.list.history[k], overlap, scale(d, 1.0 / distance));
+                    each(&self.list.pair[k], &self.list.history[k], overlap);
                 }
             }
         }

@@ -148,9 +148,11 @@ impl Surface {
         match *self {
             Self::Plane { offset, normal } => dot(point, normal) - offset,
             Self::Turned { axis, start, direction, length, .. } => {
-                let (u, w) = ((point[0] - axis[0]).hypot(point[1] - axis[1]) - start[0], point[2] - start[1]);
-                let along_line = (u * direction[0] + w * direction[1]).clamp(0.0, length);
-                (u - along_line * direction[0]).hypot(w - along_line * direction[1])
+                let (x, y) = (point[0] - axis[0], point[1] - axis[1]);
+                let (u, w) = ((x * x + y * y).sqrt() - start[0], point[2] - start[1]);
+                let along_line = (u * direction[0] + w * direction[1]).min(length).max(0.0);
+                let (u, w) = (u - along_line * direction[0], w - along_line * direction[1]);
+                (u * u + w * w).sqrt()
             }
         }
     }
@@ -249,15 +251,15 @@ impl Walls {
         }
     }
 
-    /// Calls back with factors, pair, history, overlap in m and normal of each contact.
-    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Factors, &Pair, &History, f64, V3)) {
+    /// Calls back with factors, pair, history and overlap in m of each contact.
+    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Factors, &Pair, &History, f64)) {
         for near in &self.near {
             let [x, y, z, radius] = grains.place[near.grain as usize];
             let wall = near.wall as usize;
-            if let Some((distance, normal)) = self.surfaces[wall].nearest([x, y, z])
+            if let Some((distance, _)) = self.surfaces[wall].nearest([x, y, z])
                 && distance < radius
             {
-                each(&self.factors[wall], &near.pair, &near.history, radius - distance, normal);
+                each(&self.factors[wall], &near.pair, &near.history, radius - distance);
             }
         }
     }
