@@ -1,0 +1,27 @@
+//! Discrete elements: spheres that touch, roll, slide and come to rest.
+
+mod cells;
+mod contact;
+mod energy;
+mod error;
+mod fill;
+mod forces;
+mod funnel;
+mod grains;
+mod heap;
+mod material;
+mod neighbours;
+mod pour;
+mod simulation;
+mod vector;
+mod wall;
+
+pub use energy::Energy;
+pub use error::DemError;
+pub use funnel::Funnel;
+pub use heap::{Heap, heap};
+pub use material::{Coefficients, Law, stable_step_s};
+pub use neighbours::Counters;
+pub use pour::{Pour, Poured};
+pub use simulation::{MAX_GRAINS, Rest, Setup, Simulation};
+pub use wall::{Shape, Wall};

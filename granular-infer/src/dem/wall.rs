@@ -1,0 +1,266 @@
+//! Walls: planes, cone frustums, tubes; the contacts of grains with them.
+
+use super::{
+    contact::{History, Pair, Touch, react, sizes},
+    error::{DemError, finite, positive, within},
+    grains::Grains,
+    material::{Coefficients, Factors},
+    vector::{V3, along, dot, scale, sub},
+};
+
+/// The surface of a wall that does not move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// An infinite plane; grains are on the side that the normal points to.
+    Plane {
+        /// A point of the plane, m.
+        point_m: [f64; 3],
+        /// A vector away from the plane, of any length above zero.
+        normal: [f64; 3],
+    },
+    /// A thin cone frustum that opens upwards about a vertical axis; its lower rim is round to the touch.
+    Frustum {
+        /// The axis's x and y, m.
+        axis_m: [f64; 2],
+        /// Height of the lower rim, m.
+        bottom_m: f64,
+        /// Radius of the lower rim, m, positive.
+        bottom_radius_m: f64,
+        /// Radius of the upper rim, m, above the lower one's.
+        top_radius_m: f64,
+        /// Half angle from the axis in rad, above 0 and below pi/2.
+        half_angle_rad: f64,
+    },
+    /// A thin vertical tube, without end above.
+    Tube {
+        /// The axis's x and y, m.
+        axis_m: [f64; 2],
+        /// Radius, m, positive.
+        radius_m: f64,
+        /// Height of the lower rim, m.
+        bottom_m: f64,
+    },
+}
+
+/// A wall and what grains do on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wall {
+    /// The surface.
+    pub shape: Shape,
+    /// Coefficients of grains against this wall.
+    pub coefficients: Coefficients,
+}
+
+impl Shape {
+    /// Refuses surfaces without extent.
+    pub fn check(&self) -> Result<(), DemError> {
+        match *self {
+            Self::Plane { point_m, normal } => {
+                finite("point_m", point_m)?;
+                finite("normal", normal)?;
+                positive("length of normal", dot(normal, normal).sqrt())
+            }
+            Self::Frustum { axis_m, bottom_m, bottom_radius_m, top_radius_m, half_angle_rad } => {
+                finite("axis_m and bottom_m", [axis_m[0], axis_m[1], bottom_m])?;
+                positive("bottom_radius_m", bottom_radius_m)?;
+                positive("top_radius_m - bottom_radius_m", top_radius_m - bottom_radius_m)?;
+                within("half_angle_rad", half_angle_rad, 0.01, 1.56)
+            }
+            Self::Tube { axis_m, radius_m, bottom_m } => {
+                finite("axis_m and bottom_m", [axis_m[0], axis_m[1], bottom_m])?;
+                positive("radius_m", radius_m)
+            }
+        }
+    }
+}
+
+/// A surface made ready for looking up distances.
+#[derive(Debug, Clone, Copy)]
+enum Surface {
+    Plane {
+        offset: f64,
+        normal: V3,
+    },
+    /// A straight line in the half plane through the axis: from `start` along `direction`.
+    Turned {
+        axis: [f64; 2],
+        start: [f64; 2],
+        direction: [f64; 2],
+        length: f64,
+        rim: bool,
+    },
+}
+
+impl Surface {
+    fn of(shape: &Shape) -> Self {
+        match *shape {
+            Shape::Plane { point_m, normal } => {
+                let normal = scale(normal, 1.0 / dot(normal, normal).sqrt());
+                Self::Plane { offset: dot(point_m, normal), normal }
+            }
+            Shape::Frustum { axis_m, bottom_m, bottom_radius_m, top_radius_m, half_angle_rad } => {
+                let (sine, cosine) = half_angle_rad.sin_cos();
+                Self::Turned {
+                    axis: axis_m,
+                    start: [bottom_radius_m, bottom_m],
+                    direction: [sine, cosine],
+                    length: (top_radius_m - bottom_radius_m) / sine,
+                    rim: true,
+                }
+            }
+            Shape::Tube { axis_m, radius_m, bottom_m } => Self::Turned {
+                axis: axis_m,
+                start: [radius_m, bottom_m],
+                direction: [0.0, 1.0],
+                length: f64::INFINITY,
+                rim: false,
+            },
+        }
+    }
+
+    /// Distance and the unit vector from the surface to the point; none where the surface ends before.
+    #[inline(always)]
+    fn nearest(&self, point: V3) -> Option<(f64, V3)> {
+        match *self {
+            Self::Plane { offset, normal } => Some((dot(point, normal) - offset, normal)),
+            Self::Turned { axis, start, direction, length, rim } => {
+                let (x, y) = (point[0] - axis[0], point[1] - axis[1]);
+                let r = (x * x + y * y).sqrt();
+                let (u, w) = (r - start[0], point[2] - start[1]);
+                let mut along_line = u * direction[0] + w * direction[1];
+                if along_line > length || (along_line < 0.0 && !rim) {
+                    return None;
+                }
+                along_line = along_line.max(0.0);
+                let (u, w) = (u - along_line * direction[0], w - along_line * direction[1]);
+                let distance = (u * u + w * w).sqrt();
+                if !(distance > 0.0 && r > 0.0) {
+                    return None;
+                }
+                let out = u / (distance * r);
+                Some((distance, [x * out, y * out, w / distance]))
+            }
+        }
+    }
+
+    /// A distance that is never too long, whether or not the surface ends before.
+    fn at_least(&self, point: V3) -> f64 {
+        match *self {
+            Self::Plane { offset, normal } => dot(point, normal) - offset,
+            Self::Turned { axis, start, direction, length, .. } => {
+                let (x, y) = (point[0] - axis[0], point[1] - axis[1]);
+                let (u, w) = ((x * x + y * y).sqrt() - start[0], point[2] - start[1]);
+                let along_line = (u * direction[0] + w * direction[1]).min(length).max(0.0);
+                let (u, w) = (u - along_line * direction[0], w - along_line * direction[1]);
+                (u * u + w * w).sqrt()
+            }
+        }
+    }
+}
+
+/// A grain near a wall.
+#[derive(Debug, Clone, Copy)]
+struct Near {
+    wall: u32,
+    grain: u32,
+    pair: Pair,
+    history: History,
+}
+
+/// All walls and the grains near them.
+#[derive(Debug, Clone)]
+pub(crate) struct Walls {
+    surfaces: Vec<Surface>,
+    factors: Vec<Factors>,
+    present: Vec<bool>,
+    near: Vec<Near>,
+    before: Vec<Near>,
+}
+
+impl Walls {
+    pub(crate) fn new(shapes: &[Shape], factors: Vec<Factors>, grains: usize) -> Self {
+        Self {
+            surfaces: shapes.iter().map(Surface::of).collect(),
+            factors,
+            present: vec![true; shapes.len()],
+            near: Vec::with_capacity(2 * grains + 16),
+            before: Vec::with_capacity(2 * grains + 16),
+        }
+    }
+
+    /// Takes a wall away.
+    pub(crate) fn remove(&mut self, wall: usize) -> Result<(), DemError> {
+        let count = self.present.len();
+        let present =
+            self.present.get_mut(wall).ok_or(DemError::Index { name: "wall", received: wall, count })?;
+        *present = false;
+        self.near.retain(|n| n.wall as usize != wall);
+        Ok(())
+    }
+
+    /// Lists the grains that may touch a wall before one moves farther than its margin, in m.
+    pub(crate) fn rebuild(&mut self, grains: &Grains, margin: &[f64]) {
+        std::mem::swap(&mut self.near, &mut self.before);
+        self.near.clear();
+        let mut old = self.before.iter().peekable();
+        for (w, surface) in self.surfaces.iter().enumerate() {
+            if !self.present[w] {
+                continue;
+            }
+            for (g, (place, margin)) in grains.place.iter().zip(margin).enumerate() {
+                let [x, y, z, radius] = *place;
+                if surface.at_least([x, y, z]) > radius + margin {
+                    continue;
+                }
+                let key = (w as u32, g as u32);
+                while old.next_if(|o| (o.wall, o.grain) < key).is_some() {}
+                let history =
+                    old.next_if(|o| (o.wall, o.grain) == key).map(|o| o.history).unwrap_or_default();
+                let pair = Pair::wall(radius, grains.mass[g]);
+                self.near.push(Near { wall: key.0, grain: key.1, pair, history });
+            }
+        }
+    }
+
+    /// Adds the walls' forces to the grains.
+    pub(crate) fn react(&mut self, grains: &mut Grains, step: f64) {
+        for near in &mut self.near {
+            let g = near.grain as usize;
+            let [x, y, z, radius] = grains.place[g];
+            let (distance, normal) = match self.surfaces[near.wall as usize].nearest([x, y, z]) {
+                Some(found) if found.0 < radius => found,
+                _ => {
+                    near.history = History::default();
+                    continue;
+                }
+            };
+            let motion = &grains.motion[g];
+            let factors = &self.factors[near.wall as usize];
+            let touch = Touch {
+                normal,
+                overlap: radius - distance,
+                sizes: sizes(factors.hertz, radius, radius - distance),
+                velocity: motion.velocity,
+                surface: scale(motion.spin, distance),
+                rotation: motion.spin,
+            };
+            let r = react(factors, &near.pair, &touch, &mut near.history, step);
+            let load = &mut grains.load[g];
+            load.force = along(load.force, 1.0, r.force);
+            load.torque = sub(along(load.torque, -distance, r.turn), scale(r.couple, -1.0));
+        }
+    }
+
+    /// Calls back with factors, pair, history and overlap in m of each contact.
+    pub(crate) fn contacts(&self, grains: &Grains, mut each: impl FnMut(&Factors, &Pair, &History, f64)) {
+        for near in &self.near {
+            let [x, y, z, radius] = grains.place[near.grain as usize];
+            let wall = near.wall as usize;
+            if let Some((distance, _)) = self.surfaces[wall].nearest([x, y, z])
+                && distance < radius
+            {
+                each(&self.factors[wall], &near.pair, &near.history, radius - distance);
+            }
+        }
+    }
+}
