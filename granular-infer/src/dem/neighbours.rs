@@ -205,3 +205,52 @@ impl Neighbours {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sizes, speeds and places of all kinds, on both sides of the origin and of the grid's seam.
+    fn crowd(n: usize) -> Grains {
+        let wave = |i: usize, k: f64| (k * (i as f64 + 1.0)).sin();
+        let radii: Vec<f64> = (0..n).map(|i| 2e-3 * (1.0 + 0.5 * wave(i, 7.1))).collect();
+        let places: Vec<V3> = (0..n).map(|i| [3.3, 5.7, 9.1].map(|k| 0.02 * wave(i, k))).collect();
+        let mut grains = Grains::new(&radii, &places, 1000.0, 1e-5);
+        for (i, m) in grains.motion.iter_mut().enumerate() {
+            m.velocity = [wave(i, 2.3).powi(9) * 5.0, 0.0, 0.0];
+        }
+        grains
+    }
+
+    /// The list is what looking at all pairs gives, and histories stay with their pairs.
+    #[test]
+    fn the_list_has_every_pair() {
+        let n = 400;
+        let mut grains = crowd(n);
+        let mut list = Neighbours::new(&grains);
+        for round in 1..4_u64 {
+            list.rebuild(&grains, 1e-5);
+            for i in 0..n {
+                let near: Vec<u32> = (i + 1..n)
+                    .filter(|&j| {
+                        let (a, b) = (grains.place[i], grains.place[j]);
+                        let d = sub([a[0], a[1], a[2]], [b[0], b[1], b[2]]);
+                        let cut = a[3] + b[3] + list.margin[i] + list.margin[j];
+                        dot(d, d) < cut * cut
+                    })
+                    .map(|j| j as u32)
+                    .collect();
+                let row = list.list.row(i);
+                assert_eq!(list.list.other[row.clone()], near, "grain {i}");
+                for k in row {
+                    let name = (i * n) as u64 + u64::from(list.list.other[k]);
+                    let known = list.list.history[k].round;
+                    assert!(known == 0 || known == name, "a history changed its pair");
+                    list.list.history[k].round = name;
+                }
+            }
+            assert!(list.len() > n, "too few pairs to tell");
+            grains.place.iter_mut().for_each(|p| p[0] += 1e-3 * (round as f64) * p[1].signum());
+        }
+    }
+}
