@@ -3,8 +3,14 @@
 mod error;
 pub use error::{Error, ErrorKind, ErrorType};
 
+pub mod arm;
+pub mod camera;
 pub mod clock;
 pub mod force_torque;
+pub mod gripper;
+pub mod microphones;
+pub mod picture;
+pub mod pneumatics;
 pub mod programme;
 pub mod replay;
 pub mod rotary;
