@@ -29,12 +29,9 @@ pub fn unheard(durations_s: &[f64], restitution: f64, expected_first: Option<f64
     if !(LEAST_RESTITUTION..1.0).contains(&e) {
         return vec![0; n];
     }
-    // How long the whole is, and its last part, by the first part.
-    let whole = |m: usize| (0..=m).map(|k| e.powi(k as i32)).sum::<f64>();
-    let last = |m: usize| e.powi(m as i32);
     let doubt = |m: usize| if m > 0 { DOUBT } else { 0.0 };
     let off =
-        |duration: f64, expected: f64, m: usize| (duration / (expected * whole(m))).ln().abs() + doubt(m);
+        |duration: f64, expected: f64, m: usize| (parts(duration, m, e).0 / expected).ln().abs() + doubt(m);
     let nearest = |duration: f64, expected: f64| {
         (0..=MOST).map(|m| (off(duration, expected, m), m)).fold((f64::INFINITY, 0), nearer)
     };
@@ -45,12 +42,12 @@ pub fn unheard(durations_s: &[f64], restitution: f64, expected_first: Option<f64
             (Some(before), _) => nearest(duration, e * before).1,
             (None, Some(&next)) => {
                 let choices =
-                    (0..=MOST).map(|m| (nearest(next, e * duration / whole(m) * last(m)).0 + doubt(m), m));
+                    (0..=MOST).map(|m| (nearest(next, e * parts(duration, m, e).1).0 + doubt(m), m));
                 choices.fold((f64::INFINITY, 0), nearer).1
             }
             (None, None) => 0,
         };
-        before = Some(duration / whole(m) * last(m));
+        before = Some(parts(duration, m, e).1);
         found.push(m);
     }
     found

@@ -131,7 +131,7 @@ fn placed(
 fn expect_first(drops: &mut [Drop], nominal: &Effects) {
     /// Fewer drops say nothing of it.
     const FEWEST: usize = 5;
-    let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.first_heading(nominal)).collect();
+    let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.heading(0, nominal)).collect();
     let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
     let mean =
         |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);

@@ -215,23 +215,25 @@ impl Drop {
         }
     }
 
-    /// Where the ball heads after the first impact that was heard.
-    pub(super) fn first_heading(&self, effects: &Effects) -> [f64; 2] {
-        heading(&self.flight(0, effects, self.unheard.get(1).copied().unwrap_or(0), Part::First).0)
+    /// How many impacts went unheard within a flight.
+    fn hidden(&self, flight: usize) -> usize {
+        self.unheard.get(flight + 1).copied().unwrap_or(0)
     }
 
-    /// Where the ball heads after each of those impacts.
+    /// Where the ball heads after an impact.
+    pub(super) fn heading(&self, impact: usize, effects: &Effects) -> [f64; 2] {
+        heading(&self.flight(impact, effects, self.hidden(impact), Part::First).0)
+    }
+
+    /// Where the ball heads after each of the impacts about which something is known.
     pub(super) fn headings(&self, effects: &Effects) -> Vec<[f64; 2]> {
-        let hidden = |i: usize| self.unheard.get(i + 1).copied().unwrap_or(0);
-        let flights = self.first()..self.times_s.len() - 1;
-        flights.map(|i| heading(&self.flight(i, effects, hidden(i), Part::First).0)).collect()
+        (self.first()..self.times_s.len() - 1).map(|i| self.heading(i, effects)).collect()
     }
 
     /// Speed at which the ball comes to each of those impacts, m/s.
     pub(super) fn speeds(&self, effects: &Effects) -> Vec<f64> {
-        let landing = (0..self.times_s.len() - 1).map(|i| {
-            speed(&self.flight(i, effects, self.unheard.get(i + 1).copied().unwrap_or(0), Part::Last).1)
-        });
+        let landing = (0..self.times_s.len() - 1)
+            .map(|i| speed(&self.flight(i, effects, self.hidden(i), Part::Last).1));
         let dropped = self.height_m.map(|h| {
             let hidden = self.unheard.first().copied().unwrap_or(0);
             speed_after_drop(h, effects.gravity_m_s2, 0.0) * effects.restitution.powi(hidden as i32)

@@ -1,5 +1,7 @@
 //! What the files of a recording say: the rig, and the drops.
 
+use bounce_audio::flight::drag_per_m;
+
 use super::GRAVITY_M_S2;
 use super::drop::Drop;
 use crate::domains::reading::check_runs;
@@ -23,10 +25,14 @@ impl Rig {
         let mass = rig.number("mass_kg", 1e-9, 1e6)?;
         let diameter = rig.number("diameter_m", 1e-5, 1e2)?;
         let gravity_m_s2 = rig.number("gravity_m_s2", 1e-3, 100.0)?.unwrap_or(GRAVITY_M_S2);
-        let drag_unit = mass.zip(diameter).map(|(mass, diameter)| {
-            0.5 * AIR_DENSITY_KG_M3 * 0.25 * std::f64::consts::PI * diameter * diameter / mass
-        });
+        let drag_unit =
+            mass.zip(diameter).map(|(mass, diameter)| drag_per_m(1.0, diameter, mass, AIR_DENSITY_KG_M3));
         Ok(Self { gravity_m_s2, drag_unit, drop_height_m })
+    }
+
+    /// Impacts without which a drop says nothing.
+    pub(super) fn fewest(&self) -> usize {
+        if self.drop_height_m.is_some() { 2 } else { 3 }
     }
 }
 
@@ -52,9 +58,8 @@ pub(super) fn heard(table: &Table, rig: &Rig) -> Result<Vec<Heard>, ReadError> {
         (Some(_), None) => return Err(table.missing("y_m", "the other coordinate of each place")),
         (None, Some(_)) => return Err(table.missing("x_m", "the other coordinate of each place")),
     };
-    let fewest = if rig.drop_height_m.is_some() { 2 } else { 3 };
     let mut all = Vec::new();
-    for (label, rows) in check_runs(table, labels, fewest, Some("t_s"))? {
+    for (label, rows) in check_runs(table, labels, rig.fewest(), Some("t_s"))? {
         let mut known = vec![0; rows.len()];
         for (i, pair) in rows.windows(2).enumerate() {
             let (before, now) = (numbers[pair[0]], numbers[pair[1]]);

@@ -37,7 +37,7 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
         };
         let mut impacts = found.map_err(|e| open(e.to_string()))?.impacts;
         impacts.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-        let fewest = if rig.drop_height_m.is_some() { 2 } else { 3 };
+        let fewest = rig.fewest();
         if impacts.len() < fewest {
             return Err(ReadError::TooFewRows {
                 file: path.display().to_string(),

@@ -21,6 +21,8 @@ struct Block {
     /// Directions in which errors are tied, one a column, and by how much each is to be shortened.
     tied: DMatrix<f64>,
     shorter: DVector<f64>,
+    /// Errors where nothing has happened.
+    off: DVector<f64>,
 }
 
 /// A dough with its rolls; its first error among those of its block.
@@ -83,25 +85,26 @@ impl DoughModel {
         }
         let fresh: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
         let fresh = Fresh::of(&fresh, self.dynamics.noise());
-        let mut block = Block { doughs, fresh, tied: DMatrix::zeros(first, 0), shorter: DVector::zeros(0) };
-        self.tie(&mut block, first);
+        let (tied, shorter) = self.tie(&doughs, &fresh, first);
+        let mut block = Block { doughs, fresh, tied, shorter, off: DVector::zeros(first) };
+        block.off = self.errors(&block, &Effects::OFF);
         self.blocks.push(block);
         runs.iter().enumerate().map(|(k, (label, _))| self.shown(label, k)).collect()
     }
 
-    /// How the uncertainty of what was learned ties the errors of a block.
-    fn tie(&self, block: &mut Block, rows: usize) {
+    /// How the uncertainty of what was learned ties the errors of doughs: directions, and by how much each is to be shortened.
+    fn tie(&self, doughs: &[Dough], fresh: &Fresh, rows: usize) -> (DMatrix<f64>, DVector<f64>) {
         /// Below this part of its own variance nothing is said to be tied.
         const LEAST: f64 = 1e-3;
         let p = self.dynamics.coefficients();
         // Coefficients of all doughs, then each one's own level and slope.
-        let columns = 3 * p + 6 * block.doughs.len();
+        let columns = 3 * p + 6 * doughs.len();
         let own = self.dynamics.own();
         let mut all = DMatrix::zeros(rows, columns);
-        for (at, dough) in block.doughs.iter().enumerate() {
+        for (at, dough) in doughs.iter().enumerate() {
             let courses = courses(dough.rolls.len());
             let mut sensitivity = OMatrix::<f64, Const<3>, Dyn>::zeros(columns);
-            for (i, step) in self.follow(dough, &block.fresh, &Effects::OFF).iter().enumerate() {
+            for (i, step) in self.follow(dough, fresh, &Effects::OFF).iter().enumerate() {
                 let row = dough.first + PER_ROLL * i;
                 let mut write = |offset: usize,
                                  factor: &nalgebra::Matrix3<f64>,
@@ -128,15 +131,16 @@ impl DoughModel {
         }
         let eigen = SymmetricEigen::new(all.tr_mul(&all));
         let strong: Vec<usize> = (0..columns).filter(|&k| eigen.eigenvalues[k] > LEAST).collect();
-        block.tied = DMatrix::from_fn(rows, strong.len(), |_, _| 0.0);
-        block.shorter = DVector::from_iterator(
+        let mut tied = DMatrix::zeros(rows, strong.len());
+        let shorter = DVector::from_iterator(
             strong.len(),
             strong.iter().map(|&k| 1.0 - 1.0 / (1.0 + eigen.eigenvalues[k]).sqrt()),
         );
         for (column, &k) in strong.iter().enumerate() {
             let direction = &all * eigen.eigenvectors.column(k) / eigen.eigenvalues[k].sqrt();
-            block.tied.set_column(column, &direction);
+            tied.set_column(column, &direction);
         }
+        (tied, shorter)
     }
 
     fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
@@ -151,8 +155,7 @@ impl DoughModel {
     }
 
     /// The errors of a block under some effects: independent, of variance one.
-    fn errors(&self, block: usize, effects: &Effects) -> DVector<f64> {
-        let block = &self.blocks[block];
+    fn errors(&self, block: &Block, effects: &Effects) -> DVector<f64> {
         let mut errors = DVector::zeros(block.tied.nrows());
         for dough in &block.doughs {
             for (i, step) in self.follow(dough, &block.fresh, effects).iter().enumerate() {
@@ -172,7 +175,7 @@ impl DoughModel {
         if let Some(errors) = lock().get(&key) {
             return Arc::clone(errors);
         }
-        let errors = Arc::new(self.errors(block, &self.places.effects(shared)));
+        let errors = Arc::new(self.errors(&self.blocks[block], &self.places.effects(shared)));
         let mut kept = lock();
         if kept.len() >= MOST_KEPT {
             kept.clear();
@@ -183,8 +186,8 @@ impl DoughModel {
 
     /// What the engine is to see of a dough.
     fn shown(&self, label: &str, dough: usize) -> Run {
-        let at = self.blocks.len() - 1;
-        let dough = &self.blocks[at].doughs[dough];
+        let block = &self.blocks[self.blocks.len() - 1];
+        let dough = &block.doughs[dough];
         let of = |f: &dyn Fn(&Step) -> f64| dough.steps.iter().map(f).collect::<Vec<f64>>();
         let inputs = vec![
             of(&|s| s.step),
@@ -196,9 +199,8 @@ impl DoughModel {
             of(&|s| s.roll.action[1]),
             of(&|s| self.band.force_n(s.roll.action[0], s.roll.action[1])),
         ];
-        let errors = self.errors(at, &Effects::OFF);
         let channel = |c: usize| {
-            let of = |i| self.scale[c] * errors[dough.first + PER_ROLL * i + c];
+            let of = |i| self.scale[c] * block.off[dough.first + PER_ROLL * i + c];
             (0..dough.steps.len()).map(of).collect::<Vec<f64>>()
         };
         let mut outputs: Vec<Vec<f64>> = (0..PER_ROLL).map(channel).collect();
@@ -217,13 +219,13 @@ impl Model for DoughModel {
         let Some(&(block, dough)) = self.runs.get(&run.label) else {
             return Err(PredictError { run: run.label.clone(), reason: "no such rolls".into() });
         };
-        let off = self.kept_errors(block, &self.places.off);
         let errors = self.kept_errors(block, shared);
-        let (n, first) = (run.len(), self.blocks[block].doughs[dough].first);
+        let block = &self.blocks[block];
+        let (n, first) = (run.len(), block.doughs[dough].first);
         for (at, value) in out.iter_mut().enumerate() {
             let (channel, roll) = (at / n, at % n);
             let row = first + PER_ROLL * roll + channel;
-            *value = self.scale[channel] * (off[row] - errors[row]);
+            *value = self.scale[channel] * (block.off[row] - errors[row]);
         }
         Ok(())
     }

@@ -51,10 +51,8 @@ impl Effects {
 }
 
 /// Where each parameter stands.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Places {
-    /// All shared parameters where nothing has happened.
-    pub(super) off: Vec<f64>,
     factor: At,
     drying: Option<At>,
     slip: At,
@@ -165,7 +163,6 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
         &["drying", "stiffness-change"],
     );
     terms(&mut b, &mut p);
-    p.off = b.spec.parameters.iter().map(|p| p.start).collect();
     (b.spec, p)
 }
 
