@@ -91,6 +91,21 @@ pub fn diagnose(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
+    let diagnosis = diagnose_with(model, recording, experiments, options, observer);
+    // A simulation that broke half way leaves an answer that may rest on what it did not say.
+    match model.broken() {
+        Some(error) => Err(error.into()),
+        None => diagnosis,
+    }
+}
+
+fn diagnose_with(
+    model: &dyn Model,
+    recording: &Recording,
+    experiments: &[Experiment],
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Diagnosis, DiagnoseError> {
     check(recording, options)?;
     let tell = |stage: &str, done: f64| -> Result<(), DiagnoseError> {
         if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }

@@ -34,7 +34,7 @@ pub fn finite_differences<M: Model + ?Sized>(
     for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(rows.max(1))) {
         let info = if is_shared { shared_info[slot] } else { own_info[slot] };
         let value = if is_shared { shared[slot] } else { own[slot] };
-        let step = 1e-5 * info.scale.max(1e-3 * value.abs());
+        let step = model.relative_step() * info.scale.max(1e-3 * value.abs());
         let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
         for (x, out) in [(high, &mut above), (low, &mut below)] {
             *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = x;

@@ -305,6 +305,10 @@ impl Model for Extended<'_> {
         Ok(())
     }
 
+    fn relative_step(&self) -> f64 {
+        self.inner.relative_step()
+    }
+
     fn start(&self, run: &Run, own: &mut [f64]) {
         self.inner.start(run, &mut own[..self.inner_own]);
     }

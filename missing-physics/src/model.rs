@@ -226,10 +226,21 @@ pub trait Model: Sync {
         None
     }
 
+    /// Why the simulation will give no prediction any more, whatever is asked of it (the program behind it has ended): the
+    /// diagnosis then ends with this error, even where it could do without the predictions that failed.
+    fn broken(&self) -> Option<PredictError> {
+        None
+    }
+
+    /// Step of the differences that stand for derivatives, in scales of a parameter: well above the simulation's own rounding.
+    fn relative_step(&self) -> f64 {
+        1e-5
+    }
+
     /// The derivatives of [`Model::predict`] with respect to the shared parameters at the slots `shared_free` and
     /// the own parameters at the slots `own_free`, one column after the other, each as long as `out`.
     ///
-    /// The default takes central differences at steps of 1e-5 of a parameter's scale, one-sided at a bound.
+    /// The default takes central differences at steps of [`Model::relative_step`], one-sided at a bound.
     ///
     /// # Errors
     /// As [`Model::predict`].

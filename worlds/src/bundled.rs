@@ -2,6 +2,7 @@
 
 use crate::flight::{Effects, FlightWorld, Seen};
 use crate::noise::Noise;
+use crate::pendulum::{Friction, PendulumWorld};
 
 /// A bundled recording: its folder's name and its files' contents.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,6 +48,14 @@ pub fn all() -> Vec<Bundled> {
         noise: Noise::white(0.001),
         ..FlightWorld::thrown(Seen::Space)
     };
+    let swing = PendulumWorld {
+        length_m: 0.52,
+        friction: Friction { dry_rad_s2: 0.04, ..Friction::default() },
+        released_rad: vec![0.25, 0.42, 0.6],
+        rows: 160,
+        rate_hz: 25.0,
+        noise: Noise { digit: 0.001, ..Noise::white(0.002) },
+    };
     let steel = FlightWorld { noise: Noise::white(0.0015), ..FlightWorld::thrown(Seen::Space) };
     vec![
         Bundled {
@@ -74,6 +83,15 @@ pub fn all() -> Vec<Bundled> {
             readme: readme(
                 "A steel ball, thrown five times",
                 "All coordinates, 60 frames a second. Hidden: nothing. Noise: 1.5 mm, white.",
+            ),
+        },
+        Bundled {
+            name: "swing",
+            header: include_str!("swing.toml").into(),
+            data: swing.csv(23),
+            readme: readme(
+                "A pendulum, let go three times",
+                "Its angle, 25 readings a second; the simulator is the program `pendulum.py` (Python, standard library). Hidden: dry friction in the bearing, 0.04 rad/s^2. Length 0.52 m, stated as 0.5. Noise: 2 mrad, in steps of 1 mrad.",
             ),
         },
     ]

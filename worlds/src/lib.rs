@@ -4,3 +4,4 @@ pub mod bounce;
 pub mod bundled;
 pub mod flight;
 pub mod noise;
+pub mod pendulum;

@@ -26,7 +26,19 @@ impl Builder {
 
     /// A parameter that each run has for itself.
     pub(super) fn own(&mut self, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> At {
-        self.parameter(name, unit, Scope::PerRun, 0.0, bounds, scale)
+        self.own_from(name, unit, 0.0, bounds, scale)
+    }
+
+    /// A parameter that each run has for itself, off (or starting) at `start`.
+    pub(super) fn own_from(
+        &mut self,
+        name: &str,
+        unit: &str,
+        start: f64,
+        bounds: [f64; 2],
+        scale: f64,
+    ) -> At {
+        self.parameter(name, unit, Scope::PerRun, start, bounds, scale)
     }
 
     fn parameter(

@@ -2,6 +2,7 @@
 
 pub mod bounce;
 mod builder;
+pub mod custom;
 pub mod dough_roll;
 pub mod indentation;
 pub mod liquid_tilt;
@@ -82,6 +83,7 @@ pub fn all() -> &'static [&'static dyn Domain] {
         &indentation::Indentation,
         &bounce::Bounce,
         &dough_roll::DoughRoll,
+        &custom::Custom,
     ]
 }
 

@@ -3,7 +3,7 @@
 use crate::recording::{Column, Header, ReadError, Table, quoted};
 
 /// A column of numbers.
-pub(super) const fn number(name: &'static str, what: &'static str) -> Column {
+pub(super) const fn number<'a>(name: &'a str, what: &'a str) -> Column<'a> {
     Column { name, what, label: false }
 }
 

@@ -114,6 +114,11 @@ fn visit(table: &Table, path: &str, seen: &mut impl FnMut(String)) {
         match value {
             Value::Table(inner) if !inner.is_empty() => visit(inner, &format!("{path}{key}."), seen),
             Value::Table(_) => {}
+            Value::Array(list) if !list.is_empty() && list.iter().all(Value::is_table) => {
+                for (k, inner) in list.iter().filter_map(Value::as_table).enumerate() {
+                    visit(inner, &format!("{path}{key}[{k}]."), seen);
+                }
+            }
             _ => seen(format!("{path}{key}")),
         }
     }
@@ -135,6 +140,33 @@ impl<'a> Section<'a> {
             None => Ok(Section { header: self.header, table: None, path }),
             Some(Value::Table(table)) => Ok(Section { header: self.header, table: Some(table), path }),
             Some(other) => Err(self.header.wrong(&format!("{}{name}", self.path), other, "a section")),
+        }
+    }
+
+    /// The sections of a list of them (`[[key]]`), in the order of the file; none where it is absent.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`] where the key holds something else.
+    pub fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, ReadError> {
+        let name = format!("{}{key}", self.path);
+        let Some(value) = self.table.and_then(|t| t.get(key)) else { return Ok(Vec::new()) };
+        let tables: Option<Vec<&'a Table>> =
+            value.as_array().map(|list| list.iter().map(Value::as_table).collect()).unwrap_or_default();
+        let Some(tables) = tables else { return Err(self.header.wrong(&name, value, "sections in [[ ]]")) };
+        let one =
+            |(k, table)| Section { header: self.header, table: Some(table), path: format!("{name}[{k}].") };
+        Ok(tables.into_iter().enumerate().map(one).collect())
+    }
+
+    /// True or false, if it is there.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`].
+    pub fn flag(&self, key: &str) -> Result<Option<bool>, ReadError> {
+        match self.value(key) {
+            None => Ok(None),
+            Some(Value::Boolean(flag)) => Ok(Some(*flag)),
+            Some(other) => Err(self.header.wrong(&format!("{}{key}", self.path), other, "true or false")),
         }
     }
 

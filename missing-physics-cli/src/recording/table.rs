@@ -9,11 +9,11 @@ const LARGEST_NUMBER: f64 = 1e12;
 
 /// A column that a table may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Column {
+pub struct Column<'a> {
     /// Name, with its unit as a suffix.
-    pub name: &'static str,
+    pub name: &'a str,
     /// What it holds, for a person (`height in metres`).
-    pub what: &'static str,
+    pub what: &'a str,
     /// Whether it holds labels rather than numbers.
     pub label: bool,
 }
@@ -29,23 +29,23 @@ pub enum Values {
 
 /// A table as it was read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
+pub struct Table<'a> {
     /// The file, as errors name it.
     pub file: String,
     /// Names in the order of the file.
-    pub names: Vec<&'static str>,
+    pub names: Vec<&'a str>,
     /// Cells by column, in the same order.
     pub columns: Vec<Values>,
     /// The line on which each row stands, from 1.
     pub lines: Vec<u64>,
 }
 
-impl Table {
+impl<'a> Table<'a> {
     /// Reads a table whose columns are all among `known`.
     ///
     /// # Errors
     /// [`ReadError`]: the first thing that is wrong, from the top.
-    pub fn read(path: &Path, known: &[Column]) -> Result<Self, ReadError> {
+    pub fn read(path: &Path, known: &[Column<'a>]) -> Result<Self, ReadError> {
         let file = path.display().to_string();
         let text = read_text(path)?;
         let mut reader =
@@ -60,7 +60,7 @@ impl Table {
         if !read(&mut reader, &mut record)? {
             return Err(ReadError::TooFewRows { file, what: "the file".into(), got: 0, expected: row });
         }
-        let mut chosen: Vec<Column> = Vec::with_capacity(record.len());
+        let mut chosen: Vec<Column<'a>> = Vec::with_capacity(record.len());
         for name in &record {
             let name = name.trim();
             let Some(column) = known.iter().find(|c| c.name == name) else {
@@ -164,12 +164,12 @@ impl Table {
     }
 }
 
-fn list(known: &[Column]) -> String {
+fn list(known: &[Column<'_>]) -> String {
     known.iter().map(|c| c.name).collect::<Vec<_>>().join(", ")
 }
 
 /// The column that was meant, where only the unit differs; else all known ones.
-fn meant(name: &str, known: &[Column]) -> String {
+fn meant(name: &str, known: &[Column<'_>]) -> String {
     let stem = |n: &str| n.split('_').next().unwrap_or_default().to_ascii_lowercase();
     let close = known.iter().find(|c| !c.label && stem(c.name) == stem(name) && name.len() <= 40);
     match close {

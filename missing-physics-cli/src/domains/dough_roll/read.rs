@@ -29,7 +29,7 @@ pub(super) struct Read {
     pub(super) runs: Vec<RunOfRolls>,
     pub(super) timed: bool,
     /// The file and the row to blame where the training rolls do not do.
-    pub(super) blame: Table,
+    pub(super) blame: Table<'static>,
 }
 
 /// Reads a recording.

@@ -1,0 +1,324 @@
+//! A simulator in a process of its own: one line of JSON in, one line of JSON out.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use crate::recording::{one_line, quoted};
+
+/// The longest line that a simulator may answer, bytes.
+const LONGEST_LINE: u64 = 64 << 20;
+/// How many of its last words on stderr are kept.
+const KEPT_ERRORS: usize = 3;
+/// How long a simulator has for its first answer beyond the time limit: programs take their time to start.
+const START: Duration = Duration::from_secs(30);
+/// How long a simulator that is no longer needed has for its own end.
+const FAREWELL: Duration = Duration::from_millis(200);
+
+/// What is asked.
+#[derive(Debug, Serialize)]
+struct Request<'a> {
+    id: u64,
+    run: &'a str,
+    parameters: BTreeMap<&'a str, f64>,
+    inputs: BTreeMap<&'a str, &'a [f64]>,
+}
+
+/// What is answered: predicted channels, or why there are none.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Reply {
+    id: u64,
+    #[serde(default)]
+    channels: BTreeMap<String, Vec<Option<f64>>>,
+    error: Option<String>,
+}
+
+/// Why there is no prediction.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Failure {
+    /// None at these parameters; others may do.
+    Here(String),
+    /// None any more.
+    Forever(String),
+}
+
+/// How a simulator is started.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    /// Program and arguments.
+    pub(super) command: Vec<String>,
+    /// The folder in which it runs.
+    pub(super) folder: PathBuf,
+    /// The longest wait for one answer.
+    pub(super) limit: Duration,
+    /// How many may run at once, at least 1.
+    pub(super) processes: usize,
+}
+
+/// Simulators that wait for work.
+#[derive(Debug)]
+pub(super) struct Pool {
+    start: Start,
+    state: Mutex<State>,
+    freed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    idle: Vec<Process>,
+    running: usize,
+    asked: u64,
+    fault: Option<String>,
+}
+
+impl Pool {
+    pub(super) fn new(start: Start) -> Self {
+        Self { start, state: Mutex::default(), freed: Condvar::new() }
+    }
+
+    /// Why no simulator answers any more.
+    pub(super) fn fault(&self) -> Option<String> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).fault.clone()
+    }
+
+    /// Predicts `channels` of a run, one after the other into `out`.
+    pub(super) fn predict(
+        &self,
+        run: &str,
+        parameters: BTreeMap<&str, f64>,
+        inputs: BTreeMap<&str, &[f64]>,
+        channels: &[String],
+        out: &mut [f64],
+    ) -> Result<(), Failure> {
+        let (mut process, id) = self.take()?;
+        let answer = process
+            .ask(&Request { id, run, parameters, inputs }, self.start.limit)
+            .and_then(|line| understood(&line, id, channels, out));
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        match &answer {
+            Err(Failure::Forever(why)) => {
+                state.fault.get_or_insert_with(|| why.clone());
+                state.running -= 1;
+            }
+            _ => state.idle.push(process),
+        }
+        drop(state);
+        self.freed.notify_one();
+        answer
+    }
+
+    /// A simulator that is idle, or a new one, or the first to be free; with the number of the question.
+    fn take(&self) -> Result<(Process, u64), Failure> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if let Some(fault) = &state.fault {
+                return Err(Failure::Forever(fault.clone()));
+            }
+            state.asked += 1;
+            let id = state.asked;
+            if let Some(process) = state.idle.pop() {
+                return Ok((process, id));
+            }
+            if state.running < self.start.processes {
+                return match Process::start(&self.start.command, &self.start.folder) {
+                    Ok(process) => {
+                        state.running += 1;
+                        Ok((process, id))
+                    }
+                    Err(why) => {
+                        state.fault = Some(why.clone());
+                        Err(Failure::Forever(why))
+                    }
+                };
+            }
+            state = self.freed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// Reads an answer into `out`.
+fn understood(line: &str, id: u64, channels: &[String], out: &mut [f64]) -> Result<(), Failure> {
+    let forever = |why: String| Err(Failure::Forever(why));
+    // Python and others write NaN and Infinity, which are no JSON.
+    let reply: Result<Reply, _> = serde_json::from_str(line).or_else(|e| {
+        let plain = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+        serde_json::from_str(&plain).map_err(|_| e)
+    });
+    let reply = match reply {
+        Ok(reply) => reply,
+        Err(e) => {
+            return forever(format!(
+                "the simulator answered {}, expected {{\"id\": {id}, \"channels\": {{…}}}} on one line ({})",
+                quoted(line),
+                one_line(&e.to_string())
+            ));
+        }
+    };
+    if reply.id != id {
+        return forever(format!("the simulator answered question {}, expected question {id}", reply.id));
+    }
+    if let Some(why) = reply.error {
+        return Err(Failure::Here(format!("the simulator says {}", quoted(&why))));
+    }
+    let rows = out.len() / channels.len().max(1);
+    for (name, out) in channels.iter().zip(out.chunks_exact_mut(rows.max(1))) {
+        let Some(values) = reply.channels.get(name) else {
+            let names: Vec<&str> = reply.channels.keys().map(String::as_str).collect();
+            let got = if names.is_empty() { "none".into() } else { names.join(", ") };
+            return forever(format!(
+                "the simulator answered the channels {}, expected {name}",
+                one_line(&got)
+            ));
+        };
+        if values.len() != rows {
+            return forever(format!(
+                "the simulator answered {} values of {name}, expected {rows}, one for each row",
+                values.len()
+            ));
+        }
+        for (row, (out, value)) in out.iter_mut().zip(values).enumerate() {
+            *out = value.filter(|v| v.is_finite()).ok_or_else(|| {
+                Failure::Here(format!("the simulator answered no finite number for {name} at row {row}"))
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// A simulator that runs.
+#[derive(Debug)]
+struct Process {
+    child: Child,
+    questions: Option<Sender<String>>,
+    answers: Receiver<Vec<u8>>,
+    errors: Arc<Mutex<VecDeque<String>>>,
+    fresh: bool,
+}
+
+impl Process {
+    fn start(command: &[String], folder: &Path) -> Result<Self, String> {
+        let (program, arguments) = command.split_first().ok_or("no command to start")?;
+        let mut child = Command::new(program)
+            .args(arguments)
+            .current_dir(folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|e| format!("the simulator {} cannot be started: {e}", quoted(program)))?;
+        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (Some(mut stdin), Some(stdout), Some(stderr)) = pipes else {
+            return Err(format!("the simulator {} has no pipes", quoted(program)));
+        };
+        let (questions, to_write) = channel::<String>();
+        // Threads of its own write and read: a simulator that does neither cannot hold anybody up.
+        std::thread::spawn(move || {
+            for line in to_write {
+                if stdin.write_all(line.as_bytes()).and_then(|()| stdin.flush()).is_err() {
+                    break;
+                }
+            }
+        });
+        let (found, answers) = channel();
+        std::thread::spawn(move || {
+            let mut stdout = BufReader::new(stdout);
+            loop {
+                let mut line = Vec::new();
+                match stdout.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line) {
+                    Ok(n) if n > 0 && found.send(line).is_ok() => {}
+                    _ => break,
+                }
+            }
+        });
+        let errors = Arc::new(Mutex::new(VecDeque::new()));
+        let kept = Arc::clone(&errors);
+        std::thread::spawn(move || {
+            for line in BufReader::new(stderr).split(b'\n').map_while(Result::ok) {
+                let line = String::from_utf8_lossy(&line).trim().to_owned();
+                let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+                if !line.is_empty() {
+                    kept.push_back(line);
+                }
+                if kept.len() > KEPT_ERRORS {
+                    kept.pop_front();
+                }
+            }
+        });
+        Ok(Self { child, questions: Some(questions), answers, errors, fresh: true })
+    }
+
+    /// The line that answers a question.
+    fn ask(&mut self, request: &Request<'_>, limit: Duration) -> Result<String, Failure> {
+        let mut line = serde_json::to_string(request)
+            .map_err(|e| Failure::Here(format!("the question cannot be written: {e}")))?;
+        line.push('\n');
+        let limit = if std::mem::take(&mut self.fresh) { limit + START } else { limit };
+        if self.questions.as_ref().is_none_or(|q| q.send(line).is_err()) {
+            return Err(self.ended());
+        }
+        match self.answers.recv_timeout(limit) {
+            Ok(line) => String::from_utf8(line).map_err(|e| {
+                let got = String::from_utf8_lossy(e.as_bytes()).into_owned();
+                Failure::Forever(format!("the simulator answered {}, which is no text", quoted(&got)))
+            }),
+            Err(RecvTimeoutError::Timeout) => {
+                let _ = self.child.kill();
+                let limit = limit.as_secs_f64();
+                Err(Failure::Forever(format!(
+                    "the simulator gave no answer within {limit} s{}",
+                    self.last_words()
+                )))
+            }
+            Err(RecvTimeoutError::Disconnected) => Err(self.ended()),
+        }
+    }
+
+    /// What became of a simulator that answers no more.
+    fn ended(&mut self) -> Failure {
+        let how = match wait(&mut self.child, FAREWELL) {
+            Some(status) => format!("ended ({status})"),
+            None => "closed its output".into(),
+        };
+        Failure::Forever(format!("the simulator {how} before it answered{}", self.last_words()))
+    }
+
+    fn last_words(&self) -> String {
+        // The thread that reads them may still be at it.
+        std::thread::sleep(Duration::from_millis(50));
+        let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        match errors.back() {
+            Some(last) => format!("; its last words: {}", quoted(last)),
+            None => String::new(),
+        }
+    }
+}
+
+/// How a process ended, if it does in time.
+fn wait(child: &mut Child, patience: Duration) -> Option<std::process::ExitStatus> {
+    let begin = Instant::now();
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return Some(status),
+            Ok(None) if begin.elapsed() < patience => std::thread::sleep(Duration::from_millis(5)),
+            _ => return None,
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // The end of its input tells a simulator to end; one that does not is ended.
+        self.questions = None;
+        if wait(&mut self.child, FAREWELL).is_none() {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+}
