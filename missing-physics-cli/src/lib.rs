@@ -6,4 +6,5 @@
 pub mod commands;
 pub mod domains;
 pub mod recording;
+pub mod repair;
 pub mod report;

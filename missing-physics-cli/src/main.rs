@@ -30,6 +30,9 @@ enum Command {
         /// Write the report as one HTML page as well.
         #[arg(long, value_name = "FILE")]
         html: Option<PathBuf>,
+        /// Write the repaired model as well, for `predict`.
+        #[arg(long, value_name = "FILE")]
+        write_model: Option<PathBuf>,
         /// Seed of every random draw.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -39,6 +42,16 @@ enum Command {
         /// Rate of false alarms that is put up with, above 0 and below 0.5.
         #[arg(long, default_value_t = 0.05)]
         alpha: f64,
+    },
+    /// Predicts a recording by a repaired model: simulated channels as CSV, with intervals.
+    Predict {
+        /// The model that `diagnose --write-model` wrote.
+        model: PathBuf,
+        /// The recording's folder; cells of its table may be empty, where nothing was measured yet.
+        folder: PathBuf,
+        /// Write the table to a file instead of printing it.
+        #[arg(long, value_name = "FILE")]
+        csv: Option<PathBuf>,
     },
     /// Lists what the tool knows: domains, baselines, mechanisms, columns.
     Domains,
@@ -92,11 +105,12 @@ impl Drop for Bar {
 
 fn run(command: Command) -> Result<String, CommandError> {
     match command {
-        Command::Diagnose { folder, json, html, seed, threads, alpha } => {
+        Command::Diagnose { folder, json, html, write_model, seed, threads, alpha } => {
             let options = Options { alpha, seed, ..Options::default() };
-            let arguments = DiagnoseArguments { folder, json, html, options, threads };
+            let arguments = DiagnoseArguments { folder, json, html, model: write_model, options, threads };
             commands::diagnose(&arguments, &Bar::new())
         }
+        Command::Predict { model, folder, csv } => commands::predict(&model, &folder, csv.as_deref()),
         Command::Domains => Ok(commands::domains()),
         Command::Check { folder } => commands::check(&folder),
         Command::New { domain, folder } => commands::new(&domain, &folder),

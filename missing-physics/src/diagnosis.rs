@@ -1,5 +1,7 @@
 //! The answer: everything that a report, a machine or another program needs of a diagnosis.
 
+use crate::repaired::Repaired;
+
 /// What the recording says of the baseline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -276,6 +278,8 @@ pub struct Diagnosis {
     pub outliers: Vec<Outlier>,
     /// Remarks: non-convergence, few rows, strong correlation.
     pub remarks: Vec<String>,
+    /// The model that the diagnosis ended with: the chosen mechanisms on, or the baseline.
+    pub repaired: Repaired,
     /// Data and fits, for drawing.
     pub curves: Vec<Curves>,
 }

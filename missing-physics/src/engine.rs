@@ -20,6 +20,7 @@ use crate::noise_rule::noise_rule;
 use crate::observer::{Observer, Progress};
 use crate::outliers::set_aside;
 use crate::problem::Problem;
+use crate::repaired::Repaired;
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,7 +150,7 @@ fn diagnose_with(
         unknowns,
     };
     if adequacy.p_value > options.alpha {
-        let mut diagnosis = work.skeleton(&adequacy, Verdict::Adequate, &baseline.fit)?;
+        let mut diagnosis = work.skeleton(&adequacy, Verdict::Adequate, &baseline)?;
         diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
         diagnosis.after = diagnosis.before.clone();
         return Ok(diagnosis);
@@ -207,8 +208,8 @@ fn diagnose_with(
     let explained = best
         .filter(|(c, p)| *p > enough && score_of(&c.set).is_some_and(|s| s.log_score > base_score.log_score));
 
-    let final_fit = explained.map_or(&baseline.fit, |(c, _)| &c.fit);
-    let mut diagnosis = work.skeleton(&adequacy, Verdict::Unexplained, final_fit)?;
+    let final_model = explained.map_or(&baseline, |(c, _)| c);
+    let mut diagnosis = work.skeleton(&adequacy, Verdict::Unexplained, final_model)?;
     diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
     diagnosis.after = diagnosis.before.clone();
     work.mechanisms(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best.map(|b| b.0));
@@ -370,7 +371,7 @@ impl Work<'_> {
         &mut self,
         adequacy: &adequacy::Adequacy,
         verdict: Verdict,
-        last: &Fit,
+        model: &Candidate,
     ) -> Result<Diagnosis, PredictError> {
         let recording = &self.problem.recording;
         let pairs =
@@ -393,7 +394,7 @@ impl Work<'_> {
             variables: pairs(&recording.variables),
             baseline: self.problem.spec().baseline.clone(),
             baseline_parameters: estimates(self.problem, self.baseline, &free, &[], None),
-            noise: self.noise(last),
+            noise: self.noise(&model.fit),
             location: Vec::new(),
             mechanisms: Vec::new(),
             sets: Vec::new(),
@@ -408,6 +409,7 @@ impl Work<'_> {
             undetermined: Vec::new(),
             outliers: std::mem::take(&mut self.outliers),
             remarks,
+            repaired: Repaired::of(self.problem, model),
             curves: Vec::new(),
         };
         let before = law::predictions(self.problem, self.plain)?;

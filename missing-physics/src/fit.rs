@@ -209,6 +209,28 @@ struct Linearised {
     chi2: f64,
 }
 
+/// Normal equations of one run with the prior of its own parameters, which come first, then the shared ones, then the residual.
+pub(crate) fn own_normal(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    run: usize,
+    shared: &[f64],
+    own: &[f64],
+) -> Result<DMatrix<f64>, PredictError> {
+    let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, own)?);
+    let last = gram.nrows() - 1;
+    for (i, &slot) in selection.own.iter().enumerate() {
+        let precision = 1.0 / own_prior_width(problem, selection, i).powi(2);
+        let departure = problem.own_start[run][slot] - own[slot];
+        gram[(i, i)] += precision;
+        gram[(i, last)] += precision * departure;
+        gram[(last, i)] += precision * departure;
+        gram[(last, last)] += precision * departure * departure;
+    }
+    Ok(gram)
+}
+
 fn linearise(
     problem: &Problem<'_>,
     selection: &Selection,
@@ -219,16 +241,8 @@ fn linearise(
     let mut normals = Vec::with_capacity(own.len());
     let mut chi2 = 0.0;
     for (run, values) in own.iter().enumerate() {
-        let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, values)?);
+        let gram = own_normal(problem, selection, noise, run, shared, values)?;
         let last = gram.nrows() - 1;
-        for (i, &slot) in selection.own.iter().enumerate() {
-            let precision = 1.0 / own_prior_width(problem, selection, i).powi(2);
-            let departure = problem.own_start[run][slot] - values[slot];
-            gram[(i, i)] += precision;
-            gram[(i, last)] += precision * departure;
-            gram[(last, i)] += precision * departure;
-            gram[(last, last)] += precision * departure * departure;
-        }
         chi2 += gram[(last, last)];
         normals.push(RunNormal { gram });
     }

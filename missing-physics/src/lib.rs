@@ -19,4 +19,5 @@ pub mod observer;
 mod outliers;
 mod own_prior;
 mod problem;
+pub mod repaired;
 pub mod synthetic;

@@ -1,6 +1,6 @@
 //! Small dense helpers for normal equations.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Dot product.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -89,6 +89,24 @@ pub(crate) fn backward(factor: &DMatrix<f64>, kept: &[bool], b: &mut [f64]) {
 /// Log determinant over the kept pivots.
 pub(crate) fn log_determinant(factor: &DMatrix<f64>, kept: &[bool]) -> f64 {
     (0..kept.len()).filter(|&i| kept[i]).map(|i| 2.0 * factor[(i, i)].ln()).sum()
+}
+
+/// Inverse of a symmetric matrix that may be of low rank, whatever the units of its rows: directions that it does not tell are
+/// left out.
+pub(crate) fn inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    /// Relative to rows of unit length.
+    const LEAST: f64 = 1e-12;
+    let n = matrix.nrows();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let scale: Vec<f64> =
+        (0..n).map(|i| matrix[(i, i)].sqrt()).map(|d| if d > 0.0 { 1.0 / d } else { 0.0 }).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::new(scaled);
+    let weights = eigen.eigenvalues.map(|v| if v > LEAST { 1.0 / v } else { 0.0 });
+    let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&weights) * eigen.eigenvectors.transpose();
+    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
 }
 
 /// The columns that a channel determines: those whose sum of squares in it (`here`) is not small beside the largest over

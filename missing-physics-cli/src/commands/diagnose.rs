@@ -7,6 +7,7 @@ use missing_physics::observer::Observer;
 
 use super::{CommandError, write_whole};
 use crate::domains;
+use crate::repair::{Repair, RepairError};
 use crate::report::{self, ReportContext};
 
 /// What `diagnose` is asked for.
@@ -18,6 +19,8 @@ pub struct DiagnoseArguments {
     pub json: Option<PathBuf>,
     /// Where the page goes.
     pub html: Option<PathBuf>,
+    /// Where the repaired model goes.
+    pub model: Option<PathBuf>,
     /// Seed and false-alarm rate.
     pub options: Options,
     /// Number of threads; 0 for all cores.
@@ -29,7 +32,7 @@ pub struct DiagnoseArguments {
 /// # Errors
 /// [`CommandError`]; nothing is written then.
 pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<String, CommandError> {
-    for path in arguments.json.iter().chain(&arguments.html) {
+    for path in arguments.json.iter().chain(&arguments.html).chain(&arguments.model) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
             return Err(CommandError::Other(format!("{}: no such folder to write to", folder.display())));
@@ -42,6 +45,9 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
         }
     }
     let (domain, loaded) = domains::load(&arguments.folder)?;
+    if arguments.model.is_some() && !domain.predicts() {
+        return Err(RepairError::NoChannels { domain: domain.id() }.into());
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads)
         .build()
@@ -64,6 +70,9 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
     }
     if let Some(path) = &arguments.html {
         write_whole(path, &report::html(&diagnosis, &context))?;
+    }
+    if let Some(path) = &arguments.model {
+        write_whole(path, &Repair::new(domain, &diagnosis).to_json())?;
     }
     Ok(report::text(&diagnosis, &context))
 }

@@ -3,10 +3,12 @@
 mod diagnose;
 mod list;
 mod new;
+mod predict;
 
 pub use diagnose::{DiagnoseArguments, diagnose};
 pub use list::{check, domains};
 pub use new::new;
+pub use predict::predict;
 
 /// Why a command failed; its text is one line.
 #[derive(Debug, thiserror::Error)]
@@ -17,6 +19,9 @@ pub enum CommandError {
     /// The recording cannot be diagnosed.
     #[error(transparent)]
     Diagnose(#[from] missing_physics::engine::DiagnoseError),
+    /// The repaired model cannot be read, or does not fit the recording.
+    #[error(transparent)]
+    Repair(#[from] crate::repair::RepairError),
     /// Something else, in words.
     #[error("{0}")]
     Other(String),

@@ -67,6 +67,11 @@ pub trait Domain: Sync {
     fn spec(&self) -> Spec;
     /// A recording to begin from.
     fn template(&self) -> Template;
+    /// Whether its channels are what is measured, so that a model of them can predict a run; false where the engine is shown
+    /// errors that the domain has whitened.
+    fn predicts(&self) -> bool {
+        true
+    }
     /// Reads the recording that a header describes.
     ///
     /// # Errors
@@ -115,7 +120,18 @@ pub fn find(id: &str) -> Result<&'static dyn Domain, String> {
 /// # Errors
 /// [`ReadError`].
 pub fn load(folder: &std::path::Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
-    let header = Header::read(folder)?;
+    load_with(&Header::read(folder)?)
+}
+
+/// Reads a recording in whose table cells may be empty, where nothing was measured: what is to be predicted.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn load_with_gaps(folder: &std::path::Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
+    load_with(&Header::read_with_gaps(folder)?)
+}
+
+fn load_with(header: &Header) -> Result<(&'static dyn Domain, Loaded), ReadError> {
     let known: Vec<&str> = all().iter().map(|d| d.id()).collect();
     let expected = format!("one of: {}", known.join(", "));
     let id = header.root().text("domain", &expected)?;
@@ -129,7 +145,7 @@ pub fn load(folder: &std::path::Path) -> Result<(&'static dyn Domain, Loaded), R
             expected
         },
     })?;
-    let loaded = domain.load(&header)?;
+    let loaded = domain.load(header)?;
     header.finish()?;
     Ok((domain, loaded))
 }

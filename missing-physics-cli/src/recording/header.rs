@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::{ReadError, one_line, quoted, read_text};
+use super::{Column, ReadError, inside, one_line, quoted, read_text};
 
 /// A parsed `recording.toml`.
 #[derive(Debug)]
@@ -15,6 +15,8 @@ pub struct Header {
     pub folder: PathBuf,
     /// The file, as errors name it.
     pub file: String,
+    /// Whether a cell of a number may be empty: a row that was not measured.
+    gaps: bool,
     root: Table,
     asked: RefCell<BTreeSet<String>>,
 }
@@ -33,6 +35,18 @@ impl Header {
     /// # Errors
     /// [`ReadError`] where the file is missing, is not TOML, or is of another format.
     pub fn read(folder: &Path) -> Result<Self, ReadError> {
+        Self::read_with(folder, false)
+    }
+
+    /// The same for a recording in whose tables cells may be empty, where nothing was measured.
+    ///
+    /// # Errors
+    /// As [`Header::read`].
+    pub fn read_with_gaps(folder: &Path) -> Result<Self, ReadError> {
+        Self::read_with(folder, true)
+    }
+
+    fn read_with(folder: &Path, gaps: bool) -> Result<Self, ReadError> {
         let path = folder.join("recording.toml");
         let file = path.display().to_string();
         let text = read_text(&path)?;
@@ -41,12 +55,21 @@ impl Header {
             let row = text.as_bytes()[..at].iter().filter(|b| **b == b'\n').count() + 1;
             ReadError::Toml { file: file.clone(), row, why: one_line(e.message()) }
         })?;
-        let header = Self { folder: folder.into(), file, root, asked: RefCell::default() };
+        let header = Self { folder: folder.into(), file, gaps, root, asked: RefCell::default() };
         match header.root().value("format") {
             Some(Value::Integer(1)) => Ok(header),
             Some(other) => Err(header.wrong("format", other, "1")),
             None => Err(header.missing("format", "1")),
         }
+    }
+
+    /// The table that a key outside any section names.
+    ///
+    /// # Errors
+    /// [`ReadError`]: no such key, no such file, or the first thing that is wrong in it.
+    pub fn table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<super::Table<'c>, ReadError> {
+        let name = self.root().text(key, "the name of a CSV file")?;
+        super::Table::read(&inside(&self.folder, &self.file, key, name)?, known, self.gaps)
     }
 
     /// The keys outside any section.

@@ -23,7 +23,7 @@ pub struct Column<'a> {
 pub enum Values {
     /// Labels.
     Labels(Vec<String>),
-    /// Finite numbers.
+    /// Finite numbers; NaN for an empty cell, where they may be empty.
     Numbers(Vec<f64>),
 }
 
@@ -41,11 +41,11 @@ pub struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Reads a table whose columns are all among `known`.
+    /// Reads a table whose columns are all among `known`; with `gaps` a cell of a number may be empty.
     ///
     /// # Errors
     /// [`ReadError`]: the first thing that is wrong, from the top.
-    pub fn read(path: &Path, known: &[Column<'a>]) -> Result<Self, ReadError> {
+    pub fn read(path: &Path, known: &[Column<'a>], gaps: bool) -> Result<Self, ReadError> {
         let file = path.display().to_string();
         let text = read_text(path)?;
         let mut reader =
@@ -97,6 +97,7 @@ impl<'a> Table<'a> {
                 match values {
                     Values::Labels(_) if cell.is_empty() => return Err(wrong("a label")),
                     Values::Labels(labels) => labels.push(cell.to_owned()),
+                    Values::Numbers(numbers) if gaps && cell.is_empty() => numbers.push(f64::NAN),
                     Values::Numbers(numbers) => match cell.parse::<f64>() {
                         Ok(v) if v.is_finite() && v.abs() <= LARGEST_NUMBER => numbers.push(v),
                         Ok(v) if v.is_finite() => {

@@ -23,7 +23,7 @@ use self::read::{Rig, heard};
 use self::spread::Known;
 use super::reading::number;
 use super::{Domain, Loaded, Template};
-use crate::recording::{Column, Header, ReadError, Table, inside};
+use crate::recording::{Column, Header, ReadError};
 
 const COLUMNS: [Column; 5] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -81,6 +81,10 @@ impl Domain for Bounce {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
+    fn predicts(&self) -> bool {
+        false
+    }
+
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
         let rig = Rig::read(header)?;
         let noise = header.section("noise")?;
@@ -97,8 +101,8 @@ impl Domain for Bounce {
             }
             return Ok(loaded);
         }
-        let name = header.root().text("data", "the name of a CSV file (or [audio] files)")?;
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+        header.root().text("data", "the name of a CSV file (or [audio] files)")?;
+        let table = header.table("data", &COLUMNS)?;
         let heard = heard(&table, &rig)?;
         assemble::assemble(heard, &rig, known, &Microphones::default()).map_err(|(row, what)| {
             let time = table.numbers("t_s").map_or(f64::NAN, |t| t[row]);

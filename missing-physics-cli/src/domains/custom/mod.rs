@@ -13,7 +13,7 @@ use missing_physics::model::{Experiment, Quantity, Scope, Spec};
 use super::builder::Builder;
 use super::reading::{calibration, check_runs, number, resolution};
 use super::{Domain, Loaded, Template};
-use crate::recording::{Column, Header, ReadError, Table, inside, quoted};
+use crate::recording::{Column, Header, ReadError, Table, quoted};
 use model::{Asked, CustomModel, Simulation};
 use process::Pool;
 use terms::Sizes;
@@ -76,7 +76,6 @@ impl Domain for Custom {
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
         let inputs = quantities(header, "input")?;
         let channels = quantities(header, "channel")?;
-        let name = header.root().text("data", "the name of a CSV file")?;
         let (program, relative_step) = declare::program(header)?;
         let mut b = Builder::default();
         let parameters = declare::declare(header, &mut b)?;
@@ -91,7 +90,7 @@ impl Domain for Custom {
         if program.is_none() {
             known.extend(simulated.iter().map(|n| number(n, "the simulation's prediction of a channel")));
         }
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &known)?;
+        let table = header.table("data", &known)?;
         let runs = runs(&table, &inputs, &channels)?;
         let rises = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
         let along = runs.iter().all(rises);
@@ -220,7 +219,7 @@ fn experiments(
     }
     let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
     known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
-    let table = Table::read(&inside(&header.folder, &header.file, "experiments", name)?, &known)?;
+    let table = header.table("experiments", &known)?;
     let own: Vec<f64> =
         spec.parameters.iter().filter(|p| p.scope == Scope::PerRun).map(|p| p.start).collect();
     let experiment = |mut run: Run| {

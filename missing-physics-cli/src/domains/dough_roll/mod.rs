@@ -66,6 +66,10 @@ impl Domain for DoughRoll {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
+    fn predicts(&self) -> bool {
+        false
+    }
+
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
         let read = read::read(header)?;
         let dynamics = Dynamics::learn(&read.training).map_err(|e| ReadError::TooFewRows {

@@ -46,12 +46,12 @@ pub(super) fn read(header: &Header) -> Result<Read, ReadError> {
     for name in CHANNELS {
         noise.number(name, f64::MIN_POSITIVE, 1e3)?;
     }
-    let name = header.root().text("data", "the name of a CSV file")?;
-    let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+    let table = header.table("data", &COLUMNS)?;
     let (mut runs, timed) = rolls(&table)?;
     let (training, blame) = match rig.optional_text("training", "the name of a CSV file")? {
         Some(name) => {
-            let table = Table::read(&inside(&header.folder, &header.file, "rig.training", name)?, &COLUMNS)?;
+            let table =
+                Table::read(&inside(&header.folder, &header.file, "rig.training", name)?, &COLUMNS, false)?;
             (rolls(&table)?.0, table)
         }
         None => {

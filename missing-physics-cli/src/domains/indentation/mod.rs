@@ -10,7 +10,7 @@ use missing_physics::model::{Model, Quantity, Spec};
 
 use super::reading::{calibration, check_runs, number, resolution};
 use super::{Domain, Loaded, Template};
-use crate::recording::{Column, Header, ReadError, Section, Table, inside, quoted};
+use crate::recording::{Column, Header, ReadError, Section, Table, quoted};
 use model::{Condition, IndentationModel, Setup};
 
 const COLUMNS: [Column; 8] = [
@@ -80,12 +80,11 @@ impl Domain for Indentation {
     }
 
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
-        let name = header.root().text("data", "the name of a CSV file")?;
         let rig = header.section("rig")?;
         let (indenter, radius_known) = indenter(&rig)?;
         let poisson_ratio = rig.number("poisson_ratio", -0.99, 0.5)?.unwrap_or(0.5);
         let thickness_m = rig.number("thickness_m", 1e-9, 1e3)?;
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+        let table = header.table("data", &COLUMNS)?;
         let labels = table.labels("run", "the label of each row's run")?;
         let column = |name: &str, what: &str| table.numbers(name).ok_or_else(|| table.missing(name, what));
         let (depths, forces) =

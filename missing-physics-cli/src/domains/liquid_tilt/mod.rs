@@ -81,7 +81,6 @@ impl Domain for LiquidTilt {
     }
 
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
-        let name = header.root().text("data", "the name of a CSV file")?;
         let rig = header.section("rig")?;
         let vessel = vessel(header, &rig)?;
         let grasp = Grasp {
@@ -92,7 +91,7 @@ impl Domain for LiquidTilt {
             gravity_m_s2: rig.number("gravity_m_s2", 1e-3, 1e3)?.unwrap_or(9.80665),
         };
         let density_kg_m3 = rig.number("density_kg_m3", 1.0, 1e5)?;
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+        let table = header.table("data", &COLUMNS)?;
         let labels = table.labels("run", "the label of each row's run")?;
         let column = |name: &str, what: &str| table.numbers(name).ok_or_else(|| table.missing(name, what));
         let theta = column("theta_rad", "tilt in radians")?;

@@ -9,7 +9,7 @@ use missing_physics::model::{Model, Quantity, Spec};
 
 use super::reading::{calibration, check_runs, number, resolution};
 use super::{Domain, Loaded, Template};
-use crate::recording::{Column, Header, ReadError, Section, Table, inside};
+use crate::recording::{Column, Header, ReadError, Section};
 use model::{Channel, Setup, SloshModel};
 
 const COLUMNS: [Column; 4] = [
@@ -63,9 +63,8 @@ impl Domain for Slosh {
     }
 
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
-        let name = header.root().text("data", "the name of a CSV file")?;
         let (mut setup, rig) = setup(header)?;
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+        let table = header.table("data", &COLUMNS)?;
         let labels = table.labels("run", "the label of each row's run")?;
         let times = table.numbers("t_s").ok_or_else(|| table.missing("t_s", "time in seconds"))?;
         let (channel, values) = match (table.numbers("tau_z_nm"), table.numbers("fx_n")) {

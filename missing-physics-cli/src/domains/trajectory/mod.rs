@@ -9,7 +9,7 @@ use missing_physics::model::{Quantity, Spec};
 
 use super::reading::{calibration, check_runs, number, resolution};
 use super::{Domain, Loaded, Template};
-use crate::recording::{Column, Header, ReadError, Table, inside};
+use crate::recording::{Column, Header, ReadError, Table};
 use model::{Axes, Setup, TrajectoryModel};
 
 const COLUMNS: [Column; 9] = [
@@ -73,13 +73,12 @@ impl Domain for Trajectory {
     }
 
     fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
-        let name = header.root().text("data", "the name of a CSV file")?;
         let rig = header.section("rig")?;
         let mass_kg = rig.number("mass_kg", 1e-9, 1e6)?;
         let diameter_m = rig.number("diameter_m", 1e-6, 1e3)?;
         let gravity_m_s2 = rig.number("gravity_m_s2", 0.0, 100.0)?.unwrap_or(9.80665);
         let air_density_kg_m3 = rig.number("air_density_kg_m3", 0.0, 2e3)?.unwrap_or(1.2);
-        let table = Table::read(&inside(&header.folder, &header.file, "data", name)?, &COLUMNS)?;
+        let table = header.table("data", &COLUMNS)?;
         let labels = table.labels("run", "the label of each row's run")?;
         let times = table.numbers("t_s").ok_or_else(|| table.missing("t_s", "time in seconds"))?;
         let axes = axes(&table)?;

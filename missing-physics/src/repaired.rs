@@ -1,0 +1,243 @@
+//! The model that a diagnosis ended with, as a value: to be kept, and to predict runs that were not there.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::compare::Candidate;
+use crate::data::{Recording, RecordingError};
+use crate::fit::{NoiseState, own_normal, solve};
+use crate::linalg::inverse;
+use crate::model::{Model, PredictError, Quantity};
+use crate::noise::family;
+use crate::problem::{Problem, Selection};
+
+/// A model with its mechanisms on, and how well its parameters are known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Repaired {
+    /// Identifiers of the mechanisms that are on; none for a baseline that was adequate.
+    pub mechanisms: Vec<String>,
+    /// All shared parameters of the full model, in its order.
+    pub parameters: Vec<Shared>,
+    /// Which of them were fitted: indices into `parameters`.
+    pub fitted: Vec<usize>,
+    /// Covariance of the fitted ones, row by row, in their order.
+    pub covariance: Vec<Vec<f64>>,
+    /// Noise by channel.
+    pub noise: Vec<KnownNoise>,
+    /// Step between rows to which the noise's correlation refers, in the unit of the variable along which it runs.
+    pub noise_step: f64,
+}
+
+/// A shared parameter and its value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shared {
+    /// Name with its unit as a suffix.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+}
+
+/// The noise of a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownNoise {
+    /// Name of the channel.
+    pub channel: String,
+    /// One sigma of a reading.
+    pub sigma: f64,
+    /// Number of its correlation among the shapes that the engine knows; 0 is white.
+    pub shape: usize,
+}
+
+/// Why a repaired model cannot predict a recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RepairedError {
+    /// The model was written for another simulation.
+    #[error("the model knows the {what} {got}, this simulation has {expected}")]
+    Other {
+        /// What differs (`channels`, `parameters`, `mechanism`).
+        what: &'static str,
+        /// What the model has.
+        got: String,
+        /// What the simulation has.
+        expected: String,
+    },
+    /// Sizes, signs or numbers that no diagnosis writes.
+    #[error("the model is damaged: {0}")]
+    Damaged(&'static str),
+    /// A run whose own unknowns nothing tells.
+    #[error("run {run} has {got} measured values, expected at least {expected} to tell how it began")]
+    NotStarted {
+        /// Label of the run.
+        run: String,
+        /// Measured values in it.
+        got: usize,
+        /// Its own unknowns.
+        expected: usize,
+    },
+    /// The recording is not sound.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The simulation gave no prediction.
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+}
+
+/// What the model says of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictedRun {
+    /// Label of the run.
+    pub label: String,
+    /// Simulated channels, one column each.
+    pub channels: Vec<Vec<f64>>,
+    /// One sigma of each simulated value: what is not known of the shared parameters and of the run's own ones.
+    pub sigma: Vec<Vec<f64>>,
+}
+
+impl Repaired {
+    pub(crate) fn of(problem: &Problem<'_>, model: &Candidate) -> Self {
+        let spec = problem.spec();
+        let (fit, selection) = (&model.fit, &model.selection);
+        let covariance = inverse(&fit.information);
+        let shared = problem.shared.index.iter().zip(&fit.shared);
+        Self {
+            mechanisms: model.set.iter().map(|&m| spec.mechanisms[m].id.clone()).collect(),
+            parameters: shared
+                .map(|(&i, &value)| Shared { name: spec.parameters[i].name.clone(), value })
+                .collect(),
+            fitted: selection.shared.clone(),
+            covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            noise: (0..problem.channels())
+                .map(|c| KnownNoise {
+                    channel: problem.recording.channels[c].name.clone(),
+                    sigma: fit.noise.sigma[c],
+                    shape: fit.noise.shape[c],
+                })
+                .collect(),
+            noise_step: problem.step,
+        }
+    }
+
+    /// Predicts every row of a recording, measured or not (NaN where a channel was not measured).
+    ///
+    /// The shared parameters stay as they were found; each run's own ones (where it began) are fitted to its measured rows.
+    ///
+    /// # Errors
+    /// [`RepairedError`].
+    pub fn predict(
+        &self,
+        model: &dyn Model,
+        recording: &Recording,
+    ) -> Result<Vec<PredictedRun>, RepairedError> {
+        recording.check()?;
+        let mut problem = Problem::new(model, recording.clone());
+        problem.step = self.noise_step;
+        let selection = self.matching(&problem)?;
+        let noise = NoiseState {
+            shape: self.noise.iter().map(|n| n.shape).collect(),
+            sigma: self.noise.iter().map(|n| n.sigma).collect(),
+        };
+        let unknown = selection.own.len();
+        for (run, rows) in recording.runs.iter().zip(&problem.rows) {
+            let got = rows.valid.iter().map(Vec::len).sum();
+            if got < unknown {
+                return Err(RepairedError::NotStarted { run: run.label.clone(), got, expected: unknown });
+            }
+        }
+        let shared: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let still = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+        let own = solve(&problem, &still, &noise, &shared, &problem.own_start)?.own;
+        (0..recording.runs.len())
+            .map(|run| self.predict_run(&problem, &selection, &noise, run, &shared, &own[run]))
+            .collect()
+    }
+
+    fn predict_run(
+        &self,
+        problem: &Problem<'_>,
+        selection: &Selection,
+        noise: &NoiseState,
+        run: usize,
+        shared: &[f64],
+        own: &[f64],
+    ) -> Result<PredictedRun, RepairedError> {
+        let data = &problem.recording.runs[run];
+        let (n_shared, n_own) = (selection.shared.len(), selection.own.len());
+        let rows = problem.channels() * data.len();
+        let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows * (n_shared + n_own)]);
+        problem.model.jacobian(
+            data,
+            shared,
+            own,
+            &selection.shared,
+            &selection.own,
+            &mut out,
+            &mut jacobian,
+        )?;
+        let jacobian = DMatrix::from_vec(rows, n_shared + n_own, jacobian);
+        // The run's own parameters follow the shared ones: d own / d shared = -A^-1 B of its normal equations.
+        let normal = own_normal(problem, selection, noise, run, shared, own)?;
+        let own_covariance = inverse(&normal.view((0, 0), (n_own, n_own)).into_owned());
+        let follow = -(&own_covariance * normal.view((0, n_own), (n_own, n_shared)));
+        let covariance = DMatrix::from_fn(n_shared, n_shared, |i, j| self.covariance[i][j]);
+        let by_own = jacobian.columns(n_shared, n_own).into_owned();
+        let by_shared = jacobian.columns(0, n_shared) + &by_own * follow;
+        let quadratic = |by: &DMatrix<f64>, of: &DMatrix<f64>| -> DVector<f64> {
+            let product = by * of;
+            DVector::from_iterator(rows, (0..rows).map(|r| product.row(r).dot(&by.row(r))))
+        };
+        let variance = quadratic(&by_own, &own_covariance) + quadratic(&by_shared, &covariance);
+        let sigma: Vec<f64> = variance.iter().map(|v| v.max(0.0).sqrt()).collect();
+        let columns = |all: &[f64]| all.chunks(data.len().max(1)).map(<[f64]>::to_vec).collect();
+        Ok(PredictedRun { label: data.label.clone(), channels: columns(&out), sigma: columns(&sigma) })
+    }
+
+    /// What is free with the model's mechanisms on, if the model is one of this simulation's.
+    fn matching(&self, problem: &Problem<'_>) -> Result<Selection, RepairedError> {
+        let spec = problem.spec();
+        let differ = |what, got: Vec<&str>, expected: Vec<&str>| {
+            if got == expected {
+                return Ok(());
+            }
+            Err(RepairedError::Other { what, got: got.join(", "), expected: expected.join(", ") })
+        };
+        fn names(list: &[Quantity]) -> Vec<&str> {
+            list.iter().map(|q| q.name.as_str()).collect()
+        }
+        let channels = self.noise.iter().map(|n| n.channel.as_str()).collect();
+        differ("channels", channels, names(&problem.recording.channels))?;
+        let known = problem.shared.index.iter().map(|&i| spec.parameters[i].name.as_str()).collect();
+        differ("parameters", self.parameters.iter().map(|p| p.name.as_str()).collect(), known)?;
+        let set = self
+            .mechanisms
+            .iter()
+            .map(|id| {
+                spec.mechanisms.iter().position(|m| m.id == *id).ok_or_else(|| RepairedError::Other {
+                    what: "mechanism",
+                    got: id.clone(),
+                    expected: spec.mechanisms.iter().map(|m| m.id.as_str()).collect::<Vec<_>>().join(", "),
+                })
+            })
+            .collect::<Result<Vec<usize>, _>>()?;
+        let selection = problem.select(&set, &[]);
+        let n = self.fitted.len();
+        let finite = |v: &f64| v.is_finite();
+        if self.fitted != selection.shared {
+            return Err(RepairedError::Damaged("its fitted parameters are not those of its mechanisms"));
+        }
+        if self.covariance.len() != n || self.covariance.iter().any(|r| r.len() != n || !r.iter().all(finite))
+        {
+            return Err(RepairedError::Damaged("its covariance is not a square of finite numbers"));
+        }
+        if !self.parameters.iter().all(|p| p.value.is_finite()) || !(self.noise_step > 0.0) {
+            return Err(RepairedError::Damaged("a parameter or step that is no number"));
+        }
+        let shapes = family().len();
+        if self.noise.iter().any(|n| !(n.sigma > 0.0 && n.sigma.is_finite()) || n.shape >= shapes) {
+            return Err(RepairedError::Damaged("noise that is not above zero, or of no known shape"));
+        }
+        Ok(selection)
+    }
+}
