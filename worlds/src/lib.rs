@@ -1,7 +1,10 @@
 #![doc = include_str!("../README.md")]
 
 pub mod bounce;
+pub mod bounces;
 pub mod bundled;
+pub mod concealed;
 pub mod flight;
+pub mod flights;
 pub mod noise;
 pub mod pendulum;

@@ -1,0 +1,87 @@
+//! Bouncing balls with concealed effects.
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::bounce::{BounceWorld, Effects};
+use crate::concealed::draw::{between, choose, log_between, sign, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker};
+
+/// The domain `bounce`, from events with places.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounces;
+
+const LISTED: usize = 7;
+
+impl Maker for Bounces {
+    fn domain(&self) -> &'static str {
+        "bounce"
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let mut world = BounceWorld {
+            runs: whole(&mut rng, 15, 40),
+            impacts: whole(&mut rng, 5, 8),
+            height_m: between(&mut rng, 0.2, 0.6),
+            height_known: whole(&mut rng, 0, 1) == 1,
+            restitution: between(&mut rng, 0.65, 0.9),
+            kappa: log_between(&mut rng, 1e3, 3e4),
+            noise: [log_between(&mut rng, 1e-5, 1e-4), log_between(&mut rng, 2e-3, 1e-2)],
+            noise_known: whole(&mut rng, 0, 3) > 0,
+            ..BounceWorld::drops()
+        };
+        match hidden {
+            Hidden::Nothing => {}
+            Hidden::One => listed(&mut world, choose(&mut rng, LISTED, 1)[0], &mut key, &mut rng),
+            Hidden::Two => {
+                for which in choose(&mut rng, LISTED, 2) {
+                    listed(&mut world, which, &mut key, &mut rng);
+                }
+            }
+            Hidden::Unlisted => {
+                world.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
+                key.unlisted = Some("a table that is softer on one side".into());
+            }
+        }
+        let [header, data] = world.files(seed ^ 0x5eed);
+        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+    }
+}
+
+fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
+    let e: &mut Effects = &mut world.effects;
+    match which {
+        0 => {
+            e.drag_per_m = log_between(rng, 0.01, 0.4);
+            key.add("air-drag", &[("k_per_m", e.drag_per_m)]);
+        }
+        1 => {
+            e.slope_s_m = log_between(rng, 0.003, 0.05);
+            let at_one = world.restitution;
+            key.add("velocity-dependent-restitution", &[("slope_s_m", e.slope_s_m), ("e_at_1_m_s", at_one)]);
+        }
+        2 => {
+            let size = log_between(rng, 0.002, 0.06);
+            e.table = [0.8 * sign(rng) * size, 0.6 * sign(rng) * size];
+            key.add("table-tilt", &[("slope_x", e.table[0]), ("slope_y", e.table[1])]);
+        }
+        3 => {
+            e.friction = log_between(rng, 0.03, 0.4);
+            key.add("tangential-friction", &[("fraction", e.friction)]);
+        }
+        4 => {
+            e.clock_rate = sign(rng) * log_between(rng, 0.003, 0.04);
+            key.add("clock-rate", &[("rate", e.clock_rate)]);
+        }
+        5 => {
+            e.position_scale = sign(rng) * log_between(rng, 0.01, 0.1);
+            key.add("position-scale", &[("scale", e.position_scale)]);
+        }
+        _ => {
+            e.unheard = between(rng, 0.05, 0.4);
+            key.add("missed-impact", &[("fraction", e.unheard)]);
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Recordings in which an effect is concealed, of every domain, drawn at random: what the proof is made of.
+
+/// What is hidden in a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Hidden {
+    /// Nothing: noise and nuisances alone.
+    Nothing,
+    /// One mechanism of the domain's list.
+    One,
+    /// Two of them.
+    Two,
+    /// Something that is not on the list.
+    Unlisted,
+}
+
+/// A recording with its answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Concealed {
+    /// The files of the recording's folder: name and contents.
+    pub files: Vec<(String, String)>,
+    /// The answer.
+    pub key: Key,
+}
+
+/// What was hidden.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Key {
+    /// The kind of world.
+    pub hidden: Hidden,
+    /// Identifiers of the listed mechanisms at work, in alphabetical order.
+    pub mechanisms: Vec<String>,
+    /// Their parameters, by the names of the recordings' format.
+    pub parameters: Vec<HiddenParameter>,
+    /// What an unlisted effect is, in words.
+    pub unlisted: Option<String>,
+    /// Where a local effect acts.
+    pub place: Option<Place>,
+}
+
+/// A parameter of a hidden mechanism.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HiddenParameter {
+    /// Identifier of the mechanism.
+    pub mechanism: String,
+    /// Name with its unit as a suffix.
+    pub name: String,
+    /// True value.
+    pub value: f64,
+}
+
+/// Where a local effect acts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// Name of the variable.
+    pub variable: String,
+    /// Start of the interval.
+    pub from: f64,
+    /// End of the interval.
+    pub to: f64,
+}
+
+/// Makes worlds of one domain.
+pub trait Maker: Sync {
+    /// The domain.
+    fn domain(&self) -> &'static str;
+
+    /// Draws a world in which something of the given kind is hidden: its strength from faint to strong on a log scale, the
+    /// noise, the nuisances and the numbers of runs and rows as people have them. The same seed gives the same bits.
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed;
+}
+
+/// All makers.
+pub fn makers() -> &'static [&'static dyn Maker] {
+    &[&crate::flights::Flights, &crate::bounces::Bounces]
+}
+
+impl Key {
+    /// An answer without parameters or place.
+    pub fn new(hidden: Hidden) -> Self {
+        Self { hidden, mechanisms: Vec::new(), parameters: Vec::new(), unlisted: None, place: None }
+    }
+
+    /// Adds a mechanism at work, with its parameters.
+    pub fn add(&mut self, mechanism: &str, parameters: &[(&str, f64)]) {
+        self.mechanisms.push(mechanism.into());
+        self.mechanisms.sort();
+        self.parameters.extend(parameters.iter().map(|&(name, value)| HiddenParameter {
+            mechanism: mechanism.into(),
+            name: name.into(),
+            value,
+        }));
+    }
+}
+
+/// What every maker draws.
+pub(crate) mod draw {
+    use rand::Rng;
+    use rand_distr::{Distribution, Uniform};
+
+    use crate::noise::Noise;
+
+    /// A number between two.
+    pub(crate) fn between(rng: &mut impl Rng, low: f64, high: f64) -> f64 {
+        Uniform::new_inclusive(low, high).map_or(low, |u| u.sample(rng))
+    }
+
+    /// A number between two above zero, evenly on a log scale.
+    pub(crate) fn log_between(rng: &mut impl Rng, low: f64, high: f64) -> f64 {
+        between(rng, low.ln(), high.ln()).exp()
+    }
+
+    /// One or the other sign.
+    pub(crate) fn sign(rng: &mut impl Rng) -> f64 {
+        if rng.next_u32() & 1 == 0 { 1.0 } else { -1.0 }
+    }
+
+    /// A whole number from `low` to `high`.
+    pub(crate) fn whole(rng: &mut impl Rng, low: usize, high: usize) -> usize {
+        low + (rng.next_u64() % (high - low + 1) as u64) as usize
+    }
+
+    /// `count` different numbers below `of`, rising.
+    pub(crate) fn choose(rng: &mut impl Rng, of: usize, count: usize) -> Vec<usize> {
+        let mut all: Vec<usize> = (0..of).collect();
+        let mut chosen: Vec<usize> =
+            (0..count.min(of)).map(|_| all.swap_remove(whole(rng, 0, all.len() - 1))).collect();
+        chosen.sort_unstable();
+        chosen
+    }
+
+    /// Noise of the given sigma, as sensors have it: white, or correlated from row to row, or rounded to a coarse digit.
+    pub(crate) fn noise(rng: &mut impl Rng, sigma: f64) -> Noise {
+        let white = Noise::white(sigma);
+        match whole(rng, 0, 3) {
+            0 => Noise { correlation: between(rng, 0.2, 0.7), ..white },
+            1 => Noise { digit: sigma * between(rng, 0.5, 2.0), ..white },
+            _ => white,
+        }
+    }
+}

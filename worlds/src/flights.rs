@@ -1,0 +1,122 @@
+//! Flights with concealed effects.
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::concealed::draw::{between, choose, log_between, noise, sign, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use crate::flight::{Effects, FlightWorld, Gust, Seen};
+
+/// The domain `trajectory`.
+#[derive(Debug, Clone, Copy)]
+pub struct Flights;
+
+/// Listed effects that a camera can see in space.
+const LISTED: usize = 8;
+
+impl Maker for Flights {
+    fn domain(&self) -> &'static str {
+        "trajectory"
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let rows = whole(&mut rng, 35, 60);
+        let sigma = log_between(&mut rng, 5e-4, 3e-3);
+        let mut world = FlightWorld {
+            runs: whole(&mut rng, 4, 8),
+            rows: [rows, rows + 15],
+            noise: noise(&mut rng, sigma),
+            ..FlightWorld::thrown(Seen::Space)
+        };
+        let effects = &mut world.effects;
+        match hidden {
+            Hidden::Nothing => {}
+            Hidden::One => listed(effects, choose(&mut rng, LISTED, 1)[0], &mut key, &mut rng),
+            Hidden::Two => {
+                for which in choose(&mut rng, LISTED, 2) {
+                    listed(effects, which, &mut key, &mut rng);
+                }
+            }
+            Hidden::Unlisted => unlisted(effects, &mut key, &mut rng),
+        }
+        let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n";
+        let data = world.draw(seed ^ 0x5eed).csv(6);
+        Concealed { files: vec![("recording.toml".into(), header.into()), ("data.csv".into(), data)], key }
+    }
+}
+
+fn listed(e: &mut Effects, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
+    match which {
+        0 => {
+            e.quadratic_per_m = log_between(rng, 0.002, 0.1);
+            key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]);
+        }
+        1 => {
+            e.linear_per_s = log_between(rng, 0.01, 0.4);
+            key.add("linear-drag", &[("rate_per_s", e.linear_per_s)]);
+        }
+        2 => {
+            e.lift_m_s2 = sign(rng) * log_between(rng, 0.01, 0.4);
+            key.add("buoyancy", &[("acceleration_m_s2", e.lift_m_s2)]);
+        }
+        3 => {
+            let size = log_between(rng, 0.01, 0.3);
+            e.magnus_per_s = [0.6 * sign(rng) * size, 0.7 * sign(rng) * size, 0.4 * sign(rng) * size];
+            let [x, y, z] = e.magnus_per_s;
+            key.add("magnus-lift", &[("lift_x_per_s", x), ("lift_y_per_s", y), ("lift_z_per_s", z)]);
+        }
+        4 => {
+            // Moving air acts through drag, which then is at work as well.
+            e.quadratic_per_m = e.quadratic_per_m.max(log_between(rng, 0.02, 0.1));
+            let size = log_between(rng, 0.3, 4.0);
+            let angle = between(rng, 0.0, std::f64::consts::TAU);
+            e.wind_m_s = [size * angle.cos(), size * angle.sin()];
+            key.add("wind", &[("wind_x_m_s", e.wind_m_s[0]), ("wind_y_m_s", e.wind_m_s[1])]);
+            if !key.mechanisms.iter().any(|m| m == "quadratic-drag") {
+                key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]);
+            }
+        }
+        5 => {
+            e.camera_scale = sign(rng) * log_between(rng, 0.002, 0.06);
+            key.add("camera-scale", &[("scale", e.camera_scale)]);
+        }
+        6 => {
+            let size = log_between(rng, 0.002, 0.06);
+            e.camera_tilt_rad = [0.8 * sign(rng) * size, 0.6 * sign(rng) * size];
+            let [x, y] = e.camera_tilt_rad;
+            key.add("camera-tilt", &[("about_x_rad", x), ("about_y_rad", y)]);
+        }
+        _ => {
+            e.clock_rate = sign(rng) * log_between(rng, 0.001, 0.03);
+            key.add("clock-rate", &[("rate", e.clock_rate)]);
+        }
+    }
+}
+
+fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
+    match whole(rng, 0, 3) {
+        0 => {
+            e.mast = [log_between(rng, 0.003, 0.02), between(rng, 2.0, 8.0)];
+            key.unlisted = Some("a mast that swings".into());
+        }
+        1 => {
+            e.cord_per_s2 = log_between(rng, 0.2, 2.0);
+            key.unlisted = Some("a cord that pulls back".into());
+        }
+        2 => {
+            let begin = between(rng, 0.1, 0.35);
+            let end = begin + between(rng, 0.1, 0.25);
+            e.quadratic_per_m = 0.05;
+            e.gust = Gust { velocity_m_s: [0.0, log_between(rng, 4.0, 15.0), 0.0], window_s: [begin, end] };
+            key.unlisted = Some("a gust".into());
+            key.place = Some(Place { variable: "t_s".into(), from: begin, to: end });
+        }
+        _ => {
+            e.camera_step = [sign(rng) * log_between(rng, 0.005, 0.03), between(rng, 0.2, 0.5)];
+            key.unlisted = Some("a camera that is knocked".into());
+            key.place = Some(Place { variable: "t_s".into(), from: e.camera_step[1], to: f64::INFINITY });
+        }
+    }
+}
