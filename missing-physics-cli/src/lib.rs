@@ -5,6 +5,7 @@
 
 pub mod commands;
 pub mod domains;
+pub mod prove;
 pub mod recording;
 pub mod repair;
 pub mod report;

@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use missing_physics::engine::Options;
 use missing_physics::observer::{Observer, Progress};
 use missing_physics_cli::commands::{self, CommandError, DiagnoseArguments};
+use missing_physics_cli::prove::{ProveArguments, prove};
 
 /// Says which physics a simulation leaves out, from recordings.
 #[derive(Debug, Parser)]
@@ -52,6 +53,24 @@ enum Command {
         /// Write the table to a file instead of printing it.
         #[arg(long, value_name = "FILE")]
         csv: Option<PathBuf>,
+    },
+    /// Proves the tool on concealed effects: draws worlds, seals the answers, diagnoses, opens the seal, scores.
+    Prove {
+        /// One domain; all of which worlds can be drawn without it.
+        #[arg(long)]
+        domain: Option<String>,
+        /// Worlds of each domain.
+        #[arg(long, default_value_t = 100)]
+        worlds: usize,
+        /// Seed of the worlds.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// The folder of the proof; one that was stopped goes on.
+        #[arg(long, default_value = "proof")]
+        out: PathBuf,
+        /// Number of threads; 0 for all cores. The score does not depend on it.
+        #[arg(long, default_value_t = 0)]
+        threads: usize,
     },
     /// Lists what the tool knows: domains, baselines, mechanisms, columns.
     Domains,
@@ -111,6 +130,9 @@ fn run(command: Command) -> Result<String, CommandError> {
             commands::diagnose(&arguments, &Bar::new())
         }
         Command::Predict { model, folder, csv } => commands::predict(&model, &folder, csv.as_deref()),
+        Command::Prove { domain, worlds, seed, out, threads } => {
+            prove(&ProveArguments { domain, worlds, seed, folder: out, threads }, &Bar::new())
+        }
         Command::Domains => Ok(commands::domains()),
         Command::Check { folder } => commands::check(&folder),
         Command::New { domain, folder } => commands::new(&domain, &folder),

@@ -68,6 +68,12 @@ pub enum DiagnoseError {
         /// What is allowed.
         expected: &'static str,
     },
+    /// A mechanism that the model has not.
+    #[error("the model has no mechanism {id}")]
+    Unknown {
+        /// The identifier.
+        id: String,
+    },
     /// The observer stopped the work.
     #[error("stopped")]
     Stopped,
@@ -100,6 +106,45 @@ pub fn diagnose(
     }
 }
 
+/// The beginning of every diagnosis.
+struct Begun<'a> {
+    /// The recording without its wild readings.
+    problem: Problem<'a>,
+    outliers: Vec<Outlier>,
+    rule: NoiseRule,
+    baseline: Candidate,
+    /// The first fit of the baseline.
+    start: Fit,
+}
+
+fn begin<'a>(
+    model: &'a dyn Model,
+    recording: &Recording,
+    options: &Options,
+) -> Result<Begun<'a>, DiagnoseError> {
+    check(recording, options)?;
+    let problem = Problem::new(model, recording.clone());
+    enough_rows(&problem)?;
+    let (cleaned, outliers) = set_aside(&problem)?;
+    let problem = Problem::new(model, cleaned);
+    let rule = noise_rule(&problem);
+    enough_rows(&problem)?;
+    let selection = problem.select(&[], &[]);
+    let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
+    let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
+    Ok(Begun { problem, outliers, rule, baseline, start })
+}
+
+/// The baseline's fit to a recording without its wild readings.
+pub(crate) fn baseline_of<'a>(
+    model: &'a dyn Model,
+    recording: &Recording,
+    options: &Options,
+) -> Result<(Problem<'a>, NoiseRule, Candidate), DiagnoseError> {
+    let begun = begin(model, recording, options)?;
+    Ok((begun.problem, begun.rule, begun.baseline))
+}
+
 fn diagnose_with(
     model: &dyn Model,
     recording: &Recording,
@@ -107,27 +152,17 @@ fn diagnose_with(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    check(recording, options)?;
     let tell = |stage: &str, done: f64| -> Result<(), DiagnoseError> {
         if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }
     };
     tell("reading the noise", 0.0)?;
-    let problem = Problem::new(model, recording.clone());
-    enough_rows(&problem)?;
-    tell("looking for wild readings", 0.0)?;
-    let (cleaned, outliers) = set_aside(&problem)?;
-    let problem = Problem::new(model, cleaned);
-    let rule = noise_rule(&problem);
-    let selection = problem.select(&[], &[]);
+    let Begun { problem, outliers, rule, baseline, start } = begin(model, recording, options)?;
     let (rows, unknowns) = enough_rows(&problem)?;
-    tell("fitting the baseline", 0.0)?;
-    let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
-    let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
     // What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
     let white =
         NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(&problem, &rule, &start) };
     let plain = Candidate {
-        fit: solve(&problem, &selection, &white, &start.shared, &start.own)?,
+        fit: solve(&problem, &baseline.selection, &white, &start.shared, &start.own)?,
         ..baseline.clone()
     };
     let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();

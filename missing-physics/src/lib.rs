@@ -21,3 +21,4 @@ mod own_prior;
 mod problem;
 pub mod repaired;
 pub mod synthetic;
+pub mod told;

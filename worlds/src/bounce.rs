@@ -74,6 +74,12 @@ impl BounceWorld {
 
     /// The contents of `recording.toml` and `data.csv`.
     pub fn files(&self, seed: u64) -> [String; 2] {
+        self.files_and_unheard(seed).0
+    }
+
+    /// The same, and the number of runs in which an impact went unheard.
+    pub fn files_and_unheard(&self, seed: u64) -> ([String; 2], usize) {
+        let mut runs_unheard = 0;
         let mut header = String::from("format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n");
         if self.noise_known {
             let [time, place] = self.noise;
@@ -88,6 +94,7 @@ impl BounceWorld {
             let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
             let unheard = (rng.random::<f64>() < self.effects.unheard)
                 .then(|| rng.random_range(1..self.impacts.max(3) - 1));
+            runs_unheard += usize::from(unheard.is_some());
             let impacts = self.impacts + usize::from(unheard.is_some());
             let heard = self.drop(self.height_m * spread, impacts, &mut rng);
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
@@ -95,7 +102,7 @@ impl BounceWorld {
                 let _ = writeln!(data, "{run},{},{t:.7},{x:.5},{y:.5}", number + 1);
             }
         }
-        [header, data]
+        ([header, data], runs_unheard)
     }
 
     /// Time and place of each impact of one drop, as they are heard.

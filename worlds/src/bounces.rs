@@ -45,7 +45,10 @@ impl Maker for Bounces {
                 key.unlisted = Some("a table that is softer on one side".into());
             }
         }
-        let [header, data] = world.files(seed ^ 0x5eed);
+        let ([header, data], unheard) = world.files_and_unheard(seed ^ 0x5eed);
+        // The format asks for the share of these very runs.
+        let share = unheard as f64 / world.runs as f64;
+        key.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact").for_each(|p| p.value = share);
         Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
     }
 }
@@ -80,7 +83,7 @@ fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha
             key.add("position-scale", &[("scale", e.position_scale)]);
         }
         _ => {
-            e.unheard = between(rng, 0.05, 0.4);
+            e.unheard = between(rng, 0.1, 0.4);
             key.add("missed-impact", &[("fraction", e.unheard)]);
         }
     }

@@ -29,6 +29,8 @@ pub struct Key {
     pub hidden: Hidden,
     /// Identifiers of the listed mechanisms at work, in alphabetical order.
     pub mechanisms: Vec<String>,
+    /// Identifiers that may stand beside them or be left out (the drag through which a wind acts).
+    pub beside: Vec<String>,
     /// Their parameters, by the names of the recordings' format.
     pub parameters: Vec<HiddenParameter>,
     /// What an unlisted effect is, in words.
@@ -48,14 +50,14 @@ pub struct HiddenParameter {
     pub value: f64,
 }
 
-/// Where a local effect acts.
+/// Where a local effect acts: readings change at an end of the interval that lies within the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// Name of the variable.
     pub variable: String,
-    /// Start of the interval.
+    /// Start of the interval; `-inf` for the beginning.
     pub from: f64,
-    /// End of the interval.
+    /// End of the interval; `inf` for the end.
     pub to: f64,
 }
 
@@ -77,7 +79,14 @@ pub fn makers() -> &'static [&'static dyn Maker] {
 impl Key {
     /// An answer without parameters or place.
     pub fn new(hidden: Hidden) -> Self {
-        Self { hidden, mechanisms: Vec::new(), parameters: Vec::new(), unlisted: None, place: None }
+        Self {
+            hidden,
+            mechanisms: Vec::new(),
+            beside: Vec::new(),
+            parameters: Vec::new(),
+            unlisted: None,
+            place: None,
+        }
     }
 
     /// Adds a mechanism at work, with its parameters.

@@ -74,9 +74,7 @@ fn listed(e: &mut Effects, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
             let angle = between(rng, 0.0, std::f64::consts::TAU);
             e.wind_m_s = [size * angle.cos(), size * angle.sin()];
             key.add("wind", &[("wind_x_m_s", e.wind_m_s[0]), ("wind_y_m_s", e.wind_m_s[1])]);
-            if !key.mechanisms.iter().any(|m| m == "quadratic-drag") {
-                key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]);
-            }
+            key.beside = vec!["quadratic-drag".into(), "linear-drag".into()];
         }
         5 => {
             e.camera_scale = sign(rng) * log_between(rng, 0.002, 0.06);
@@ -109,9 +107,9 @@ fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
             let begin = between(rng, 0.1, 0.35);
             let end = begin + between(rng, 0.1, 0.25);
             e.quadratic_per_m = 0.05;
+            // What it does to the speed stays when it is over: no place in the readings.
             e.gust = Gust { velocity_m_s: [0.0, log_between(rng, 4.0, 15.0), 0.0], window_s: [begin, end] };
-            key.unlisted = Some("a gust".into());
-            key.place = Some(Place { variable: "t_s".into(), from: begin, to: end });
+            key.unlisted = Some("a gust in still air, with drag".into());
         }
         _ => {
             e.camera_step = [sign(rng) * log_between(rng, 0.005, 0.03), between(rng, 0.2, 0.5)];

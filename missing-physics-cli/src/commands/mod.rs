@@ -28,7 +28,7 @@ pub enum CommandError {
 }
 
 /// Writes a file whole or not at all.
-fn write_whole(path: &std::path::Path, text: &str) -> Result<(), CommandError> {
+pub(crate) fn write_whole(path: &std::path::Path, text: &str) -> Result<(), CommandError> {
     let fail = |e: std::io::Error| CommandError::Other(format!("{}: {e}", path.display()));
     let Some(name) = path.file_name() else {
         return Err(CommandError::Other(format!("{}: not the name of a file", path.display())));

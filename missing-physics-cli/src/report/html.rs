@@ -10,7 +10,7 @@ use super::plots;
 use super::svg::escape;
 use super::text::{headline, law_kind, noise_sentence, where_sentence};
 
-const STYLE: &str = "
+pub(crate) const STYLE: &str = "
 :root{--ink:#1c2430;--paper:#fff;--soft:#5b6675;--line:#dde2e8;--data:#8a94a3;--before:#c2410c;--after:#0369a1;--shade:#f59e0b33;--band:#0369a114;--card:#f6f8fa}
 @media(prefers-color-scheme:dark){:root{--ink:#e6eaf0;--paper:#12161c;--soft:#9aa6b5;--line:#2b333d;--data:#8793a3;--before:#fb923c;--after:#38bdf8;--shade:#f59e0b2e;--band:#38bdf81c;--card:#1a2028}}
 *{box-sizing:border-box}body{margin:0 auto;max-width:1020px;padding:2rem 1.2rem 4rem;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)}

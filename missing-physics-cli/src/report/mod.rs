@@ -7,6 +7,12 @@ mod plots;
 mod svg;
 mod text;
 
+/// What other pages share with the report's.
+pub(crate) mod page {
+    pub(crate) use super::html::STYLE;
+    pub(crate) use super::svg::{Chart, Series, escape};
+}
+
 pub use html::html;
 pub use json::json;
 pub use text::text;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 /// Text made safe for HTML and SVG, in content and in attributes.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -20,23 +20,23 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// What a chart draws: points or a line, in a named class that the page's style colours.
-pub(super) struct Series<'a> {
-    pub(super) class: &'a str,
-    pub(super) x: &'a [f64],
-    pub(super) y: &'a [f64],
-    pub(super) points: bool,
+pub(crate) struct Series<'a> {
+    pub(crate) class: &'a str,
+    pub(crate) x: &'a [f64],
+    pub(crate) y: &'a [f64],
+    pub(crate) points: bool,
 }
 
 /// A chart with axes.
-pub(super) struct Chart<'a> {
-    pub(super) title: String,
-    pub(super) x_label: String,
-    pub(super) y_label: String,
-    pub(super) series: Vec<Series<'a>>,
+pub(crate) struct Chart<'a> {
+    pub(crate) title: String,
+    pub(crate) x_label: String,
+    pub(crate) y_label: String,
+    pub(crate) series: Vec<Series<'a>>,
     /// An interval of x to shade.
-    pub(super) shaded: Option<(f64, f64)>,
+    pub(crate) shaded: Option<(f64, f64)>,
     /// Half height of a band about zero.
-    pub(super) band: Option<f64>,
+    pub(crate) band: Option<f64>,
 }
 
 const WIDTH: f64 = 460.0;
@@ -50,7 +50,7 @@ const MOST_POINTS: usize = 600;
 
 impl Chart<'_> {
     /// The chart as an `<svg>` element.
-    pub(super) fn render(&self) -> String {
+    pub(crate) fn render(&self) -> String {
         let range = |pick: for<'s> fn(&'s Series<'_>) -> &'s [f64]| {
             let values = self.series.iter().flat_map(|s| pick(s).iter().copied()).filter(|v| v.is_finite());
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))

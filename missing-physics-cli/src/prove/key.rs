@@ -1,0 +1,28 @@
+//! The sealed answers, one line each.
+
+use serde_json::json;
+use worlds::concealed::{Hidden, Key};
+
+/// The word for a kind of world.
+pub(super) fn word(hidden: Hidden) -> &'static str {
+    match hidden {
+        Hidden::Nothing => "nothing",
+        Hidden::One => "one",
+        Hidden::Two => "two",
+        Hidden::Unlisted => "unlisted",
+    }
+}
+
+/// An answer as a line of JSON.
+pub(super) fn to_json(world: &str, key: &Key) -> String {
+    let parameters: Vec<_> = key
+        .parameters
+        .iter()
+        .map(|p| json!({"mechanism": p.mechanism, "name": p.name, "value": p.value}))
+        .collect();
+    let place = key.place.as_ref().map(|p| json!({"variable": p.variable, "from": p.from, "to": p.to}));
+    let line = json!({"world": world, "hidden": word(key.hidden), "mechanisms": key.mechanisms,
+        "beside": key.beside,
+        "parameters": parameters, "unlisted": key.unlisted, "place": place});
+    format!("{line}\n")
+}

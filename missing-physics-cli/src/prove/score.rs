@@ -1,0 +1,263 @@
+//! How often the tool was right, wrong and silent.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use statrs::distribution::{Binomial, DiscreteCDF as _};
+use worlds::concealed::Hidden;
+
+use super::world::Judged;
+
+/// A rate: so many of so many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Part {
+    /// How many.
+    pub hits: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+impl Part {
+    fn add(&mut self, hit: bool) {
+        self.hits += usize::from(hit);
+        self.of += 1;
+    }
+
+    fn join(&mut self, other: Self) {
+        self.hits += other.hits;
+        self.of += other.of;
+    }
+
+    /// The rate, in [0, 1]; NaN of nothing.
+    pub fn rate(self) -> f64 {
+        self.hits as f64 / self.of as f64
+    }
+
+    /// The counts between which 95 % of draws lie where the true rate is `rate`.
+    pub fn band(self, rate: f64) -> [u64; 2] {
+        Binomial::new(rate, self.of as u64)
+            .map_or([0, 0], |law| [law.inverse_cdf(0.025), law.inverse_cdf(0.975)])
+    }
+}
+
+/// The score of one domain (or of all).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DomainScore {
+    /// The domain.
+    pub domain: String,
+    /// Worlds in which nothing is hidden that were doubted at 5 %.
+    pub alarms_5: Part,
+    /// The same at 1 %.
+    pub alarms_1: Part,
+    /// Worlds with listed effects that were doubted at 5 %.
+    pub detected: Part,
+    /// The same by a likelihood-ratio test that was told what to look for.
+    pub told_detected: Part,
+    /// Of the worlds where the data decide: `explained` by exactly what is hidden.
+    pub right: Part,
+    /// `ambiguous`, the truth among the rivals.
+    pub ambiguous: Part,
+    /// A mechanism named that is not there, the truth not among the rivals.
+    pub wrong: Part,
+    /// The answer set holds the truth, of the worlds with an answer where the data decide.
+    pub holds: Part,
+    /// Mean number of sets in those answers.
+    pub set_size: f64,
+    /// A mechanism named that is not there, of all worlds with listed effects.
+    pub wrong_of_all: Part,
+    /// Unlisted effects answered `unexplained`, of those that were doubted.
+    pub unexplained: Part,
+    /// Local effects with p at most 0.001: the first place named begins or ends where the effect does, to a tenth of the
+    /// variable's extent.
+    pub located: Part,
+    /// Intervals of 95 % that hold the true value, where the set is right.
+    pub covered: Part,
+    /// Median error on data left out over that of the true model's refit, where the set is right.
+    pub heldout_ratio: f64,
+    /// Median time of a diagnosis in s (of this machine, as busy as it was).
+    pub seconds: f64,
+    /// Detection against the size of an effect: `sqrt` of the told likelihood ratio at the middle of each bin, detected by the
+    /// tool, by the told test.
+    pub power: Vec<(f64, Part, Part)>,
+    /// What was answered to each single hidden mechanism: `confusion[truth][answer]`.
+    pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
+    sizes: Vec<f64>,
+    ratios: Vec<f64>,
+    times: Vec<f64>,
+}
+
+/// The scores of all domains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Score {
+    /// Domain by domain.
+    pub domains: Vec<DomainScore>,
+    /// All together.
+    pub all: DomainScore,
+}
+
+/// Edges of the bins of `sqrt` of the told likelihood ratio.
+const EDGES: [f64; 9] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, f64::INFINITY];
+/// A place is found where an end of it is, to this part of the variable's extent.
+const CLOSE: f64 = 0.1;
+/// Where the told log Bayes factor against every rival is at least this, the data decide.
+const DECISIVE: f64 = 5.0;
+
+impl Score {
+    pub(super) fn of(domains: &[String], judged: &[Judged]) -> Self {
+        let one = |name: &str, worlds: &mut dyn Iterator<Item = &Judged>| {
+            let bins = EDGES.windows(2).map(|w| {
+                let middle = if w[1].is_finite() { 0.5 * (w[0] + w[1]) } else { w[0] * 1.2 };
+                (middle, Part::default(), Part::default())
+            });
+            let mut score =
+                DomainScore { domain: name.into(), power: bins.collect(), ..DomainScore::default() };
+            worlds.for_each(|w| score.add(w));
+            score.finish();
+            score
+        };
+        Self {
+            domains: domains.iter().map(|d| one(d, &mut judged.iter().filter(|w| w.domain == d))).collect(),
+            all: one("all", &mut judged.iter()),
+        }
+    }
+
+    pub(super) fn to_json(&self, seal: &str, seed: u64, worlds: usize) -> String {
+        let domains: Vec<Value> = self.domains.iter().chain([&self.all]).map(DomainScore::to_json).collect();
+        let value = json!({"format": 1, "seal": seal, "seed": seed, "worlds": worlds, "domains": domains});
+        // Numbers, texts and lists always serialise.
+        serde_json::to_string_pretty(&value).unwrap_or_default() + "\n"
+    }
+}
+
+impl DomainScore {
+    fn add(&mut self, w: &Judged) {
+        let o = &w.outcome;
+        let doubted = o.p_value <= 0.05;
+        self.times.push(o.seconds);
+        match w.key.hidden {
+            Hidden::Nothing => {
+                self.alarms_5.add(doubted);
+                self.alarms_1.add(o.p_value <= 0.01);
+            }
+            Hidden::Unlisted => {
+                if doubted {
+                    self.unexplained.add(o.verdict == "unexplained");
+                }
+            }
+            Hidden::One | Hidden::Two => self.add_listed(w, doubted),
+        }
+        if let Some(place) = w.key.place.as_ref().filter(|_| o.p_value <= 0.001) {
+            let hit = o.places.first().is_some_and(|found| {
+                let near = |found: Option<f64>, extent: f64| {
+                    let ends = [place.from, place.to].into_iter().filter(|end| end.is_finite());
+                    found.is_some_and(|f| ends.into_iter().any(|end| (f - end).abs() <= CLOSE * extent))
+                };
+                found.variable.as_deref() == Some(&place.variable)
+                    && found.extent.is_some_and(|extent| near(found.from, extent) || near(found.to, extent))
+            });
+            self.located.add(hit);
+        }
+    }
+
+    fn add_listed(&mut self, w: &Judged, doubted: bool) {
+        let o = &w.outcome;
+        let plain = |ids: &[String]| sorted(ids, &w.key.beside);
+        let truth = plain(&w.key.mechanisms);
+        let chosen = plain(&o.chosen);
+        let answered = !o.chosen.is_empty();
+        let holds = chosen == truth || o.confused_with.iter().any(|set| plain(set) == truth);
+        let wrong = answered && !holds && !chosen.iter().all(|m| truth.contains(m));
+        self.detected.add(doubted);
+        self.wrong_of_all.add(wrong);
+        if let [single] = truth.as_slice() {
+            let answer = match o.verdict.as_str() {
+                "explained" => chosen.join(" + "),
+                word => word.to_owned(),
+            };
+            *self.confusion.entry(single.clone()).or_default().entry(answer).or_default() += 1;
+        }
+        if let Some(best) = &w.best {
+            self.told_detected.add(best.p_value <= 0.05);
+            let size = best.likelihood_ratio.sqrt();
+            let bin = EDGES.windows(2).position(|e| size >= e[0] && size < e[1]);
+            if let Some((_, tool, told)) = bin.and_then(|b| self.power.get_mut(b)) {
+                tool.add(doubted);
+                told.add(best.p_value <= 0.05);
+            }
+            if best.decisive >= DECISIVE {
+                self.right.add(o.verdict == "explained" && chosen == truth);
+                self.ambiguous.add(o.verdict == "ambiguous" && holds);
+                self.wrong.add(wrong);
+                if answered {
+                    self.holds.add(holds);
+                    self.sizes.push(1.0 + o.confused_with.len() as f64);
+                }
+            }
+        }
+        if chosen == truth {
+            self.add_right(w);
+        }
+    }
+
+    /// What can be scored only where the right mechanisms were chosen.
+    fn add_right(&mut self, w: &Judged) {
+        for p in &w.key.parameters {
+            let found = w.outcome.estimates.iter().find(|e| e.mechanism == p.mechanism && e.name == p.name);
+            if let Some(e) = found {
+                self.covered.add((e.ci95[0]..=e.ci95[1]).contains(&p.value));
+            }
+        }
+        if let Some(best) = &w.best {
+            let pairs = w.outcome.heldout_rmse.iter().zip(&best.heldout_rmse);
+            let ratios: Vec<f64> = pairs.filter_map(|(a, b)| Some((*a)? / (*b)?)).collect();
+            if !ratios.is_empty() {
+                self.ratios.push(ratios.iter().sum::<f64>() / ratios.len() as f64);
+            }
+        }
+    }
+
+    fn finish(&mut self) {
+        self.set_size = self.sizes.iter().sum::<f64>() / self.sizes.len() as f64;
+        self.heldout_ratio = median(&mut self.ratios);
+        self.seconds = median(&mut self.times);
+        let mut merged: Vec<(f64, Part, Part)> = Vec::new();
+        for (middle, tool, told) in std::mem::take(&mut self.power) {
+            match merged.last_mut().filter(|last| last.1.of == 0) {
+                Some(last) => {
+                    last.0 = middle;
+                    last.1.join(tool);
+                    last.2.join(told);
+                }
+                None => merged.push((middle, tool, told)),
+            }
+        }
+        merged.retain(|bin| bin.1.of > 0);
+        self.power = merged;
+    }
+
+    fn to_json(&self) -> Value {
+        let part = |p: Part| json!([p.hits, p.of]);
+        let number = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
+        let power: Vec<Value> =
+            self.power.iter().map(|(size, tool, told)| json!([size, part(*tool), part(*told)])).collect();
+        json!({"domain": self.domain, "false_alarms_5": part(self.alarms_5), "false_alarms_1": part(self.alarms_1),
+            "detected": part(self.detected), "told_detected": part(self.told_detected),
+            "right": part(self.right), "ambiguous": part(self.ambiguous), "wrong": part(self.wrong),
+            "answer_set_holds": part(self.holds), "answer_set_size": number(self.set_size),
+            "wrong_of_all": part(self.wrong_of_all), "unlisted_unexplained": part(self.unexplained),
+            "located": part(self.located), "covered": part(self.covered),
+            "heldout_ratio": number(self.heldout_ratio), "power": power, "confusion": self.confusion})
+    }
+}
+
+/// Identifiers in order, without those that do not matter.
+fn sorted(ids: &[String], but: &[String]) -> Vec<String> {
+    let mut ids: Vec<String> = ids.iter().filter(|id| !but.contains(id)).cloned().collect();
+    ids.sort();
+    ids
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,63 @@
+//! A proof: the same whatever the number of threads, whole after it was cut off, and of worlds that its arguments tell.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+fn prove(folder: &Path, worlds: &str, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_missing-physics"));
+    command.args(["prove", "--domain", "trajectory", "--worlds", worlds, "--out"]).arg(folder).args(more);
+    command
+}
+
+fn ran(mut command: Command) -> Output {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    output
+}
+
+#[test]
+fn a_proof_that_was_killed_goes_on_to_the_same_score() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, cut) = (folder.path().join("whole"), folder.path().join("cut"));
+    let said = String::from_utf8(ran(prove(&whole, "5", &["--threads", "2"])).stdout).unwrap();
+    assert!(said.contains("false alarms at 5 %") && said.contains("answers sealed as"), "{said}");
+
+    let mut child = prove(&cut, "5", &["--threads", "1"]).spawn().unwrap();
+    let begin = Instant::now();
+    // Killed as soon as one world is done.
+    while !cut.join("trajectory/0000/outcome.json").exists() && begin.elapsed() < Duration::from_secs(120) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!cut.join("score.json").exists() && !cut.join("keys.jsonl").exists());
+    // A file that the kill left half written is no outcome.
+    std::fs::create_dir_all(cut.join("trajectory/0004")).unwrap();
+    std::fs::write(cut.join("trajectory/0004/outcome.json"), "{\"verdict\": \"adeq").unwrap();
+    ran(prove(&cut, "5", &["--threads", "1"]));
+    for file in ["score.json", "keys.jsonl", "plan.json", "trajectory/0003/answer.json"] {
+        let read = |proof: &Path| std::fs::read_to_string(proof.join(file)).unwrap();
+        assert_eq!(read(&whole), read(&cut), "{file}");
+    }
+
+    // Other arguments are another proof.
+    let other = prove(&whole, "5", &["--seed", "2"]).output().unwrap();
+    assert_eq!(other.status.code(), Some(2));
+    assert!(String::from_utf8(other.stderr).unwrap().contains("another proof"));
+}
+
+#[test]
+fn a_domain_without_worlds_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output =
+        Command::new(tool).args(["prove", "--domain", "tides", "--out"]).arg(folder.path()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.contains("no worlds of the domain \"tides\", expected one of: trajectory, bounce"),
+        "{said}"
+    );
+}
