@@ -21,10 +21,10 @@ fn ran(mut command: Command) -> Output {
 fn a_proof_that_was_killed_goes_on_to_the_same_score() {
     let folder = tempfile::tempdir().unwrap();
     let (whole, cut) = (folder.path().join("whole"), folder.path().join("cut"));
-    let said = String::from_utf8(ran(prove(&whole, "5", &["--threads", "2"])).stdout).unwrap();
+    let said = String::from_utf8(ran(prove(&whole, "3", &["--threads", "2"])).stdout).unwrap();
     assert!(said.contains("false alarms at 5 %") && said.contains("answers sealed as"), "{said}");
 
-    let mut child = prove(&cut, "5", &["--threads", "1"]).spawn().unwrap();
+    let mut child = prove(&cut, "3", &["--threads", "1"]).spawn().unwrap();
     let begin = Instant::now();
     // Killed as soon as one world is done.
     while !cut.join("trajectory/0000/outcome.json").exists() && begin.elapsed() < Duration::from_secs(120) {
@@ -34,16 +34,16 @@ fn a_proof_that_was_killed_goes_on_to_the_same_score() {
     child.wait().unwrap();
     assert!(!cut.join("score.json").exists() && !cut.join("keys.jsonl").exists());
     // A file that the kill left half written is no outcome.
-    std::fs::create_dir_all(cut.join("trajectory/0004")).unwrap();
-    std::fs::write(cut.join("trajectory/0004/outcome.json"), "{\"verdict\": \"adeq").unwrap();
-    ran(prove(&cut, "5", &["--threads", "1"]));
-    for file in ["score.json", "keys.jsonl", "plan.json", "trajectory/0003/answer.json"] {
+    std::fs::create_dir_all(cut.join("trajectory/0002")).unwrap();
+    std::fs::write(cut.join("trajectory/0002/outcome.json"), "{\"verdict\": \"adeq").unwrap();
+    ran(prove(&cut, "3", &["--threads", "1"]));
+    for file in ["score.json", "keys.jsonl", "plan.json", "trajectory/0001/answer.json"] {
         let read = |proof: &Path| std::fs::read_to_string(proof.join(file)).unwrap();
         assert_eq!(read(&whole), read(&cut), "{file}");
     }
 
     // Other arguments are another proof.
-    let other = prove(&whole, "5", &["--seed", "2"]).output().unwrap();
+    let other = prove(&whole, "3", &["--seed", "2"]).output().unwrap();
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8(other.stderr).unwrap().contains("another proof"));
 }
