@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 pub mod container;
+#[cfg(feature = "fake")]
+pub mod fake;
 pub mod pour;
 mod root;
 pub mod slosh;
