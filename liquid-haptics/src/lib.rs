@@ -4,6 +4,7 @@ pub mod container;
 pub mod fake;
 pub mod pour;
 mod root;
+pub mod signal;
 pub mod slosh;
 pub mod viscosity;
 pub mod volume;

@@ -70,10 +70,8 @@ pub enum Refusal {
     },
     /// No motion can be told from the noise.
     NothingMoves {
-        /// The best mode's amplitude in units of the reading.
-        amplitude: f64,
-        /// Its standard error.
-        error: f64,
+        /// Standard deviation of the readings, in their unit.
+        spread: f64,
     },
     /// Something moves, but the viscosity is open by more than the widest factor.
     TooNoisy {
@@ -82,10 +80,10 @@ pub enum Refusal {
         /// The widest allowed ratio of its ends.
         widest_factor: f64,
     },
-    /// Something moves that is neither the first mode nor a drain: its residuals stand this far above the readings' own noise.
+    /// Something moves that is neither the first mode nor a drain.
     NeitherLaw {
-        /// Ratio of the residuals' standard deviation to that of the noise.
-        excess: f64,
+        /// Correlation, over half a period of the mode, of what the nearer law leaves.
+        correlation: f64,
     },
 }
 
@@ -174,48 +172,50 @@ impl ViscosityFit {
         reading: &[f64],
         from: usize,
     ) -> Verdict {
-        let noise = noise(reading);
-        let late = &reading[from..];
-        let swings = mode.as_ref().is_some_and(|m| {
-            m.amplitude() > FELT * m.amplitude_error && m.damping_ratio < MOST_DAMPING
-        });
-        // Both are judged on the rows where the film has developed.
-        let mode_squares = mode.as_ref().map(|m| {
-            let pairs = t_s[from..].iter().zip(late);
-            pairs.map(|(t, y)| (y - m.at(t - t_s[0])).powi(2)).sum::<f64>()
-        });
-        let drain_squares = drain.as_ref().map(|d| d.fit.squares());
-        // Squares of noise differ between the two by a few of their own standard deviations.
-        let slack = 1.0 + 3.0 * (2.0 / late.len() as f64).sqrt() * 0.5;
-        let oscillates = swings
-            && match (mode_squares, drain_squares) {
-                (Some(mode), Some(drain)) => mode <= drain * slack,
-                (Some(_), None) => true,
-                _ => false,
-            };
-        if let (true, Some(mode)) = (oscillates, &mode) {
-            let [low, high] = mode.damping_interval();
-            let interval = [low, high].map(|ratio| cylinder.kinematic_viscosity_m2_s(ratio));
-            let viscosity = cylinder.kinematic_viscosity_m2_s(mode.damping_ratio);
-            return self.answer(viscosity, interval, mode.sigma / noise, Regime::Oscillating(mode.clone()));
-        }
-        match drain {
-            Some(drain) if drain.fall > FELT * drain.fall_error => {
-                let regime = Regime::Draining { offset: drain.fit.params[1], sigma: drain.fit.sigma() };
-                let excess = drain.fit.sigma() / noise;
-                self.answer(drain.viscosity(), drain.interval(), excess, regime)
+        let step_s = (t_s[t_s.len() - 1] - t_s[0]) / (t_s.len() - 1) as f64;
+        let half_period_s = 0.5 * TAU / cylinder.angular_frequency_rad_s(0, 0.0);
+        let rows = (half_period_s / step_s).ceil() as usize;
+        let left = |m: &ModeFit| -> Vec<f64> {
+            t_s.iter().zip(reading).map(|(t, y)| y - m.at(t - t_s[0])).collect()
+        };
+        let swings = mode.filter(|m| m.amplitude() > FELT * m.amplitude_error && m.damping_ratio < MOST_DAMPING);
+        let drains = drain.filter(|d| d.fall > FELT * d.fall_error);
+        // Both are judged on the rows where the film has developed. Squares of noise differ by a few of their own deviations.
+        let slack = 1.0 + 1.5 * (2.0 / (reading.len() - from) as f64).sqrt();
+        match (swings, drains) {
+            (Some(mode), drain) => {
+                let residuals = left(&mode);
+                let late: f64 = residuals[from..].iter().map(|r| r * r).sum();
+                match drain {
+                    Some(drain) if drain.fit.squares() * slack < late => self.drained(&drain, rows),
+                    _ => {
+                        let interval = mode.damping_interval().map(|g| cylinder.kinematic_viscosity_m2_s(g));
+                        let viscosity = cylinder.kinematic_viscosity_m2_s(mode.damping_ratio);
+                        self.answer(viscosity, interval, tie(&residuals, rows), Regime::Oscillating(mode))
+                    }
+                }
             }
-            _ => {
-                let (amplitude, error) =
-                    mode.map_or((0.0, noise), |mode| (mode.amplitude(), mode.amplitude_error));
-                Verdict::Refused(Refusal::NothingMoves { amplitude, error })
+            (None, Some(drain)) => self.drained(&drain, rows),
+            (None, None) => {
+                let correlation = tie(reading, rows);
+                let spread = spread(reading);
+                Verdict::Refused(if correlation > NEITHER {
+                    Refusal::NeitherLaw { correlation }
+                } else {
+                    Refusal::NothingMoves { spread }
+                })
             }
         }
     }
 
-    fn answer(&self, kinematic: f64, interval: [f64; 2], excess: f64, regime: Regime) -> Verdict {
-        if excess > NEITHER {
-            return Verdict::Refused(Refusal::NeitherLaw { excess });
+    fn drained(&self, drain: &DrainFit, rows: usize) -> Verdict {
+        let regime = Regime::Draining { offset: drain.fit.params[1], sigma: drain.fit.sigma() };
+        self.answer(drain.viscosity(), drain.interval(), tie(drain.fit.residuals.as_slice(), rows), regime)
+    }
+
+    fn answer(&self, kinematic: f64, interval: [f64; 2], correlation: f64, regime: Regime) -> Verdict {
+        if correlation > NEITHER {
+            return Verdict::Refused(Refusal::NeitherLaw { correlation });
         }
         if !(interval[1] <= self.widest_factor * interval[0]) {
             let widest_factor = self.widest_factor;
@@ -230,19 +230,23 @@ impl ViscosityFit {
     }
 }
 
-/// Residuals above this many times the readings' own noise are of neither law: smooth noise, which differences understate by as
-/// much as its smoothing, stays below.
-const NEITHER: f64 = 30.0;
+/// Residuals whose correlation over half a period of the mode is above this are motion that the law does not have; noise, even
+/// smoothed over a tenth of a period, forgets sooner.
+const NEITHER: f64 = 0.5;
 
-/// Standard deviation of the readings' noise from third differences, which pass motion as slow as a mode by (robust: the median).
-fn noise(reading: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> =
-        reading.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
-    // The weights' squares sum to 20; the median of a normal variable's size is 0.6745 of its deviation.
-    let largest = reading.iter().fold(0.0f64, |most, y| most.max(y.abs()));
-    (median / 0.6745 / 20f64.sqrt()).max(1e-9 * largest).max(f64::MIN_POSITIVE)
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Correlation of values that many rows apart, about their mean; 0 of values that are all alike.
+fn tie(values: &[f64], rows: usize) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let whole: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    let pairs = values.iter().zip(&values[rows.min(values.len())..]);
+    let along: f64 = pairs.map(|(a, b)| (a - mean) * (b - mean)).sum();
+    if whole > 0.0 { along / whole } else { 0.0 }
 }
 
 /// A drain fitted to readings: logarithm of the viscosity, and offset; the scale is the liquid's weight.
