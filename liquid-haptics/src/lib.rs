@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
+#[cfg(feature = "classify")]
+pub mod classify;
 pub mod container;
 #[cfg(feature = "fake")]
 pub mod fake;
