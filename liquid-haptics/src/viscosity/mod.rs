@@ -9,6 +9,7 @@ mod error;
 mod estimate;
 mod least_squares;
 mod mode;
+pub mod tank;
 
 pub use drain::{Drain, rise_time_s, thesis_drain_viscosity};
 pub use error::ViscosityError;
