@@ -6,7 +6,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-fn clouds(places: &[(&str, f64)], spread: f64, each: usize, rng: &mut ChaCha8Rng) -> (Vec<Vec<f64>>, Vec<String>) {
+fn clouds(
+    places: &[(&str, f64)],
+    spread: f64,
+    each: usize,
+    rng: &mut ChaCha8Rng,
+) -> (Vec<Vec<f64>>, Vec<String>) {
     let (mut rows, mut labels) = (Vec::new(), Vec::new());
     let noise = Normal::new(0.0, spread).unwrap();
     for (name, place) in places {

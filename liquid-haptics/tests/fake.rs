@@ -1,5 +1,10 @@
 //! The simulated wrist: the generic tilt programme on it and on a replay of it, and what the estimators make of what it feels.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a test stops where it fails, and says what it saw")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use std::f64::consts::PI;
 
@@ -79,7 +84,11 @@ fn a_sweep_gives_mass_and_volume_back() {
         };
         let estimate = fit.estimate(&poses).unwrap();
         let volume = mass / 997.0;
-        println!("{mass:.3} kg: {:+.2} g, {:+.2} ml", 1e3 * (felt.mass_kg - mass), 1e6 * (estimate.volume_m3 - volume));
+        println!(
+            "{mass:.3} kg: {:+.2} g, {:+.2} ml",
+            1e3 * (felt.mass_kg - mass),
+            1e6 * (estimate.volume_m3 - volume)
+        );
         off.push((estimate.volume_m3 - volume).abs());
         inside += usize::from((estimate.interval_m3[0]..=estimate.interval_m3[1]).contains(&volume));
     }
@@ -146,7 +155,12 @@ fn water_oil_and_honey_have_their_viscosities() {
             let mass = density * volume;
             let (t, y, turn_s) = swing(load(mass, density, viscosity), seconds, seed);
             let bottle = Bottle::new(&cylinder, volume, mass, 9.80665).unwrap();
-            let fit = ViscosityFit { bottle, mass_error_share: 0.0, head_start_s: 2.0 / PI * turn_s, widest_factor: 4.0 };
+            let fit = ViscosityFit {
+                bottle,
+                mass_error_share: 0.0,
+                head_start_s: 2.0 / PI * turn_s,
+                widest_factor: 4.0,
+            };
             let Verdict::Viscosity(estimate) = fit.estimate(&t, &y).unwrap() else {
                 panic!("{name}: {:?}", fit.estimate(&t, &y))
             };

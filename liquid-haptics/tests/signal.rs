@@ -33,7 +33,10 @@ fn a_weight_pulls_down() {
         .map(|i| {
             let t = f64::from(i) * 1e-3;
             let (sin, cos) = tilt(t).sin_cos();
-            stamped(t, Wrench { force_n: [10.0 * sin + 0.7, -10.0 * cos - 0.2, 0.0], torque_nm: [0.0, 0.0, -0.3] })
+            stamped(
+                t,
+                Wrench { force_n: [10.0 * sin + 0.7, -10.0 * cos - 0.2, 0.0], torque_nm: [0.0, 0.0, -0.3] },
+            )
         })
         .collect();
     // The joint's clock began 2.5 s later and is slow.
@@ -138,11 +141,14 @@ fn clocks_are_found() {
     let map = align(&moments).unwrap();
     assert!((map.rate - 1.00002).abs() < 1e-12 && (map.at(10.0) - 1_010.000_2).abs() < 1e-9);
     let motion = |t: f64| (TAU * 0.31 * t).sin() + 0.4 * (TAU * 0.83 * t + 1.0).sin();
-    let first: Vec<_> = (0..4000).map(|i| 0.003 * f64::from(i)).map(|t| stamped(t, 2.0 - 3.0 * motion(t) * -1.0)).collect();
-    let second: Vec<_> = (0..1400).map(|i| 0.008 * f64::from(i)).map(|t| stamped(t, motion(t + 0.1234))).collect();
+    let first: Vec<_> =
+        (0..4000).map(|i| 0.003 * f64::from(i)).map(|t| stamped(t, 2.0 - 3.0 * motion(t) * -1.0)).collect();
+    let second: Vec<_> =
+        (0..1400).map(|i| 0.008 * f64::from(i)).map(|t| stamped(t, motion(t + 0.1234))).collect();
     let found = align_at(&first, &second, 0.5).unwrap();
     assert!((found.offset_s - 0.1234).abs() < 2e-4, "{found:?}");
-    let noise: Vec<_> = (0..1400).map(|i| stamped(0.008 * f64::from(i), f64::from((i * 7919) % 101))).collect();
+    let noise: Vec<_> =
+        (0..1400).map(|i| stamped(0.008 * f64::from(i), f64::from((i * 7919) % 101))).collect();
     assert!(matches!(align_at(&first, &noise, 0.5), Err(SignalError::NotAlike { .. })));
     assert!(align(&moments[..1]).is_err() && align(&[[1.0, 2.0], [3.0, 2.0]]).is_err());
 }

@@ -1,10 +1,17 @@
 //! Viscosities from signals that are simulated here: an oscillator by Runge-Kutta, a film by finite volumes, a sensor's noise.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a test stops where it fails, and says what it saw")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use std::f64::consts::PI;
 
 use liquid_haptics::container::{Container, Cylinder};
-use liquid_haptics::viscosity::{Bottle, Refusal, Regime, Verdict, ViscosityError, ViscosityEstimate, ViscosityFit};
+use liquid_haptics::viscosity::{
+    Bottle, Refusal, Regime, Verdict, ViscosityError, ViscosityEstimate, ViscosityFit,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -27,7 +34,8 @@ fn sensed(torque: impl Fn(f64) -> f64, seconds: f64, rng: &mut ChaCha8Rng) -> (V
             let now = (k * AVERAGED + i) as f64 / RATE;
             let noise: f64 = StandardNormal.sample(rng);
             t += now / AVERAGED as f64;
-            y += ((torque(now) + RESOLUTION_NM * noise) / RESOLUTION_NM).round() * RESOLUTION_NM / AVERAGED as f64;
+            y += ((torque(now) + RESOLUTION_NM * noise) / RESOLUTION_NM).round() * RESOLUTION_NM
+                / AVERAGED as f64;
         }
         times.push(t);
         readings.push(y);
@@ -92,7 +100,9 @@ fn drain(bottle: &Bottle, viscosity: f64, turn_s: f64, seconds: f64) -> Vec<(f64
             let slice = area(i) * ds;
             if PI * r * r * level + above + slice < bottle.volume_m3 {
                 // The pool begins within this cell.
-                let part = ((PI * r * r * (level + ds) + above - bottle.volume_m3) / (PI * r * r * ds - slice)).clamp(0.0, 1.0);
+                let part = ((PI * r * r * (level + ds) + above - bottle.volume_m3)
+                    / (PI * r * r * ds - slice))
+                    .clamp(0.0, 1.0);
                 moment += part * moment_of(&film, &ys, i, width, r) * ds;
                 wet = i + 1;
                 break;
@@ -103,7 +113,8 @@ fn drain(bottle: &Bottle, viscosity: f64, turn_s: f64, seconds: f64) -> Vec<(f64
         out.push((now, -bottle.mass_kg / bottle.volume_m3 * GRAVITY * moment));
         let angle = if turn_s > 0.0 { 0.5 * PI * (-now / turn_s).clamp(0.0, 1.0) } else { 0.0 };
         let pull = GRAVITY * angle.cos();
-        let pace = film.iter().flat_map(|f| f[..wet].iter().zip(&size)).fold(0.0f64, |a, (d, ds)| a.max(d * d / ds));
+        let pace =
+            film.iter().flat_map(|f| f[..wet].iter().zip(&size)).fold(0.0f64, |a, (d, ds)| a.max(d * d / ds));
         let step = (0.8 * viscosity / (pull.max(1e-3 * GRAVITY) * pace)).min(0.02);
         let step = if now < 0.0 { step.min(turn_s / 200.0) } else { step };
         for f in &mut film {

@@ -204,7 +204,8 @@ impl FakeWrist {
         let moment = load.container_mass_kg * shell
             + load.liquid_mass_kg * self.across(place, tilt)
             + if self.thick() { 0.0 } else { self.slosh.mass_kg * swing };
-        let weight = (load.container_mass_kg + load.gripper_mass_kg + load.liquid_mass_kg) * load.gravity_m_s2;
+        let weight =
+            (load.container_mass_kg + load.gripper_mass_kg + load.liquid_mass_kg) * load.gravity_m_s2;
         let gain = 1.0 + load.force_gain;
         Wrench {
             force_n: [push * gain, -weight * gain, 0.0],

@@ -3,9 +3,9 @@ use std::collections::VecDeque;
 use hw_traits::clock::Stamped;
 use hw_traits::force_torque::Wrench;
 
+use super::SignalError;
 use super::align::ClockMap;
 use super::fir::{Decimator, Smoother};
-use super::SignalError;
 use crate::wrench::world_from_body;
 
 /// What a pipeline does.
@@ -56,7 +56,11 @@ impl Pipeline {
     pub fn new(settings: PipelineSettings) -> Result<Self, SignalError> {
         let ClockMap { offset_s, rate } = settings.sensor_from_joint;
         if !(rate > 0.0 && rate.is_finite() && offset_s.is_finite()) {
-            return Err(SignalError::Range { name: "sensor_from_joint", got: rate, expected: "a rate above 0" });
+            return Err(SignalError::Range {
+                name: "sensor_from_joint",
+                got: rate,
+                expected: "a rate above 0",
+            });
         }
         if let Some(&got) = settings.offset.components().iter().find(|c| !c.is_finite()) {
             return Err(SignalError::Range { name: "offset", got, expected: "numbers" });

@@ -125,8 +125,8 @@ impl Drain {
         let at = |i: isize| self.moments[(k as isize + i).clamp(0, last as isize) as usize];
         // Catmull and Rom's cubic, smooth across the table's points.
         let (a, b, c, d, u) = (at(-1), at(0), at(1), at(2), place - k as f64);
-        let cubic = b
-            + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)));
+        let cubic =
+            b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)));
         cubic * unit
     }
 }
@@ -177,7 +177,13 @@ mod tests {
 
     fn bottle(share: f64) -> Bottle {
         let volume = share * PI * 0.034f64.powi(2) * 0.17;
-        Bottle { radius_m: 0.034, length_m: 0.17, volume_m3: volume, mass_kg: 1400.0 * volume, gravity_m_s2: 9.81 }
+        Bottle {
+            radius_m: 0.034,
+            length_m: 0.17,
+            volume_m3: volume,
+            mass_kg: 1400.0 * volume,
+            gravity_m_s2: 9.81,
+        }
     }
 
     /// To begin with the moment is that of the prism on its side: two thirds of the half chord, cubed, times the length. In the end

@@ -178,7 +178,8 @@ impl ViscosityFit {
         let left = |m: &ModeFit| -> Vec<f64> {
             t_s.iter().zip(reading).map(|(t, y)| y - m.at(t - t_s[0])).collect()
         };
-        let swings = mode.filter(|m| m.amplitude() > FELT * m.amplitude_error && m.damping_ratio < MOST_DAMPING);
+        let swings =
+            mode.filter(|m| m.amplitude() > FELT * m.amplitude_error && m.damping_ratio < MOST_DAMPING);
         let drains = drain.filter(|d| d.fall > FELT * d.fall_error);
         // Both are judged on the rows where the film has developed. Squares of noise differ by a few of their own deviations.
         let slack = 1.0 + 1.5 * (2.0 / (reading.len() - from) as f64).sqrt();

@@ -150,7 +150,8 @@ mod tests {
             let fit = least_squares(&noisy, start(), decay(&t)).unwrap();
             let off = (fit.params[1] - 0.7).abs();
             inside += usize::from(off < 1.96 * covariance(&fit).unwrap()[(1, 1)].sqrt());
-            let white = fit.jacobian.tr_mul(&fit.jacobian).try_inverse().unwrap()[(1, 1)].sqrt() * fit.sigma();
+            let white =
+                fit.jacobian.tr_mul(&fit.jacobian).try_inverse().unwrap()[(1, 1)].sqrt() * fit.sigma();
             naive += usize::from(off < 1.96 * white);
         }
         assert!((348..=392).contains(&inside), "{inside} of 400 in 95 % intervals");

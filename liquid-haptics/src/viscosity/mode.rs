@@ -225,7 +225,10 @@ mod tests {
             let root = f64::sqrt(1.0 - gamma * gamma);
             let x: Vec<f64> = t
                 .iter()
-                .map(|t| 0.4 + (-gamma * 21.0 * t).exp() * ((21.0 * root * t).cos() - 0.5 * (21.0 * root * t).sin()))
+                .map(|t| {
+                    0.4 + (-gamma * 21.0 * t).exp()
+                        * ((21.0 * root * t).cos() - 0.5 * (21.0 * root * t).sin())
+                })
                 .collect();
             let fit = fit_mode(&t, &x, [14.0, 28.0]).unwrap();
             assert!((fit.damping_ratio / gamma - 1.0).abs() < 1e-6, "{gamma}: {fit:?}");

@@ -124,8 +124,12 @@ impl Tank {
     pub fn mode(&self) -> Result<TankMode, ViscosityError> {
         self.check()?;
         let (length, sums) = match *self {
-            Self::UprightCylinder { radius_m, depth_m } => (radius_m, upright::annulus(radius_m, 0.0, depth_m)),
-            Self::Annulus { outer_m, inner_m, depth_m } => (outer_m, upright::annulus(outer_m, inner_m, depth_m)),
+            Self::UprightCylinder { radius_m, depth_m } => {
+                (radius_m, upright::annulus(radius_m, 0.0, depth_m))
+            }
+            Self::Annulus { outer_m, inner_m, depth_m } => {
+                (outer_m, upright::annulus(outer_m, inner_m, depth_m))
+            }
             Self::Rectangular { length_m, width_m, depth_m } => {
                 (length_m, Some(upright::rectangular(length_m, width_m, depth_m)))
             }
@@ -292,6 +296,10 @@ mod tests {
     fn damping_and_viscosity_invert_each_other() {
         let mode = Tank::Sphere { radius_m: 0.05, depth_m: 0.04 }.mode().unwrap();
         let ratio = mode.damping_ratio(3e-6, 9.81);
-        approx::assert_relative_eq!(mode.kinematic_viscosity_m2_s(ratio, 1.0, 9.81), 3e-6, max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            mode.kinematic_viscosity_m2_s(ratio, 1.0, 9.81),
+            3e-6,
+            max_relative = 1e-12
+        );
     }
 }
