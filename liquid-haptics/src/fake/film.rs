@@ -3,9 +3,12 @@
 use std::f64::consts::PI;
 
 const STRIPS: usize = 32;
-const CELLS: usize = 160;
+/// Cells along the wall, finer towards its top, where the film is steep.
+const CELLS: usize = 200;
 /// Share of a cell that the flow may cross in a step.
 const COURANT: f64 = 0.8;
+/// Times shorter than this are gathered before the film goes on, s.
+const GATHERED_S: f64 = 1e-3;
 
 /// Film and pool.
 #[derive(Debug, Clone)]
@@ -18,6 +21,8 @@ pub(super) struct Film {
     /// Depth of each strip's cells from the top down, m, and where the strips are (cosine and width of their angle).
     depths: Vec<[f64; CELLS]>,
     walls: Vec<[f64; 2]>,
+    waiting_s: f64,
+    sideways: f64,
 }
 
 impl Film {
@@ -36,11 +41,19 @@ impl Film {
             if area * length > volume { low = chord } else { high = chord }
         }
         let depths = walls.iter().map(|[wall, _]| [depth(*wall, high); CELLS]).collect();
-        Self { radius, length, volume, viscosity, gravity, depths, walls }
+        let mut film =
+            Self { radius, length, volume, viscosity, gravity, depths, walls, waiting_s: 0.0, sideways: 0.0 };
+        film.sideways = film.sum_sideways();
+        film
     }
 
-    fn cell(&self) -> f64 {
-        self.length / CELLS as f64
+    /// Where a cell begins, m from the top.
+    fn edge(&self, i: usize) -> f64 {
+        self.length * (i as f64 / CELLS as f64).powf(1.5)
+    }
+
+    fn size(&self, i: usize) -> f64 {
+        self.edge(i + 1) - self.edge(i)
     }
 
     /// How many cells, the last one in part, lie above the pool.
@@ -49,12 +62,12 @@ impl Film {
         let mut film = 0.0;
         for i in 0..CELLS {
             let slice: f64 = self.depths.iter().zip(&self.walls).map(|(d, w)| d[i] * w[1]).sum();
-            let level = self.length - (i as f64 + 1.0) * self.cell();
-            if disc * level + film + slice * self.cell() < self.volume {
-                let spare = disc * (level + self.cell()) + film - self.volume;
-                return i as f64 + (spare / ((disc - slice) * self.cell())).clamp(0.0, 1.0);
+            let (level, size) = (self.length - self.edge(i + 1), self.size(i));
+            if disc * level + film + slice * size < self.volume {
+                let spare = disc * (level + size) + film - self.volume;
+                return i as f64 + (spare / ((disc - slice) * size)).clamp(0.0, 1.0);
             }
-            film += slice * self.cell();
+            film += slice * size;
         }
         CELLS as f64
     }
@@ -62,37 +75,49 @@ impl Film {
     /// Goes on by a time (s) at a tilt (rad): gravity pulls along the wall with its cosine.
     pub(super) fn advance(&mut self, duration_s: f64, tilt_rad: f64) {
         let pull = self.gravity * tilt_rad.cos().max(0.0);
-        let mut left = duration_s;
+        self.waiting_s += duration_s;
+        if self.waiting_s < GATHERED_S {
+            return;
+        }
+        let sizes: [f64; CELLS] = std::array::from_fn(|i| self.size(i));
+        let mut left = std::mem::take(&mut self.waiting_s);
         while left > 0.0 && pull > 0.0 {
             let wet = (self.above_pool().ceil() as usize).min(CELLS);
-            let deepest = self.depths.iter().flat_map(|d| &d[..wet]).fold(0.0f64, |a, b| a.max(*b));
-            if deepest == 0.0 {
-                return;
+            // The fastest crossing of a cell, over gravity and viscosity.
+            let cells = self.depths.iter().flat_map(|d| d[..wet].iter().zip(&sizes));
+            let pace = cells.fold(0.0f64, |most, (depth, size)| most.max(depth * depth / size));
+            if pace == 0.0 {
+                break;
             }
-            let h = (COURANT * self.cell() * self.viscosity / (pull * deepest * deepest)).min(left);
+            let h = (COURANT * self.viscosity / (pull * pace)).min(left);
             let flux = pull / (3.0 * self.viscosity);
             for strip in &mut self.depths {
                 let mut inflow = 0.0;
-                for depth in &mut strip[..wet] {
+                for (depth, size) in strip[..wet].iter_mut().zip(&sizes) {
                     let outflow = flux * depth.powi(3);
-                    *depth += h * CELLS as f64 / self.length * (inflow - outflow);
+                    *depth += h / size * (inflow - outflow);
                     inflow = outflow;
                 }
             }
             left -= h;
         }
+        self.sideways = self.sum_sideways();
     }
 
     /// Where the whole liquid's centre of mass lies off the axis, m.
     pub(super) fn sideways(&self) -> f64 {
+        self.sideways
+    }
+
+    fn sum_sideways(&self) -> f64 {
         let above = self.above_pool();
         let mut moment = 0.0;
         for i in 0..CELLS {
-            let share = (above - i as f64).clamp(0.0, 1.0);
+            let share = (above - i as f64).clamp(0.0, 1.0) * self.size(i);
             for (strip, [wall, width]) in self.depths.iter().zip(&self.walls) {
                 moment += share * width * strip[i] * (wall - 0.5 * strip[i]);
             }
         }
-        moment * self.cell() / self.volume
+        moment / self.volume
     }
 }
