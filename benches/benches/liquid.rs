@@ -27,7 +27,9 @@ fn cylinder(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
     let bottle = bottle()?;
     let columns = Round::new(0.034, 0.170, 0.001, 20_000);
     let mut group = c.benchmark_group("cylinder_center");
-    for (name, tilt, share) in [("wedge", 1.2, 0.1), ("upright", 0.3, 0.5), ("both_ends", 1.5, 0.5), ("over", 2.3, 0.7)] {
+    for (name, tilt, share) in
+        [("wedge", 1.2, 0.1), ("upright", 0.3, 0.5), ("both_ends", 1.5, 0.5), ("over", 2.3, 0.7)]
+    {
         let (up, volume) = (up_at_tilt(tilt), share * bottle.capacity_m3());
         let center = bottle.fill(&up, volume)?.center_of_mass;
         let [x, z] = columns.center(tilt, volume);
@@ -70,8 +72,13 @@ fn mesh(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
     for triangles in [1_000_usize, 10_000, 100_000] {
         let drum = drum(triangles)?;
         let (plan, volume) = (drum.plan(&up), 0.4 * drum.capacity_m3());
-        let off = plan.fill(volume)?.center_of_mass - round.fill(&up, 0.4 * round.capacity_m3())?.center_of_mass;
-        println!("mesh/{triangles}: {} triangles, centre {:.1e} m off the cylinder's", drum.triangles().len(), off.norm());
+        let off =
+            plan.fill(volume)?.center_of_mass - round.fill(&up, 0.4 * round.capacity_m3())?.center_of_mass;
+        println!(
+            "mesh/{triangles}: {} triangles, centre {:.1e} m off the cylinder's",
+            drum.triangles().len(),
+            off.norm()
+        );
         group.bench_with_input(BenchmarkId::new("plan", triangles), &up, |b, up| b.iter(|| drum.plan(up)));
         group.bench_with_input(BenchmarkId::new("query", triangles), &volume, |b, v| {
             b.iter(|| plan.fill(black_box(*v)));
@@ -99,7 +106,8 @@ fn volume(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
         poses.push(Pose { tilt_rad, wrench });
     }
     let liquid = Liquid::Mass { mass_kg: 0.3, error_kg: 2e-4 };
-    let fit = VolumeFit { container: &bottle, grasp, departures: none, liquid, sigma_nm: None, widest_share: 0.5 };
+    let fit =
+        VolumeFit { container: &bottle, grasp, departures: none, liquid, sigma_nm: None, widest_share: 0.5 };
     let estimate = fit.estimate(&poses)?;
     println!(
         "volume/19 poses: {:+.2} mL, interval {:.2} mL wide",
@@ -121,7 +129,9 @@ fn viscosity(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
     let slosh: Vec<f64> = times
         .iter()
         .enumerate()
-        .map(|(i, t)| 0.01 * (-gamma * omega * t).exp() * (omega * t * (1.0 - gamma * gamma).sqrt()).cos() + noise(i))
+        .map(|(i, t)| {
+            0.01 * (-gamma * omega * t).exp() * (omega * t * (1.0 - gamma * gamma).sqrt()).cos() + noise(i)
+        })
         .collect();
     let film = Drain::new(&bottle);
     let weight = bottle.density_kg_m3() * GRAVITY;
@@ -132,7 +142,9 @@ fn viscosity(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
         if let Verdict::Viscosity(e) = fit.estimate(&times, torque)? {
             println!("viscosity/{name}: {:+.1} %", 100.0 * (e.kinematic_m2_s / truth - 1.0));
         }
-        group.bench_function(BenchmarkId::new(name, times.len()), |b| b.iter(|| fit.estimate(&times, black_box(torque))));
+        group.bench_function(BenchmarkId::new(name, times.len()), |b| {
+            b.iter(|| fit.estimate(&times, black_box(torque)))
+        });
     }
     group.finish();
     Ok(())
@@ -143,7 +155,8 @@ fn pour(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
     let (lip, rim, bead) = (0.027, 0.171, 0.0048);
     let pour = Pour::new(&bottle, Mouth::new(lip, rim)?, Bead::measured(bead, bead)?, PI)?;
     let tilt = pour.tilt_rad(400e-6, 100e-6)?;
-    let stays = Round::new(0.034, 0.170, 0.001, 20_000).below(tilt, rim * tilt.cos() - lip * tilt.sin() + bead)[0];
+    let stays =
+        Round::new(0.034, 0.170, 0.001, 20_000).below(tilt, rim * tilt.cos() - lip * tilt.sin() + bead)[0];
     println!("pour/cylinder: {:+.1e} mL of 100 mL", 1e6 * (300e-6 - stays));
     c.bench_function("pour/cylinder", |b| b.iter(|| pour.tilt_rad(black_box(400e-6), 100e-6)));
     Ok(())
