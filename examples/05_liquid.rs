@@ -137,7 +137,12 @@ fn sweeps_of_the_bottle(levels: u32, sweeps: u32) -> Outcome<()> {
     // The sensor is calibrated once, on ten turns of the empty bottle.
     let empty: Outcome<Vec<Vec<Pose>>> =
         (0..10_u64).into_par_iter().map(|k| sweep(bottle_load(0.0, WATER, 1e-6), 900 + k)).collect();
-    let empty: Vec<Pose> = empty?.concat();
+    let empty = empty?;
+    // Turns differ by more than the scatter of one turn's poses shows: the sensor wanders.
+    let zeros = empty.iter().map(|poses| Ok(mass(poses, None)?.mass_kg)).collect::<Outcome<Vec<f64>>>()?;
+    let middle = zeros.iter().sum::<f64>() / zeros.len() as f64;
+    let wander = zeros.iter().map(|z| (z - middle).powi(2)).sum::<f64>() / (zeros.len() - 1) as f64;
+    let empty: Vec<Pose> = empty.concat();
     let felt: Outcome<Vec<Felt>> = (0..levels * sweeps)
         .into_par_iter()
         .map(|k| {
@@ -145,12 +150,16 @@ fn sweeps_of_the_bottle(levels: u32, sweeps: u32) -> Outcome<()> {
             let poses = sweep(bottle_load(WATER * truth, WATER, 1e-6), u64::from(k))?;
             let found = mass(&poses, Some(&empty))?;
             let raw = mass(&poses, None)?;
-            let [volume_m3, low, high] = volume(&inner, GRASP, &poses, Liquid::from(&found))?;
+            let liquid = Liquid::Mass {
+                mass_kg: found.mass_kg.max(0.0),
+                error_kg: (found.error_kg.powi(2) + wander).sqrt(),
+            };
+            let [volume_m3, low, high] = volume(&inner, GRASP, &poses, liquid)?;
             Ok(Felt {
                 raw_mass: raw.mass_kg - WATER * truth,
                 mass: found.mass_kg - WATER * truth,
                 volume: volume_m3 - truth,
-                outer: volume(&outer, GRASP, &poses, Liquid::from(&found))?[0] - truth,
+                outer: volume(&outer, GRASP, &poses, liquid)?[0] - truth,
                 inside: low <= truth && truth <= high,
             })
         })
