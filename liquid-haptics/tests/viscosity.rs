@@ -193,7 +193,7 @@ fn a_drain_gives_the_viscosity_back() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let (mut inside, mut all) = (0, 0);
     println!("{:>6} {:>6} {:>9} {:>20}", "Pa s", "share", "error", "interval");
-    for (share, turn) in [(0.2, 0.3), (0.4, 0.0), (0.65, 0.5)] {
+    for (share, turn) in [(0.2, 0.3), (0.4, 0.0), (0.5, 0.5)] {
         let bottle = bottle(0.035, 0.172, share, 1400.0);
         for dynamic in [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0] {
             let viscosity = dynamic / 1400.0;
