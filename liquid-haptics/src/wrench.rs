@@ -3,6 +3,8 @@
 //! World: origin at the grasp, y up, `theta` the clockwise tilt from upright. Forces are those of the load on the sensor, so
 //! weight gives `f_y < 0`, and `tau_z = x_com f_y` (thesis eq. 2.1, sign corrected).
 
+use hw_traits::force_torque::Wrench;
+
 use crate::container::{Container, ContainerError, up_at_tilt};
 
 /// Masses and lengths of a gripper that holds a container at a height along its axis.
@@ -46,6 +48,22 @@ pub struct PlanarWrench {
     pub fy_n: f64,
     /// Torque about z, N m.
     pub tau_z_nm: f64,
+}
+
+/// A wrench in the world's frame from one in the frame of a sensor that turns with the container about z: y along the container's
+/// axis, `tilt_rad` clockwise from upright, both origins at the grasp.
+pub fn world_from_body(wrench_in_body: &Wrench, tilt_rad: f64) -> Wrench {
+    let (sin, cos) = tilt_rad.sin_cos();
+    let turn = |[x, y, z]: [f64; 3]| [x * cos + y * sin, y * cos - x * sin, z];
+    Wrench { force_n: turn(wrench_in_body.force_n), torque_nm: turn(wrench_in_body.torque_nm) }
+}
+
+impl From<&Wrench> for PlanarWrench {
+    /// The parts of a wrench in the world's frame that a turn about z moves.
+    fn from(wrench_in_world: &Wrench) -> Self {
+        let ([fx_n, fy_n, _], [_, _, tau_z_nm]) = (wrench_in_world.force_n, wrench_in_world.torque_nm);
+        Self { fx_n, fy_n, tau_z_nm }
+    }
 }
 
 impl Grasp {

@@ -221,3 +221,26 @@ proptest! {
         prop_assert!((turned.center_of_mass.x - c.x).abs() < 1e-14 && (turned.center_of_mass.z - (length - c.z)).abs() < 1e-14 * size.max(1.0));
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// The four cases meet: across the tilts and volumes at which one turns into another, centre and surface move by no more than
+    /// the step does.
+    #[test]
+    fn the_four_cases_meet(log_ratio in -1.0f64..1.0, share in 0.02f64..0.98, top in proptest::bool::ANY) {
+        let (radius, length) = (1.0, 1.0 / 10f64.powf(log_ratio));
+        let cylinder = Cylinder::new(radius, length, 0.0).unwrap();
+        let volume = share * cylinder.capacity_m3();
+        // The surface reaches the bottom's (or the lid's) edge at this tilt.
+        let depth = if top { (1.0 - share) * length } else { share * length };
+        let edge = (depth / radius).atan();
+        let step = 1e-9;
+        let at = |tilt: f64| cylinder.fill(&up_at_tilt(tilt), volume).unwrap();
+        let (before, after) = (at(edge - step), at(edge + step));
+        let size = length.max(radius);
+        let jump = (before.center_of_mass - after.center_of_mass).norm();
+        prop_assert!(jump < 50.0 * step * size * (1.0 + size / length.min(radius)).powi(2), "{}", jump);
+        prop_assert!((before.surface_height_m - after.surface_height_m).abs() < 50.0 * step * size);
+    }
+}

@@ -339,3 +339,29 @@ proptest! {
         let _ = MeshContainer::from_obj(&all, 1.0, &Isometry3::identity());
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// In a convex drum the centre of mass lies below the surface and inside; more liquid stands higher; what is full and what is
+    /// empty balance; a mirrored tilt gives the mirror image.
+    #[test]
+    fn liquid_in_a_mesh_lies_where_liquid_lies(tilt in 0.0f64..3.1, share in 0.01f64..0.98, more in 0.001f64..0.02) {
+        let drum = drum(0.04, 0.15, 24);
+        let (up, capacity) = (up_at_tilt(tilt), drum.capacity_m3());
+        let fill = drum.fill(&up, share * capacity).unwrap();
+        let c = fill.center_of_mass;
+        prop_assert!(c.dot(&up) <= fill.surface_height_m + 1e-12);
+        prop_assert!(c.x.hypot(c.y) <= 0.04 && (0.0..=0.15).contains(&c.z));
+        let fuller = drum.fill(&up, (share + more) * capacity).unwrap();
+        prop_assert!(fuller.surface_height_m > fill.surface_height_m);
+        // The air above is what is left of the whole, whose centre is the drum's.
+        let down = UnitVector3::new_unchecked(-up.into_inner());
+        let air = drum.fill(&down, (1.0 - share) * capacity).unwrap();
+        let whole = c * share + air.center_of_mass * (1.0 - share);
+        prop_assert!((whole - Vector3::new(0.0, 0.0, 0.075)).norm() < 1e-9, "{}", whole);
+        prop_assert!((air.surface_height_m + fill.surface_height_m).abs() < 1e-9);
+        let mirrored = drum.fill(&up_at_tilt(-tilt), share * capacity).unwrap().center_of_mass;
+        prop_assert!((mirrored.x + c.x).abs() < 1e-9 && (mirrored.z - c.z).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,264 @@
+//! Viscosities from signals that are simulated here: an oscillator by Runge-Kutta, a film by finite volumes, a sensor's noise.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
+
+use std::f64::consts::PI;
+
+use liquid_haptics::container::{Container, Cylinder};
+use liquid_haptics::viscosity::{
+    Bottle, Refusal, Regime, Verdict, ViscosityError, ViscosityEstimate, ViscosityFit,
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const GRAVITY: f64 = 9.80665;
+/// The sensor's rate (Hz, thesis section 2.5), how many of its readings are averaged into one, and the resolution of its torque
+/// (N m), taken as the noise of a raw reading.
+const RATE: f64 = 7812.0;
+const AVERAGED: usize = 78;
+const RESOLUTION_NM: f64 = 0.005;
+
+/// Times (s) and averaged, quantised, noisy readings of a torque (N m).
+fn sensed(torque: impl Fn(f64) -> f64, seconds: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>) {
+    let count = (seconds * RATE) as usize / AVERAGED;
+    let mut times = Vec::new();
+    let mut readings = Vec::new();
+    for k in 0..count {
+        let (mut t, mut y) = (0.0, 0.0);
+        for i in 0..AVERAGED {
+            let now = (k * AVERAGED + i) as f64 / RATE;
+            let noise: f64 = StandardNormal.sample(rng);
+            t += now / AVERAGED as f64;
+            y += ((torque(now) + RESOLUTION_NM * noise) / RESOLUTION_NM).round() * RESOLUTION_NM
+                / AVERAGED as f64;
+        }
+        times.push(t);
+        readings.push(y);
+    }
+    (times, readings)
+}
+
+/// A decaying mode by Runge-Kutta of fourth order, tabulated every 0.1 ms.
+fn slosh(bottle: &Bottle, viscosity: f64, amplitude: f64, seconds: f64) -> impl Fn(f64) -> f64 {
+    let (r, h) = (bottle.radius_m, bottle.volume_m3 / (PI * bottle.radius_m.powi(2)));
+    let omega = (1.841 * GRAVITY / r * (1.841 * h / r).tanh()).sqrt();
+    let x = 1.84 * h / r;
+    #[allow(clippy::approx_constant, reason = "the law's coefficient, not 1/pi")]
+    let shallow = 0.318;
+    let gamma = 0.79
+        * (viscosity / (r.powf(1.5) * GRAVITY.sqrt())).sqrt()
+        * (1.0 + shallow / x.sinh() * (1.0 + (1.0 - h / r) / x.cosh()));
+    let step = 1e-4;
+    let (mut x, mut v) = (amplitude, 0.0);
+    let force = |x: f64, v: f64| -omega * omega * x - 2.0 * gamma * omega * v;
+    let mut table = vec![x];
+    for _ in 0..(seconds / step) as usize + 2 {
+        let (k1, l1) = (v, force(x, v));
+        let (k2, l2) = (v + 0.5 * step * l1, force(x + 0.5 * step * k1, v + 0.5 * step * l1));
+        let (k3, l3) = (v + 0.5 * step * l2, force(x + 0.5 * step * k2, v + 0.5 * step * l2));
+        let (k4, l4) = (v + step * l3, force(x + step * k3, v + step * l3));
+        x += step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+        v += step / 6.0 * (l1 + 2.0 * l2 + 2.0 * l3 + l4);
+        table.push(x);
+    }
+    move |t| 0.03 + table[((t / step) as usize).min(table.len() - 1)]
+}
+
+/// The torque (N m) of a film that drains while and after the bottle turns upright at a constant rate: upwind finite volumes in
+/// every strip, gravity's share along the wall growing with the turn. Table of time after the turn and torque.
+fn drain(bottle: &Bottle, viscosity: f64, turn_s: f64, seconds: f64) -> Vec<(f64, f64)> {
+    const STRIPS: usize = 32;
+    const CELLS: usize = 480;
+    let (r, length) = (bottle.radius_m, bottle.length_m);
+    let (mut low, mut high) = (-r, r);
+    let depth_at = |y: f64, chord: f64| {
+        let wall = (r * r - y * y).sqrt();
+        (wall - chord.max(-wall)).max(0.0)
+    };
+    let width = 2.0 * r / STRIPS as f64;
+    let ys: Vec<f64> = (0..STRIPS).map(|j| -r + (j as f64 + 0.5) * width).collect();
+    for _ in 0..60 {
+        let chord = 0.5 * (low + high);
+        let area: f64 = ys.iter().map(|y| depth_at(*y, chord) * width).sum();
+        if area * length > bottle.volume_m3 { low = chord } else { high = chord }
+    }
+    let mut film: Vec<Vec<f64>> = ys.iter().map(|y| vec![depth_at(*y, low); CELLS]).collect();
+    // Finer towards the top, where the fan is steep.
+    let edge = |i: usize| length * (i as f64 / CELLS as f64).powi(2);
+    let size: Vec<f64> = (0..CELLS).map(|i| edge(i + 1) - edge(i)).collect();
+    let mut now = -turn_s;
+    let mut out = Vec::new();
+    while now < seconds {
+        // The pool's level: what is not film is pool.
+        let area = |i: usize| film.iter().map(|f| f[i] * width).sum::<f64>();
+        let (mut above, mut moment, mut wet) = (0.0, 0.0, CELLS);
+        for (i, &ds) in size.iter().enumerate() {
+            let level = length - edge(i + 1);
+            let slice = area(i) * ds;
+            if PI * r * r * level + above + slice < bottle.volume_m3 {
+                // The pool begins within this cell.
+                let part = ((PI * r * r * (level + ds) + above - bottle.volume_m3)
+                    / (PI * r * r * ds - slice))
+                    .clamp(0.0, 1.0);
+                moment += part * moment_of(&film, &ys, i, width, r) * ds;
+                wet = i + 1;
+                break;
+            }
+            above += slice;
+            moment += moment_of(&film, &ys, i, width, r) * ds;
+        }
+        out.push((now, -bottle.mass_kg / bottle.volume_m3 * GRAVITY * moment));
+        let angle = if turn_s > 0.0 { 0.5 * PI * (-now / turn_s).clamp(0.0, 1.0) } else { 0.0 };
+        let pull = GRAVITY * angle.cos();
+        let pace =
+            film.iter().flat_map(|f| f[..wet].iter().zip(&size)).fold(0.0f64, |a, (d, ds)| a.max(d * d / ds));
+        let step = (0.8 * viscosity / (pull.max(1e-3 * GRAVITY) * pace)).min(0.02);
+        let step = if now < 0.0 { step.min(turn_s / 200.0) } else { step };
+        for f in &mut film {
+            let mut inflow = 0.0;
+            for (cell, ds) in f.iter_mut().zip(&size).take(wet) {
+                let outflow = pull * cell.powi(3) / (3.0 * viscosity);
+                *cell += step / ds * (inflow - outflow);
+                inflow = outflow;
+            }
+        }
+        now += step;
+    }
+    out
+}
+
+fn moment_of(film: &[Vec<f64>], ys: &[f64], i: usize, width: f64, r: f64) -> f64 {
+    film.iter().zip(ys).map(|(f, y)| width * ((r * r - y * y).sqrt() * f[i] - 0.5 * f[i] * f[i])).sum()
+}
+
+fn table(points: Vec<(f64, f64)>) -> impl Fn(f64) -> f64 {
+    move |t| {
+        let k = points.partition_point(|p| p.0 <= t).clamp(1, points.len() - 1);
+        let ((a, x), (b, y)) = (points[k - 1], points[k]);
+        0.02 + x + (y - x) * (t - a) / (b - a)
+    }
+}
+
+fn bottle(radius: f64, length: f64, share: f64, density: f64) -> Bottle {
+    let cylinder = Cylinder::new(radius, length, 0.001).unwrap();
+    let volume = share * cylinder.capacity_m3();
+    Bottle::new(&cylinder, volume, density * volume, GRAVITY).unwrap()
+}
+
+fn fit(bottle: Bottle, turn_s: f64) -> ViscosityFit {
+    ViscosityFit { bottle, mass_error_share: 0.0, head_start_s: 2.0 / PI * turn_s, widest_factor: 4.0 }
+}
+
+fn told(verdict: Verdict) -> ViscosityEstimate {
+    match verdict {
+        Verdict::Viscosity(estimate) => estimate,
+        Verdict::Refused(why) => panic!("{why:?}"),
+    }
+}
+
+#[test]
+fn a_slosh_gives_the_viscosity_back() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let (mut inside, mut all) = (0, 0);
+    println!("{:>8} {:>6} {:>11} {:>24}", "m2/s", "share", "error", "interval");
+    for share in [0.3, 0.5, 0.7] {
+        let bottle = bottle(0.040, 0.16, share, 1000.0);
+        for viscosity in [1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3] {
+            // 30 s: water's wave takes ten to fade.
+            let signal = slosh(&bottle, viscosity, 0.015, 30.0);
+            for _ in 0..4 {
+                let (t, y) = sensed(&signal, 30.0, &mut rng);
+                let estimate = told(fit(bottle, 0.0).estimate(&t, &y).unwrap());
+                assert!(matches!(estimate.regime, Regime::Oscillating(_)), "{viscosity} {estimate:?}");
+                let error = estimate.kinematic_m2_s / viscosity - 1.0;
+                let [low, high] = estimate.interval_m2_s;
+                println!("{viscosity:>8.0e} {share:>6} {error:>+11.4} {:>11.3e} {:>11.3e}", low, high);
+                assert!(error.abs() < 0.2, "{viscosity} {share}: {error}");
+                inside += usize::from(low <= viscosity && viscosity <= high);
+                all += 1;
+            }
+        }
+    }
+    println!("{inside} of {all} inside their 95 % intervals");
+    assert!(inside * 100 >= all * 88, "{inside} of {all}");
+}
+
+#[test]
+fn a_drain_gives_the_viscosity_back() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let (mut inside, mut all) = (0, 0);
+    println!("{:>6} {:>6} {:>9} {:>20}", "Pa s", "share", "error", "interval");
+    for (share, turn) in [(0.2, 0.3), (0.4, 0.0), (0.5, 0.5)] {
+        let bottle = bottle(0.035, 0.172, share, 1400.0);
+        for dynamic in [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0] {
+            let viscosity = dynamic / 1400.0;
+            let signal = table(drain(&bottle, viscosity, turn, 30.0));
+            for _ in 0..2 {
+                let (t, y) = sensed(&signal, 30.0, &mut rng);
+                let estimate = told(fit(bottle, turn).estimate(&t, &y).unwrap());
+                assert!(matches!(estimate.regime, Regime::Draining { .. }), "{dynamic} {estimate:?}");
+                let error = estimate.dynamic_pa_s / dynamic - 1.0;
+                let [low, high] = estimate.interval_m2_s.map(|nu| nu * 1400.0);
+                println!("{dynamic:>6} {share:>6} {error:>+9.4} {low:>10.3} {high:>10.3}");
+                assert!(error.abs() < 0.2, "{dynamic} {share}: {error}");
+                inside += usize::from(low <= dynamic && dynamic <= high);
+                all += 1;
+            }
+        }
+    }
+    println!("{inside} of {all} inside their 95 % intervals");
+    // The finite volumes themselves are 1 % high.
+    assert!(inside * 100 >= all * 70, "{inside} of {all}");
+}
+
+/// What the readings do not tell is refused, and why.
+#[test]
+fn what_is_not_felt_is_refused() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let half = bottle(0.040, 0.16, 0.5, 1000.0);
+    let refused = |bottle: Bottle, t: &[f64], y: &[f64]| match fit(bottle, 0.3).estimate(t, y).unwrap() {
+        Verdict::Refused(why) => why,
+        Verdict::Viscosity(estimate) => panic!("{estimate:?}"),
+    };
+    for _ in 0..20 {
+        let (t, y) = sensed(|_| 0.03, 10.0, &mut rng);
+        assert!(matches!(refused(half, &t, &y), Refusal::NothingMoves { .. } | Refusal::TooNoisy { .. }));
+    }
+    let signal = slosh(&half, 1e-5, 0.015, 10.0);
+    let (t, y) = sensed(&signal, 10.0, &mut rng);
+    assert!(matches!(refused(half, &t[..40], &y[..40]), Refusal::TooShort { .. }));
+    let empty = Bottle { volume_m3: 0.0, mass_kg: 0.0, ..half };
+    assert!(matches!(refused(empty, &t, &y), Refusal::Empty { .. }));
+    // A wave as high as the noise of the averaged readings, that is gone after a swing.
+    let faint = slosh(&half, 1e-3, 0.0015, 10.0);
+    let (t, y) = sensed(&faint, 10.0, &mut rng);
+    assert!(matches!(refused(half, &t, &y), Refusal::NothingMoves { .. } | Refusal::TooNoisy { .. }));
+    // A sawtooth is neither.
+    let (t, y) = sensed(|t| 0.5 * (t / 3.0).fract(), 10.0, &mut rng);
+    assert!(matches!(refused(half, &t, &y), Refusal::NeitherLaw { .. } | Refusal::TooNoisy { .. }));
+}
+
+#[test]
+fn what_is_no_reading_is_an_error() {
+    let rig = fit(bottle(0.040, 0.16, 0.5, 1000.0), 0.0);
+    let t: Vec<f64> = (0..100).map(|i| 0.02 * f64::from(i)).collect();
+    let y = vec![0.0; 100];
+    let with = |i: usize, v: f64| {
+        let mut bad = y.clone();
+        bad[i] = v;
+        bad
+    };
+    assert!(matches!(rig.estimate(&t, &with(7, f64::NAN)), Err(ViscosityError::Reading { index: 7, .. })));
+    assert!(matches!(rig.estimate(&t, &y[..50]), Err(ViscosityError::Lengths { .. })));
+    assert!(matches!(rig.estimate(&t[..5], &y[..5]), Err(ViscosityError::TooFew { .. })));
+    assert!(matches!(rig.estimate(&y, &t), Err(ViscosityError::Reading { index: 1, .. })));
+    assert!(ViscosityFit { widest_factor: 1.0, ..rig }.estimate(&t, &y).is_err());
+    assert!(ViscosityFit { head_start_s: f64::NAN, ..rig }.estimate(&t, &y).is_err());
+    // All alike: nothing moves, and nothing breaks.
+    assert!(matches!(rig.estimate(&t, &y), Ok(Verdict::Refused(_))));
+}
