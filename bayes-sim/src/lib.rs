@@ -1,0 +1,21 @@
+#![doc = include_str!("../README.md")]
+pub mod autoregressive;
+pub mod c2st;
+mod ensemble;
+pub mod error;
+mod head;
+pub mod kernel;
+mod linear;
+pub mod mdn;
+pub mod mdrff;
+pub mod mixture;
+mod network;
+mod normal;
+pub mod points;
+pub mod posterior;
+pub mod prior;
+pub mod random_features;
+mod scaling;
+pub mod simulations;
+pub mod training;
+pub mod truncation;
