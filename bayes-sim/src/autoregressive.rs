@@ -74,7 +74,14 @@ impl Autoregressive {
                 let scaled = |b: f64| (b - prepared.output.centre[i]) / prepared.output.scale[i];
                 let cut = bounds[i].map(|b| b.is_finite().then(|| scaled(b)));
                 let cut = cut.iter().any(Option::is_some).then_some(cut);
-                Ensemble::train(&plans, cut, &pairs, &held_out, &settings.training, seed.wrapping_add(i as u64))
+                Ensemble::train(
+                    &plans,
+                    cut,
+                    &pairs,
+                    &held_out,
+                    &settings.training,
+                    seed.wrapping_add(i as u64),
+                )
             })
             .collect::<Result<_, _>>()?;
         Ok(Self { prior: prior.clone(), input: prepared.input, output: prepared.output, factors })

@@ -49,7 +49,9 @@ pub fn c2st(reference: &Points, other: &Points, seed: u64) -> Result<f64, Error>
         .collect();
     let mut rows: Vec<(Vec<f64>, f64)> = Vec::with_capacity(reference.len() + other.len());
     for (sample, label) in [(reference, 0.0), (other, 1.0)] {
-        rows.extend(sample.rows().map(|r| (r.iter().zip(&scales).map(|(v, (m, s))| (v - m) / s).collect(), label)));
+        rows.extend(
+            sample.rows().map(|r| (r.iter().zip(&scales).map(|(v, (m, s))| (v - m) / s).collect(), label)),
+        );
     }
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
@@ -62,7 +64,8 @@ pub fn c2st(reference: &Points, other: &Points, seed: u64) -> Result<f64, Error>
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(fold as u64 + 1);
             let classifier = Classifier::fit(&rows, &train, &mut rng);
-            let right = test.iter().filter(|&&i| (classifier.logit(&rows[i].0) > 0.0) == (rows[i].1 > 0.5)).count();
+            let right =
+                test.iter().filter(|&&i| (classifier.logit(&rows[i].0) > 0.0) == (rows[i].1 > 0.5)).count();
             right as f64 / test.len() as f64
         })
         .collect();

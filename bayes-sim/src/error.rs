@@ -41,7 +41,9 @@ pub enum Error {
         prior: String,
     },
     /// A prior that is none: bounds the wrong way round, or not positive where a logarithm is taken.
-    #[error("parameter {parameter}: {prior} is not a prior; bounds have to rise, and be above 0 for a logarithm")]
+    #[error(
+        "parameter {parameter}: {prior} is not a prior; bounds have to rise, and be above 0 for a logarithm"
+    )]
     Prior {
         /// Parameter, from 0.
         parameter: usize,
@@ -94,7 +96,9 @@ pub enum Error {
         right: String,
     },
     /// A product of posteriors that cannot be normalised: the data agree less than the prior divided out.
-    #[error("the product of {count} posteriors divided by the prior has no finite integral; use a flat prior or fewer")]
+    #[error(
+        "the product of {count} posteriors divided by the prior has no finite integral; use a flat prior or fewer"
+    )]
     ImproperProduct {
         /// How many posteriors.
         count: usize,

@@ -219,16 +219,24 @@ mod tests {
                     let up = loss(&moved, 0.2);
                     moved[i] -= 2e-5;
                     let slope = (up - loss(&moved, 0.2)) / 2e-5;
-                    assert!((slope - by_hand[i]).abs() < 1e-5 * slope.abs().max(1.0), "{slope} {}", by_hand[i]);
+                    assert!(
+                        (slope - by_hand[i]).abs() < 1e-5 * slope.abs().max(1.0),
+                        "{slope} {}",
+                        by_hand[i]
+                    );
                 }
                 if far < 2.0 {
                     let [low, high] = cut.map(|c| c.unwrap_or(f64::NAN));
-                    let (low, high) = (if low.is_nan() { -200.0 } else { low }, if high.is_nan() { 200.0 } else { high });
+                    let (low, high) =
+                        (if low.is_nan() { -200.0 } else { low }, if high.is_nan() { 200.0 } else { high });
                     let n = 4_000_000;
                     let h = (high - low) / f64::from(n);
                     let mut s = HeadScratch::default();
-                    let sum: f64 =
-                        (0..n).map(|i| h * (-head.loss(&out, &[low + h * (f64::from(i) + 0.5)], None, &mut s)).exp()).sum();
+                    let sum: f64 = (0..n)
+                        .map(|i| {
+                            h * (-head.loss(&out, &[low + h * (f64::from(i) + 0.5)], None, &mut s)).exp()
+                        })
+                        .sum();
                     assert!((sum - 1.0).abs() < 1e-5, "{sum}");
                 }
             }

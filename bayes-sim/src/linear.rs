@@ -65,7 +65,8 @@ pub(crate) fn ridge(pairs: &Pairs, penalties: &[f64]) -> Vec<Regression> {
                 .collect();
             let mut out = Regression { coefficients, intercept, residual_sd: vec![0.0; t] };
             for k in 0..t {
-                let squares: f64 = (0..n).map(|i| (pairs.target(i)[k] - out.predict(pairs.input(i), k)).powi(2)).sum();
+                let squares: f64 =
+                    (0..n).map(|i| (pairs.target(i)[k] - out.predict(pairs.input(i), k)).powi(2)).sum();
                 out.residual_sd[k] = (squares / n as f64).sqrt().max(1e-3);
             }
             Some(out)

@@ -17,7 +17,11 @@ pub(crate) struct Component {
 }
 
 impl Component {
-    pub(crate) fn from_covariance(ln_weight: f64, mean: DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn from_covariance(
+        ln_weight: f64,
+        mean: DVector<f64>,
+        covariance: DMatrix<f64>,
+    ) -> Option<Self> {
         let n = mean.len();
         let lower = covariance.cholesky()?.unpack();
         let factor = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
@@ -25,7 +29,11 @@ impl Component {
     }
 
     /// From a precision matrix.
-    pub(crate) fn from_precision(ln_weight: f64, mean: DVector<f64>, precision: DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn from_precision(
+        ln_weight: f64,
+        mean: DVector<f64>,
+        precision: DMatrix<f64>,
+    ) -> Option<Self> {
         let covariance = precision.cholesky()?.inverse();
         Self::from_covariance(ln_weight, mean, covariance)
     }
@@ -95,7 +103,11 @@ impl Mixture {
         check_length("weights", weights, means.len())?;
         means.check_finite("means")?;
         if covariances.len() != weights.len() {
-            return Err(Error::Length { what: "covariances", expected: weights.len(), got: covariances.len() });
+            return Err(Error::Length {
+                what: "covariances",
+                expected: weights.len(),
+                got: covariances.len(),
+            });
         }
         let mut components = Vec::with_capacity(weights.len());
         for (k, (&weight, covariance)) in weights.iter().zip(covariances).enumerate() {
@@ -226,7 +238,10 @@ impl Mixture {
             let precision = c.precision();
             let inner = precision.select_rows(&rest).select_columns(&rest);
             let cross = precision.select_rows(&rest).select_columns(indices);
-            let away = DVector::from_iterator(indices.len(), indices.iter().zip(values).map(|(&i, v)| v - c.mean[i]));
+            let away = DVector::from_iterator(
+                indices.len(),
+                indices.iter().zip(values).map(|(&i, v)| v - c.mean[i]),
+            );
             let failed = Error::NotPositiveDefinite { component };
             let Some(solved) = inner.clone().cholesky().map(|f| f.solve(&(cross * away))) else {
                 return Err(failed);
@@ -338,7 +353,12 @@ pub(crate) fn pick<R: Rng + ?Sized>(cumulative: &[f64], rng: &mut R) -> usize {
 }
 
 /// One normal draw, appended.
-pub(crate) fn draw<R: Rng + ?Sized>(mean: &DVector<f64>, spread: &DMatrix<f64>, rng: &mut R, out: &mut Vec<f64>) {
+pub(crate) fn draw<R: Rng + ?Sized>(
+    mean: &DVector<f64>,
+    spread: &DMatrix<f64>,
+    rng: &mut R,
+    out: &mut Vec<f64>,
+) {
     let start = out.len();
     out.extend(mean.iter());
     for j in 0..mean.len() {

@@ -116,7 +116,9 @@ mod tests {
     /// scipy 1.16: norm.logcdf([-5, -12.5, -40]).
     #[test]
     fn the_log_distribution_function_far_out() {
-        for (z, expected) in [(-5.0, -15.064998393988725), (-12.5, -81.57535894553), (-40.0, -804.608442013754)] {
+        for (z, expected) in
+            [(-5.0, -15.064998393988725), (-12.5, -81.57535894553), (-40.0, -804.608442013754)]
+        {
             assert_relative_eq!(ln_cdf(z), expected, max_relative = 1e-8);
         }
     }
@@ -124,7 +126,9 @@ mod tests {
     /// The mass adds up over pieces, in the middle and far out, and the quantile divides it as asked.
     #[test]
     fn masses_add_up_and_quantiles_divide_them() {
-        for (a, m, b) in [(-1.0, 0.2, 2.0), (7.0, 7.2, 9.0), (-31.0, -30.5, -30.0), (3.0, 3.0 + 1e-9, 3.0 + 1e-8)] {
+        for (a, m, b) in
+            [(-1.0, 0.2, 2.0), (7.0, 7.2, 9.0), (-31.0, -30.5, -30.0), (3.0, 3.0 + 1e-9, 3.0 + 1e-8)]
+        {
             let sum = ln_sum_exp([ln_mass(a, m), ln_mass(m, b)].into_iter());
             assert_relative_eq!(sum, ln_mass(a, b), max_relative = 1e-6);
             for u in [0.01, 0.5, 0.99] {

@@ -253,9 +253,7 @@ impl Posterior {
         }
         let edge = |b: usize| marginal.value(low + b as f64 * width);
         let starts = (0..BINS).filter(|&b| inside[b] && (b == 0 || !inside[b - 1]));
-        Ok(starts
-            .map(|b| [edge(b), edge((b..BINS).find(|&e| !inside[e]).unwrap_or(BINS))])
-            .collect())
+        Ok(starts.map(|b| [edge(b), edge((b..BINS).find(|&e| !inside[e]).unwrap_or(BINS))]).collect())
     }
 }
 

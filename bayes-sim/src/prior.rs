@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
+use crate::normal::truncated_quantile;
 use crate::points::{Points, check_length};
 
 /// The prior of one parameter. Its *coordinate* is the parameter, or the logarithm of it where a logarithm is in the name.
@@ -89,6 +90,18 @@ impl Marginal {
             Self::Normal { mean, sd } | Self::LogNormal { mean, sd } => {
                 let z = (coordinate - mean) / sd;
                 -0.5 * z * z - sd.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln()
+            }
+        }
+    }
+
+    /// A coordinate drawn within a window.
+    pub(crate) fn sample_within<R: Rng + ?Sized>(self, window: [f64; 2], rng: &mut R) -> f64 {
+        let u = rng.random::<f64>();
+        match self {
+            Self::Uniform { .. } | Self::LogUniform { .. } => window[0] + (window[1] - window[0]) * u,
+            Self::Normal { mean, sd } | Self::LogNormal { mean, sd } => {
+                let [low, high] = window.map(|w| (w - mean) / sd);
+                mean + sd * truncated_quantile(low, high, u)
             }
         }
     }

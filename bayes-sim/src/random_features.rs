@@ -81,7 +81,12 @@ fn bad_freedom(value: f64) -> Error {
     Error::Setting { name: "degrees of freedom", value, rule: "above 0" }
 }
 
-fn random<R: Rng + ?Sized>(kernel: &Kernel, dim: usize, count: usize, rng: &mut R) -> Result<Vec<f64>, Error> {
+fn random<R: Rng + ?Sized>(
+    kernel: &Kernel,
+    dim: usize,
+    count: usize,
+    rng: &mut R,
+) -> Result<Vec<f64>, Error> {
     let mut out = Vec::with_capacity(dim * count);
     let Some(freedom) = kernel.family.degrees_of_freedom() else {
         out.extend((0..dim * count).map(|_| -> f64 { StandardNormal.sample(rng) }));

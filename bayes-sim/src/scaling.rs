@@ -22,7 +22,8 @@ impl InputScaling {
         for j in 0..x.dim() {
             let mut column = x.column(j);
             let (mean, sd) = mean_sd(&column);
-            let kurtosis = column.iter().map(|v| ((v - mean) / sd).powi(4)).sum::<f64>() / column.len() as f64;
+            let kurtosis =
+                column.iter().map(|v| ((v - mean) / sd).powi(4)).sum::<f64>() / column.len() as f64;
             let heavy = kurtosis > 8.0;
             let (mut centre, mut scale) = (mean, sd);
             if heavy {

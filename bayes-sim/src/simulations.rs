@@ -66,7 +66,12 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    pub(crate) fn new(prior: &Prior, simulations: &Simulations, share: f64, seed: u64) -> Result<Self, Error> {
+    pub(crate) fn new(
+        prior: &Prior,
+        simulations: &Simulations,
+        share: f64,
+        seed: u64,
+    ) -> Result<Self, Error> {
         if prior.dim() != simulations.theta.dim() {
             return Err(Error::Length {
                 what: "parameters",

@@ -171,7 +171,8 @@ impl Step {
         let (n, share) = (head.outputs(), 1.0 / indices.len() as f64);
         self.scratch.output_gradient.resize(n * indices.len(), 0.0);
         let columns = self.scratch.output_gradient.chunks_exact_mut(n);
-        for ((&i, outputs), gradient) in indices.iter().zip(self.scratch.outputs.chunks_exact(n)).zip(columns) {
+        for ((&i, outputs), gradient) in indices.iter().zip(self.scratch.outputs.chunks_exact(n)).zip(columns)
+        {
             head.loss(outputs, pairs.target(i), Some(gradient), &mut self.head);
             gradient.iter_mut().for_each(|g| *g *= share);
         }
@@ -259,7 +260,12 @@ mod tests {
             };
             let mut network = Network::new(shape, 1.0, 1.0, &mut rng);
             let draw = |n: usize, rng: &mut ChaCha8Rng| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
-            let pairs = Pairs { input_dim: 3, inputs: draw(21, &mut rng), target_dim: 2, targets: draw(14, &mut rng) };
+            let pairs = Pairs {
+                input_dim: 3,
+                inputs: draw(21, &mut rng),
+                target_dim: 2,
+                targets: draw(14, &mut rng),
+            };
             let mut step = Step::default();
             step.gradient(&network, &head, &pairs, &[0, 1, 2, 3, 4, 5, 6]);
             for i in 0..network.params.len() {
@@ -269,7 +275,11 @@ mod tests {
                 network.params[i] = kept - 1e-5;
                 let slope = (up - mean_loss(&network, &head, &pairs)) / 2e-5;
                 network.params[i] = kept;
-                assert!((slope - step.gradient[i]).abs() < 1e-8 + 1e-6 * slope.abs(), "{slope} {}", step.gradient[i]);
+                assert!(
+                    (slope - step.gradient[i]).abs() < 1e-8 + 1e-6 * slope.abs(),
+                    "{slope} {}",
+                    step.gradient[i]
+                );
             }
         }
     }

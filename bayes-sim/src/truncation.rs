@@ -40,7 +40,8 @@ impl Boxed {
             let [low, high] = away(i).map(|b| b / sd);
             (mass(low, high), cdf(low) + cdf(-high))
         };
-        let mut order: Vec<usize> = (0..component.dim()).filter(|&i| bounds[i].iter().any(|b| b.is_finite())).collect();
+        let mut order: Vec<usize> =
+            (0..component.dim()).filter(|&i| bounds[i].iter().any(|b| b.is_finite())).collect();
         order.sort_by(|&i, &j| alone(i).0.total_cmp(&alone(j).0));
         let tails = order.iter().map(|&i| alone(i).1).sum();
         let part = covariance.select_rows(&order).select_columns(&order);
@@ -87,7 +88,10 @@ impl Boxed {
                     let [a, b] = self.bounds[1].map(|b| (b - slope * y) / sd);
                     pdf(y) * mass(a, b)
                 };
-                let sum: f64 = GAUSS.iter().map(|(x, g)| g * (value(middle - half * x) + value(middle + half * x))).sum();
+                let sum: f64 = GAUSS
+                    .iter()
+                    .map(|(x, g)| g * (value(middle - half * x) + value(middle + half * x)))
+                    .sum();
                 half * sum
             })
             .sum::<f64>()
@@ -137,7 +141,12 @@ impl Boxed {
     }
 
     /// A draw within the box by the same path; `exp` of the returned number is its importance weight.
-    pub(crate) fn propose<R: Rng + ?Sized>(&self, component: &Component, rng: &mut R, out: &mut [f64]) -> f64 {
+    pub(crate) fn propose<R: Rng + ?Sized>(
+        &self,
+        component: &Component,
+        rng: &mut R,
+        out: &mut [f64],
+    ) -> f64 {
         let n = self.order.len();
         let mut y = vec![0.0; n];
         let weight = self.separate(&mut y, |_| rng.random::<f64>());

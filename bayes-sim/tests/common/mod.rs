@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// A file or folder of the shared data, or a line that says that nothing was tested.
-pub fn shared(name: &str) -> Option<PathBuf> {
+pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(name);
     if path.exists() {
         return Some(path);
@@ -28,10 +28,10 @@ pub fn shared(name: &str) -> Option<PathBuf> {
 }
 
 /// One of the benchmark's tasks (Lueckmann et al. 2021, PMLR 130:343).
-pub struct Task {
-    pub name: &'static str,
-    pub prior: Prior,
-    pub x_dim: usize,
+pub(crate) struct Task {
+    pub(crate) name: &'static str,
+    pub(crate) prior: Prior,
+    pub(crate) x_dim: usize,
     simulate: fn(&[f64], &mut ChaCha8Rng) -> Vec<f64>,
 }
 
@@ -40,13 +40,13 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Mean of a Gaussian, under a Gaussian prior.
-pub fn gaussian_linear() -> Task {
+pub(crate) fn gaussian_linear() -> Task {
     let prior = Prior::new(vec![Marginal::Normal { mean: 0.0, sd: 0.1_f64.sqrt() }; 10]).unwrap();
     Task { name: "gaussian_linear", prior, x_dim: 10, simulate: gaussian_noise }
 }
 
 /// The same under a flat prior; its posterior is exact in [`exact`].
-pub fn gaussian_linear_uniform() -> Task {
+pub(crate) fn gaussian_linear_uniform() -> Task {
     let prior = Prior::uniform(&[[-1.0, 1.0]; 10]).unwrap();
     Task { name: "gaussian_linear_uniform", prior, x_dim: 10, simulate: gaussian_noise }
 }
@@ -56,7 +56,7 @@ fn gaussian_noise(theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 /// A wide and a narrow Gaussian about the same mean; its posterior is exact in [`exact`].
-pub fn gaussian_mixture() -> Task {
+pub(crate) fn gaussian_mixture() -> Task {
     let simulate = |theta: &[f64], rng: &mut ChaCha8Rng| {
         let sd = if rng.random::<bool>() { 1.0 } else { 0.1 };
         theta.iter().map(|t| t + sd * normal(rng)).collect()
@@ -66,7 +66,7 @@ pub fn gaussian_mixture() -> Task {
 }
 
 /// Two crescents.
-pub fn two_moons() -> Task {
+pub(crate) fn two_moons() -> Task {
     let simulate = |theta: &[f64], rng: &mut ChaCha8Rng| {
         let a = rng.random_range(-FRAC_PI_2..FRAC_PI_2);
         let r = 0.1 + 0.01 * normal(rng);
@@ -77,7 +77,7 @@ pub fn two_moons() -> Task {
 }
 
 /// Simple likelihood, complex posterior: four draws of a Gaussian whose covariance is asked for as well.
-pub fn slcp() -> Task {
+pub(crate) fn slcp() -> Task {
     let simulate = |theta: &[f64], rng: &mut ChaCha8Rng| {
         let (s1, s2, rho) = (theta[2].powi(2), theta[3].powi(2), theta[4].tanh());
         let (a, b, c) = (s1 * s1 + 1e-6, rho * s1 * s2, s2 * s2 + 1e-6);
@@ -95,12 +95,12 @@ pub fn slcp() -> Task {
 }
 
 impl Task {
-    pub fn simulate(&self, theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+    pub(crate) fn simulate(&self, theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
         (self.simulate)(theta, rng)
     }
 
     /// `count` draws of the prior, each simulated.
-    pub fn simulations(&self, count: usize, seed: u64) -> Simulations {
+    pub(crate) fn simulations(&self, count: usize, seed: u64) -> Simulations {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (mut theta, mut x) = (Points::new(self.prior.dim()), Points::new(self.x_dim));
         for _ in 0..count {
@@ -113,7 +113,7 @@ impl Task {
 }
 
 /// Observation `i`, from 1, and the first `count` points of its reference posterior.
-pub fn reference(task: &Task, i: usize, count: usize) -> Option<(Vec<f64>, Points)> {
+pub(crate) fn reference(task: &Task, i: usize, count: usize) -> Option<(Vec<f64>, Points)> {
     if matches!(task.name, "gaussian_linear_uniform" | "gaussian_mixture") {
         return Some(exact(task, i as u64, count));
     }
@@ -159,6 +159,6 @@ fn exact(task: &Task, seed: u64, count: usize) -> (Vec<f64>, Points) {
 }
 
 /// A generator behind the trait object that densities take.
-pub fn dice(seed: u64) -> impl Rng {
+pub(crate) fn dice(seed: u64) -> impl Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
