@@ -127,12 +127,12 @@ fn densities_integrate_to_one_in_the_parameters_own_units() {
         Marginal::Uniform { low: -1.0, high: 0.0 },
     ])
     .unwrap();
-    let task = Task { name: "log", prior, ..common::gaussian_linear_uniform() };
+    let task = Task { name: "log", prior, x_dim: 2, ..common::gaussian_linear_uniform() };
     let data = task.simulations(400, 3);
     let (mdn, autoregressive) = quick();
     let densities: [Box<dyn ConditionalDensity>; 2] = [
-        Box::new(Mdn::train(&task.prior, &two_columns(&data), &mdn, 1).unwrap()),
-        Box::new(Autoregressive::train(&task.prior, &two_columns(&data), &autoregressive, 1).unwrap()),
+        Box::new(Mdn::train(&task.prior, &data, &mdn, 1).unwrap()),
+        Box::new(Autoregressive::train(&task.prior, &data, &autoregressive, 1).unwrap()),
     ];
     for density in densities {
         let (n, mut sum) = (300, 0.0);
@@ -152,11 +152,6 @@ fn densities_integrate_to_one_in_the_parameters_own_units() {
         let draws = density.sample(&x, 500, &mut dice(3)).unwrap();
         assert!(draws.rows().all(|t| task.prior.contains(t)));
     }
-}
-
-fn two_columns(data: &Simulations) -> Simulations {
-    let x: Vec<f64> = data.x().rows().flat_map(|r| r[..2].to_vec()).collect();
-    Simulations::new(data.theta().clone(), Points::from_values(2, x).unwrap()).unwrap()
 }
 
 /// Features that do not vary, are copies of others or have tails without variance; few simulations; more features than needed.

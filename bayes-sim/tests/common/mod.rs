@@ -32,7 +32,7 @@ pub(crate) struct Task {
     pub(crate) name: &'static str,
     pub(crate) prior: Prior,
     pub(crate) x_dim: usize,
-    simulate: fn(&[f64], &mut ChaCha8Rng) -> Vec<f64>,
+    pub(crate) simulate: fn(&[f64], &mut ChaCha8Rng) -> Vec<f64>,
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
