@@ -77,9 +77,9 @@ impl Head {
                 let share = (scratch.log_terms[k] - best).exp() / sum;
                 let weight = (outputs[k * stride] - ln_total).exp();
                 gradient[k * stride] = weight - share;
-                for i in k * stride + 1..(k + 1) * stride {
-                    gradient[i] = -share * scratch.gradients[i];
-                }
+                let block = k * stride + 1..(k + 1) * stride;
+                let pairs = gradient[block.clone()].iter_mut().zip(&scratch.gradients[block]);
+                pairs.for_each(|(g, own)| *g = -share * own);
             }
         }
         -(best + sum.ln())

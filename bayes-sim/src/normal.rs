@@ -95,7 +95,7 @@ fn tail_quantile(a: f64, b: f64, u: f64) -> f64 {
 /// `ln(exp a + exp b + ...)`; minus infinity for none.
 pub(crate) fn ln_sum_exp(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let top = values.clone().fold(f64::NEG_INFINITY, f64::max);
-    if top == f64::NEG_INFINITY || top == f64::INFINITY {
+    if top.is_infinite() {
         return top;
     }
     top + values.map(|v| (v - top).exp()).sum::<f64>().ln()
@@ -103,7 +103,7 @@ pub(crate) fn ln_sum_exp(values: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// `n` fractional parts of the square roots of primes: Richtmyer's generators of a Kronecker lattice (Genz and Bretz 2009).
 pub(crate) fn richtmyer(n: usize) -> Vec<f64> {
-    let is_prime = |k: &u32| (2..).take_while(|d| d * d <= *k).all(|d| k % d != 0);
+    let is_prime = |k: &u32| (2..).take_while(|d| d * d <= *k).all(|d| !k.is_multiple_of(d));
     (2_u32..).filter(is_prime).take(n).map(|p| f64::from(p).sqrt().fract()).collect()
 }
 

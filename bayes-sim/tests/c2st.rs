@@ -28,7 +28,8 @@ fn changed(points: &Points, change: &str) -> Points {
     Points::from_values(d, values).unwrap()
 }
 
-/// Means over as many seeds on either side; ten dimensions take minutes and are left to the script.
+/// Means over two seeds within 0.01 where scikit-learn's own seeds agree as well; where they do not (the classifier settles in one of
+/// several minima: 0.76 to 0.84), within their range. Ten dimensions take minutes and are left to the script.
 #[test]
 fn agrees_with_scikit_learn() {
     let table = include_str!("data/c2st_sklearn.csv");
@@ -39,12 +40,14 @@ fn agrees_with_scikit_learn() {
             let key = format!("{},{change},", task.name);
             let rows = table.lines().filter(|l| l.starts_with(&key));
             let theirs: Vec<f64> = rows.map(|l| l.rsplit(',').next().unwrap().parse().unwrap()).collect();
-            let n = theirs.len() as f64;
-            let theirs = theirs.iter().sum::<f64>() / n;
+            let mean = theirs.iter().sum::<f64>() / theirs.len() as f64;
+            let (low, high) = theirs.iter().fold((mean, mean), |(l, h), v| (l.min(*v), h.max(*v)));
+            let agree = high - low < 0.015;
             let other = changed(&halves[1], change);
-            let ours = (1..=n as u64).map(|s| c2st(&halves[0], &other, s).unwrap()).sum::<f64>() / n;
-            println!("{} {change}: {ours:.4}, scikit-learn {theirs:.4}", task.name);
-            assert!((ours - theirs).abs() < 0.01, "{} {change}: {ours} {theirs}", task.name);
+            let ours = (1..=2).map(|s| c2st(&halves[0], &other, s).unwrap()).sum::<f64>() / 2.0;
+            println!("{} {change}: {ours:.4}, scikit-learn {mean:.4} ({low:.4} to {high:.4})", task.name);
+            let (low, high) = if agree { (mean, mean) } else { (low, high) };
+            assert!(ours > low - 0.01 && ours < high + 0.01, "{} {change}: {ours} {mean}", task.name);
         }
     }
 }
