@@ -1,0 +1,272 @@
+//! Several networks for one target, weighted by how well they foretell held-out simulations.
+
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+use crate::head::{Head, HeadScratch};
+use crate::kernel::Kernel;
+use crate::linear::{Regression, ridge};
+use crate::network::{Activation, Network, Scratch, Shape};
+use crate::random_features::{Draw, RandomFeatures};
+use crate::training::{Pairs, TrainingReport, TrainingSettings, ln_densities, train};
+
+/// What one member is made of.
+#[derive(Debug, Clone)]
+pub(crate) enum Plan {
+    /// Means linear in the inputs, all else constant.
+    Linear,
+    /// A network with these hidden layers and this many components.
+    Network { hidden: Vec<usize>, components: usize },
+    /// Linear in random features; the length scale is chosen among multiples of the kernel's by held-out error.
+    Features { kernel: Kernel, count: usize, draw: Draw, components: usize },
+}
+
+/// One trained network.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Member {
+    features: Option<RandomFeatures>,
+    network: Network,
+    pub(crate) head: Head,
+}
+
+/// Members, their weights and how their training went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Ensemble {
+    pub(crate) members: Vec<Member>,
+    pub(crate) weights: Vec<f64>,
+    pub(crate) reports: Vec<TrainingReport>,
+}
+
+/// A random split into what is learned from and what is held out.
+pub(crate) fn split(n: usize, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
+    let mut order: Vec<usize> = (0..n).collect();
+    order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    let held_out = ((n as f64 * share).ceil() as usize).clamp(1, n - 1);
+    let rest = order.split_off(held_out);
+    (rest, order)
+}
+
+/// Random features of each input, with the inputs themselves behind.
+fn expanded(features: &RandomFeatures, pairs: &Pairs) -> Pairs {
+    let input_dim = features.len() + pairs.input_dim;
+    let mut inputs = vec![0.0; input_dim * pairs.len()];
+    for (i, out) in inputs.chunks_exact_mut(input_dim).enumerate() {
+        expand(features, pairs.input(i), out);
+    }
+    Pairs { input_dim, inputs, target_dim: pairs.target_dim, targets: pairs.targets.clone() }
+}
+
+fn expand(features: &RandomFeatures, x: &[f64], out: &mut [f64]) {
+    let (head, tail) = out.split_at_mut(features.len());
+    features.write(x, head);
+    tail.copy_from_slice(x);
+}
+
+impl Member {
+    /// Outputs for `batch` inputs, column after column.
+    pub(crate) fn outputs<'a>(&self, inputs: &[f64], batch: usize, scratch: &'a mut Scratch) -> &'a [f64] {
+        match &self.features {
+            None => self.network.forward(inputs, batch, scratch),
+            Some(features) => {
+                let dim = inputs.len() / batch;
+                let mut wide = vec![0.0; (features.len() + dim) * batch];
+                let columns = wide.chunks_exact_mut(features.len() + dim);
+                columns.zip(inputs.chunks_exact(dim)).for_each(|(out, x)| expand(features, x, out));
+                self.network.forward(&wide, batch, scratch);
+            }
+        }
+        &scratch.outputs[..self.head.outputs() * batch]
+    }
+
+    /// Log density of each target.
+    fn ln_densities(&self, pairs: &Pairs) -> Vec<f64> {
+        match &self.features {
+            None => ln_densities(&self.network, &self.head, pairs),
+            Some(features) => ln_densities(&self.network, &self.head, &expanded(features, pairs)),
+        }
+    }
+
+    fn train(
+        plan: &Plan,
+        cut: Option<[Option<f64>; 2]>,
+        pairs: &Pairs,
+        held_out: &Pairs,
+        settings: &TrainingSettings,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(Self, TrainingReport), Error> {
+        match plan {
+            Plan::Features { kernel, count, draw, components } => {
+                let (features, regression, wide) =
+                    choose_features(kernel, *count, *draw, pairs, held_out, rng)?;
+                let held_out = expanded(&features, held_out);
+                let head = Head { dim: pairs.target_dim, components: *components, cut };
+                let mut network = start(&head, &[], true, wide.input_dim, &regression, rng);
+                let report = train(&mut network, &head, &wide, &held_out, settings, rng);
+                Ok((Self { features: Some(features), network, head }, report))
+            }
+            Plan::Linear | Plan::Network { .. } => {
+                let (hidden, components): (&[usize], _) = match plan {
+                    Plan::Network { hidden, components } => (hidden, *components),
+                    _ => (&[], 1),
+                };
+                let head = Head { dim: pairs.target_dim, components, cut };
+                let regression = best_ridge(pairs, held_out).ok_or(Error::Diverged)?;
+                let body = !hidden.is_empty();
+                let mut network = start(&head, hidden, body, pairs.input_dim, &regression, rng);
+                let report = train(&mut network, &head, pairs, held_out, settings, rng);
+                Ok((Self { features: None, network, head }, report))
+            }
+        }
+    }
+}
+
+fn best_ridge(pairs: &Pairs, held_out: &Pairs) -> Option<Regression> {
+    let fits = ridge(pairs, &[1e-2, 1.0, 1e2, 1e4]);
+    let errors = fits.into_iter().map(|r| (r.ln_error(held_out), r));
+    errors.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, r)| r)
+}
+
+/// Features whose length scale leaves the least held-out error of a ridge regression.
+fn choose_features(
+    kernel: &Kernel,
+    count: usize,
+    draw: Draw,
+    pairs: &Pairs,
+    held_out: &Pairs,
+    rng: &mut ChaCha8Rng,
+) -> Result<(RandomFeatures, Regression, Pairs), Error> {
+    let mut best: Option<(f64, RandomFeatures, Regression, Pairs)> = None;
+    for factor in [0.25, 0.5, 1.0, 2.0, 4.0] {
+        let scaled = Kernel { length_scale: kernel.length_scale * factor, ..*kernel };
+        let features = RandomFeatures::draw(&scaled, pairs.input_dim, count, draw, rng)?;
+        let wide = expanded(&features, pairs);
+        let Some(regression) = best_ridge(&wide, &expanded(&features, held_out)) else { continue };
+        let error = regression.ln_error(&expanded(&features, held_out));
+        if best.as_ref().is_none_or(|b| error < b.0) {
+            best = Some((error, features, regression, wide));
+        }
+    }
+    best.map(|(_, f, r, w)| (f, r, w)).ok_or(Error::Diverged)
+}
+
+/// A network whose components all start at the regression, spread by what it leaves.
+fn start<R: Rng + ?Sized>(
+    head: &Head,
+    hidden: &[usize],
+    body: bool,
+    inputs: usize,
+    regression: &Regression,
+    rng: &mut R,
+) -> Network {
+    let shape = Shape {
+        inputs,
+        hidden: hidden.to_vec(),
+        outputs: head.outputs(),
+        body,
+        linear: if hidden.is_empty() && body { vec![] } else { head.mean_rows() },
+        activation: Activation::Isrlu,
+    };
+    let mut network = Network::new(shape, 1.7, if hidden.is_empty() { 0.0 } else { 0.1 }, rng);
+    let spread = if head.components == 1 { 0.0 } else { 1.0 };
+    for k in 0..head.components {
+        for i in 0..head.dim {
+            let (row, sd) = (k * head.stride() + 1 + i, regression.residual_sd[i]);
+            (0..inputs).for_each(|j| network.set_linear(row, j, regression.coefficients[(j, i)]));
+            let z: f64 = StandardNormal.sample(rng);
+            let bias = network.output_bias_mut();
+            bias[row] = regression.intercept[i] + spread * sd * z;
+            bias[row + head.dim] = 0.5 * spread - sd.ln();
+        }
+    }
+    network
+}
+
+impl Ensemble {
+    /// Trains a member a plan, in parallel; each has a seed of its own, so that the result does not depend on threads.
+    pub(crate) fn train(
+        plans: &[Plan],
+        cut: Option<[Option<f64>; 2]>,
+        pairs: &Pairs,
+        held_out: &Pairs,
+        settings: &TrainingSettings,
+        seed: u64,
+    ) -> Result<Self, Error> {
+        let trained: Vec<(Member, TrainingReport, Vec<f64>)> = plans
+            .par_iter()
+            .enumerate()
+            .map(|(m, plan)| {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                rng.set_stream(m as u64 + 1);
+                let (member, report) = Member::train(plan, cut, pairs, held_out, settings, &mut rng)?;
+                let ln = member.ln_densities(held_out);
+                Ok((member, report, ln))
+            })
+            .collect::<Result<_, Error>>()?;
+        let kept: Vec<_> = trained.into_iter().filter(|t| t.1.validation_loss.is_finite()).collect();
+        if kept.is_empty() {
+            return Err(Error::Diverged);
+        }
+        let columns: Vec<&[f64]> = kept.iter().map(|t| t.2.as_slice()).collect();
+        let weights = stacking(&columns);
+        let mut out = Self { members: Vec::new(), weights: Vec::new(), reports: Vec::new() };
+        for ((member, report, _), weight) in kept.into_iter().zip(weights) {
+            out.reports.push(report);
+            // A member of no weight would only cost time.
+            if weight > 0.01 {
+                out.members.push(member);
+                out.weights.push(weight);
+            }
+        }
+        let total: f64 = out.weights.iter().sum();
+        out.weights.iter_mut().for_each(|w| *w /= total);
+        Ok(out)
+    }
+
+    /// Log density of each target under the weighted members.
+    pub(crate) fn ln_densities(&self, pairs: &Pairs) -> Vec<f64> {
+        let columns: Vec<Vec<f64>> = self.members.iter().map(|m| m.ln_densities(pairs)).collect();
+        (0..pairs.len())
+            .map(|i| {
+                let terms = columns.iter().zip(&self.weights).map(|(c, w)| w.ln() + c[i]);
+                crate::normal::ln_sum_exp(terms)
+            })
+            .collect()
+    }
+
+    /// Log density of one target, from inputs as a network sees them.
+    pub(crate) fn ln_density(&self, inputs: &[f64], target: &[f64]) -> f64 {
+        let (mut scratch, mut head) = (Scratch::default(), HeadScratch::default());
+        let terms: Vec<f64> = self
+            .members
+            .iter()
+            .zip(&self.weights)
+            .map(|(m, w)| w.ln() - m.head.loss(m.outputs(inputs, 1, &mut scratch), target, None, &mut head))
+            .collect();
+        crate::normal::ln_sum_exp(terms.into_iter())
+    }
+}
+
+/// Weights that maximise the held-out log density of the weighted sum (stacking of predictive distributions, Yao et al. 2018,
+/// doi:10.1214/17-BA1091), by expectation-maximisation, with one pseudo-count for each member.
+fn stacking(ln_densities: &[&[f64]]) -> Vec<f64> {
+    let (members, n) = (ln_densities.len(), ln_densities[0].len());
+    let mut weights = vec![1.0 / members as f64; members];
+    for _ in 0..300 {
+        let mut counts = vec![1.0; members];
+        for i in 0..n {
+            let terms = weights.iter().zip(ln_densities).map(|(w, c)| w.ln() + c[i]);
+            let total = crate::normal::ln_sum_exp(terms.clone());
+            if total.is_finite() {
+                counts.iter_mut().zip(terms).for_each(|(c, t)| *c += (t - total).exp());
+            }
+        }
+        let total: f64 = counts.iter().sum();
+        weights = counts.iter().map(|c| c / total).collect();
+    }
+    weights
+}

@@ -1,0 +1,248 @@
+//! What a network's outputs mean: K Gaussian components, and the negative log density of a target under them, by hand differentiated.
+
+use serde::{Deserialize, Serialize};
+
+use crate::normal::{LN_SQRT_2PI, ln_mass};
+
+/// Least standard deviation of a component, in standard deviations of the target: `exp(-MAX_LOG_PRECISION)`.
+const MAX_LOG_PRECISION: f64 = 9.0;
+
+/// K Gaussians with full covariance in `dim` dimensions, or, in one, each cut to an interval.
+///
+/// A component's outputs are `[logit, mean (dim), a (dim), l (dim (dim - 1) / 2)]`: with `r = target - mean`,
+/// `y_i = exp(a_i) (r_i + sum_{j<i} l_ij r_j)` is standard normal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Head {
+    pub(crate) dim: usize,
+    pub(crate) components: usize,
+    /// Bounds of the one dimension, if each component is cut to them; none for no bound on that side.
+    pub(crate) cut: Option<[Option<f64>; 2]>,
+}
+
+/// Numbers that one evaluation needs, kept between evaluations.
+#[derive(Debug, Default)]
+pub(crate) struct HeadScratch {
+    log_terms: Vec<f64>,
+    residual: Vec<f64>,
+    whitened: Vec<f64>,
+    gradients: Vec<f64>,
+}
+
+impl Head {
+    /// Outputs of one component.
+    pub(crate) fn stride(&self) -> usize {
+        1 + 2 * self.dim + self.dim * (self.dim - 1) / 2
+    }
+
+    pub(crate) fn outputs(&self) -> usize {
+        self.components * self.stride()
+    }
+
+    /// Outputs that are means.
+    pub(crate) fn mean_rows(&self) -> Vec<usize> {
+        (0..self.components).flat_map(|k| (0..self.dim).map(move |i| k * self.stride() + 1 + i)).collect()
+    }
+
+    /// Bounds as numbers, infinite where there is none.
+    pub(crate) fn interval(&self) -> Option<[f64; 2]> {
+        self.cut.map(|[a, b]| [a.unwrap_or(f64::NEG_INFINITY), b.unwrap_or(f64::INFINITY)])
+    }
+
+    /// Negative log density of `target`; with `gradient`, its derivative by the outputs.
+    pub(crate) fn loss(
+        &self,
+        outputs: &[f64],
+        target: &[f64],
+        gradient: Option<&mut [f64]>,
+        scratch: &mut HeadScratch,
+    ) -> f64 {
+        let stride = self.stride();
+        let top = outputs.iter().step_by(stride).fold(f64::NEG_INFINITY, |m, &l| m.max(l));
+        let total: f64 = outputs.iter().step_by(stride).map(|l| (l - top).exp()).sum();
+        let ln_total = top + total.ln();
+        scratch.log_terms.clear();
+        scratch.gradients.resize(self.outputs(), 0.0);
+        scratch.residual.resize(self.dim, 0.0);
+        scratch.whitened.resize(self.dim, 0.0);
+        let wanted = gradient.is_some();
+        for k in 0..self.components {
+            let block = &outputs[k * stride..(k + 1) * stride];
+            let ln_density = self.component(block, target, wanted.then_some(k), scratch);
+            scratch.log_terms.push(block[0] - ln_total + ln_density);
+        }
+        let best = scratch.log_terms.iter().fold(f64::NEG_INFINITY, |m, &l| m.max(l));
+        let sum: f64 = scratch.log_terms.iter().map(|l| (l - best).exp()).sum();
+        if let Some(gradient) = gradient {
+            for k in 0..self.components {
+                let share = (scratch.log_terms[k] - best).exp() / sum;
+                let weight = (outputs[k * stride] - ln_total).exp();
+                gradient[k * stride] = weight - share;
+                let block = k * stride + 1..(k + 1) * stride;
+                let pairs = gradient[block.clone()].iter_mut().zip(&scratch.gradients[block]);
+                pairs.for_each(|(g, own)| *g = -share * own);
+            }
+        }
+        -(best + sum.ln())
+    }
+
+    /// Log density of one component; for `wanted = Some(k)` its gradient goes into the scratch of component k.
+    fn component(&self, block: &[f64], target: &[f64], wanted: Option<usize>, s: &mut HeadScratch) -> f64 {
+        let d = self.dim;
+        let (mean, a, l) = (&block[1..=d], &block[d + 1..=2 * d], &block[2 * d + 1..]);
+        for i in 0..d {
+            s.residual[i] = target[i] - mean[i];
+        }
+        let mut ln_density = -(d as f64) * LN_SQRT_2PI;
+        let mut at = 0;
+        for i in 0..d {
+            let ln_precision = a[i].min(MAX_LOG_PRECISION);
+            let dot: f64 = l[at..at + i].iter().zip(&s.residual).map(|(l, r)| l * r).sum();
+            s.whitened[i] = ln_precision.exp() * (s.residual[i] + dot);
+            ln_density += ln_precision - 0.5 * s.whitened[i] * s.whitened[i];
+            at += i;
+        }
+        if let Some(k) = wanted {
+            let g = &mut s.gradients[k * block.len()..(k + 1) * block.len()];
+            g.fill(0.0);
+            let mut at = 0;
+            for i in 0..d {
+                let scaled = s.whitened[i] * a[i].min(MAX_LOG_PRECISION).exp();
+                g[1 + i] += scaled;
+                for j in 0..i {
+                    g[1 + j] += scaled * l[at + j];
+                    g[2 * d + 1 + at + j] = -scaled * s.residual[j];
+                }
+                if a[i] < MAX_LOG_PRECISION {
+                    g[d + 1 + i] = 1.0 - s.whitened[i] * s.whitened[i];
+                }
+                at += i;
+            }
+        }
+        match self.interval() {
+            Some(interval) => ln_density - self.cut_mass(block, interval, wanted, s),
+            None => ln_density,
+        }
+    }
+
+    /// `ln` of the mass that a one-dimensional component has within the interval; its gradient is taken off.
+    fn cut_mass(&self, block: &[f64], interval: [f64; 2], wanted: Option<usize>, s: &mut HeadScratch) -> f64 {
+        let (mean, ln_precision) = (block[1], block[2].min(MAX_LOG_PRECISION));
+        let precision = ln_precision.exp();
+        let [low, high] = interval.map(|b| precision * (b - mean));
+        if low < -8.5 && high > 8.5 {
+            return 0.0;
+        }
+        let ln = ln_mass(low, high);
+        if let Some(k) = wanted {
+            let edge = |z: f64| if z.is_finite() { (-0.5 * z * z - LN_SQRT_2PI - ln).exp() } else { 0.0 };
+            let (at_low, at_high) = (edge(low), edge(high));
+            let times = |z: f64, e: f64| if z.is_finite() { z * e } else { 0.0 };
+            let g = &mut s.gradients[k * block.len()..(k + 1) * block.len()];
+            g[1] -= precision * (at_low - at_high);
+            if block[2] < MAX_LOG_PRECISION {
+                g[2] -= times(high, at_high) - times(low, at_low);
+            }
+        }
+        ln
+    }
+
+    /// `exp(a_i)` of one component, floored as in the loss.
+    pub(crate) fn precision(&self, block: &[f64], i: usize) -> f64 {
+        block[self.dim + 1 + i].min(MAX_LOG_PRECISION).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::{Dual64, DualNum};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The same density written plainly, over dual numbers.
+    fn plain(head: &Head, out: &[Dual64], target: &[f64]) -> Dual64 {
+        let (d, stride) = (head.dim, head.stride());
+        let mut weights = Dual64::from(0.0);
+        let mut sum = Dual64::from(0.0);
+        for block in out.chunks_exact(stride) {
+            weights += block[0].exp();
+            let mut q = Dual64::from(1.0);
+            let mut at = 2 * d + 1;
+            for i in 0..d {
+                let mut y = -(block[1 + i] - target[i]);
+                for j in 0..i {
+                    y -= block[at] * (block[1 + j] - target[j]);
+                    at += 1;
+                }
+                y *= block[d + 1 + i].exp();
+                q *= block[d + 1 + i].exp() * (y * y * -0.5).exp() * 0.398_942_280_401_432_7;
+            }
+            sum += block[0].exp() * q;
+        }
+        -(sum / weights).ln()
+    }
+
+    #[test]
+    fn gradients_agree_with_dual_numbers() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for (dim, components) in [(1, 1), (1, 4), (2, 3), (4, 2)] {
+            let head = Head { dim, components, cut: None };
+            for _ in 0..20 {
+                let out: Vec<f64> = (0..head.outputs()).map(|_| rng.random_range(-1.5..1.5)).collect();
+                let target: Vec<f64> = (0..dim).map(|_| rng.random_range(-1.5..1.5)).collect();
+                let mut by_hand = vec![0.0; out.len()];
+                let loss = head.loss(&out, &target, Some(&mut by_hand), &mut HeadScratch::default());
+                for i in 0..out.len() {
+                    let seeded = out.iter().enumerate();
+                    let dual: Vec<Dual64> =
+                        seeded.map(|(j, &o)| Dual64::new(o, if i == j { 1.0 } else { 0.0 })).collect();
+                    let value = plain(&head, &dual, &target);
+                    assert!((loss - value.re).abs() < 1e-12 * value.re.abs().max(1.0));
+                    let (a, b) = (by_hand[i], value.eps);
+                    assert!((a - b).abs() < 1e-10 * b.abs().max(1.0), "{a} {b}");
+                }
+            }
+        }
+    }
+
+    /// Cut components against finite differences, far outside the interval included; their density integrates to one.
+    #[test]
+    fn cut_components_are_normalised_and_differentiated() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for cut in [[Some(-1.0), Some(1.5)], [None, Some(0.5)], [Some(-0.3), None]] {
+            let head = Head { dim: 1, components: 3, cut: Some(cut) };
+            for far in [1.0, 6.0] {
+                let out: Vec<f64> = (0..head.outputs()).map(|_| far * rng.random_range(-1.5..1.5)).collect();
+                let loss = |o: &[f64], t: f64| head.loss(o, &[t], None, &mut HeadScratch::default());
+                let mut by_hand = vec![0.0; out.len()];
+                head.loss(&out, &[0.2], Some(&mut by_hand), &mut HeadScratch::default());
+                for i in 0..out.len() {
+                    let mut moved = out.clone();
+                    moved[i] += 1e-5;
+                    let up = loss(&moved, 0.2);
+                    moved[i] -= 2e-5;
+                    let slope = (up - loss(&moved, 0.2)) / 2e-5;
+                    assert!(
+                        (slope - by_hand[i]).abs() < 1e-5 * slope.abs().max(1.0),
+                        "{slope} {}",
+                        by_hand[i]
+                    );
+                }
+                if far < 2.0 {
+                    let [low, high] = cut.map(|c| c.unwrap_or(f64::NAN));
+                    let (low, high) =
+                        (if low.is_nan() { -200.0 } else { low }, if high.is_nan() { 200.0 } else { high });
+                    let n = 4_000_000;
+                    let h = (high - low) / f64::from(n);
+                    let mut s = HeadScratch::default();
+                    let sum: f64 = (0..n)
+                        .map(|i| {
+                            h * (-head.loss(&out, &[low + h * (f64::from(i) + 0.5)], None, &mut s)).exp()
+                        })
+                        .sum();
+                    assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+                }
+            }
+        }
+    }
+}

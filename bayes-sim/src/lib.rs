@@ -1,0 +1,27 @@
+#![doc = include_str!("../README.md")]
+pub mod autoregressive;
+pub mod c2st;
+pub mod calibration;
+pub mod campaign;
+mod ensemble;
+pub mod error;
+mod head;
+pub mod kernel;
+mod linear;
+pub mod mdn;
+pub mod mdrff;
+pub mod mixture;
+mod network;
+mod normal;
+pub mod novelty;
+pub mod points;
+pub mod posterior;
+pub mod prior;
+mod product;
+pub mod random_features;
+pub mod rounds;
+pub mod save;
+mod scaling;
+pub mod simulations;
+pub mod training;
+pub mod truncation;

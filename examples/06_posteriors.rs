@@ -1,0 +1,91 @@
+//! Posteriors of the benchmark sbibm (Lueckmann et al. 2021, PMLR 130:343) from one round of simulations: C2ST against its reference
+//! posteriors, beside what its authors published for neural posterior estimation (NPE), and expected coverage.
+//!
+//! ```text
+//! cargo run --release -p examples --example 06_posteriors -- --small   1,000 and 10,000 simulations, two observations
+//! cargo run --release -p examples --example 06_posteriors              100,000 as well, all ten observations: hours
+//! ```
+//! One argument that names a task or a density keeps to it: `slcp`, `autoregressive`.
+#![allow(clippy::print_stdout, reason = "an example prints what it measures")]
+#![allow(clippy::unwrap_used, reason = "what the tests share stops where data are damaged")]
+
+#[path = "../bayes-sim/tests/common/mod.rs"]
+mod common;
+
+use std::error::Error;
+use std::time::Instant;
+
+use bayes_sim::autoregressive::{Autoregressive, AutoregressiveSettings};
+use bayes_sim::c2st::c2st;
+use bayes_sim::calibration::expected_coverage;
+use bayes_sim::mdn::{Mdn, MdnSettings};
+use bayes_sim::mdrff::{Mdrff, MdrffSettings};
+use bayes_sim::posterior::ConditionalDensity;
+use common::Task;
+
+/// Mean C2ST of NPE at 1e3, 1e4 and 1e5 simulations (shared/sbibm/c2st_wide.csv).
+const PUBLISHED: [(&str, [f64; 3]); 5] = [
+    ("gaussian_linear", [0.6945, 0.5522, 0.5060]),
+    ("two_moons", [0.7251, 0.6064, 0.5417]),
+    ("slcp", [0.9752, 0.9006, 0.8315]),
+    ("gaussian_mixture", [0.7161, 0.6153, 0.5478]),
+    ("gaussian_linear_uniform", [0.6963, 0.5534, 0.5093]),
+];
+
+fn train(name: &str, task: &Task, count: usize) -> Result<Box<dyn ConditionalDensity>, Box<dyn Error>> {
+    let data = task.simulations(count, 42);
+    Ok(match name {
+        "mdn" => Box::new(Mdn::train(&task.prior, &data, &MdnSettings::default(), 1)?),
+        "mdrff" => Box::new(Mdrff::train(&task.prior, &data, &MdrffSettings::default(), 1)?),
+        _ => Box::new(Autoregressive::train(&task.prior, &data, &AutoregressiveSettings::default(), 1)?),
+    })
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let small = examples::small();
+    let only: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let counts: &[usize] = if small { &[1_000, 10_000] } else { &[1_000, 10_000, 100_000] };
+    let (observations, points) = if small { (2, 2_000) } else { (10, 10_000) };
+    let tasks = [
+        common::gaussian_linear(),
+        common::two_moons(),
+        common::slcp(),
+        common::gaussian_mixture(),
+        common::gaussian_linear_uniform(),
+    ];
+    let densities = ["mdn", "mdrff", "autoregressive"];
+    let names = |list: &[&str]| only.iter().any(|o| list.contains(&o.as_str()));
+    let by_task = names(&tasks.iter().map(|t| t.name).collect::<Vec<_>>());
+    let by_density = names(&densities);
+    println!(
+        "C2ST: 0.5 for a posterior that cannot be told from the reference. Coverage: mean of coverage less level."
+    );
+    println!(
+        "{:24} {:>7} {:15} {:>7} {:>7} {:>9} {:>9}",
+        "task", "sims", "density", "C2ST", "NPE", "coverage", "train s"
+    );
+    for task in tasks.iter().filter(|t| !by_task || only.iter().any(|o| o == t.name)) {
+        let published = PUBLISHED.iter().find(|p| p.0 == task.name).map_or([f64::NAN; 3], |p| p.1);
+        for (&count, npe) in counts.iter().zip(published) {
+            for name in densities.iter().filter(|d| !by_density || only.iter().any(|o| o == *d)) {
+                let start = Instant::now();
+                let density = train(name, task, count)?;
+                let seconds = start.elapsed().as_secs_f64();
+                let mut sum = 0.0;
+                for i in 1..=observations {
+                    let Some((x, reference)) = common::reference(task, i, points) else { return Ok(()) };
+                    let draws = density.sample(&x, points, &mut common::dice(i as u64))?;
+                    sum += c2st(&reference, &draws, 1)?;
+                }
+                let tests = task.simulations(if small { 500 } else { 1000 }, 7);
+                let coverage = expected_coverage(density.as_ref(), &tests, 200, 3)?.mean_error();
+                let score = sum / observations as f64;
+                println!(
+                    "{:24} {count:>7} {name:15} {score:>7.3} {npe:>7.3} {coverage:>+9.3} {seconds:>9.1}",
+                    task.name
+                );
+            }
+        }
+    }
+    Ok(())
+}
