@@ -15,6 +15,8 @@ pub(super) struct Grid {
 const MOST_CELLS: f64 = 4e6;
 /// Cells about the highest one through whose medians a quadric is laid, to each side.
 const PATCH: usize = 3;
+/// Cells that a quadric needs.
+const LEAST_CELLS: usize = 18;
 
 impl Grid {
     pub(super) fn new(points: &[[f64; 3]], cell_m: f64) -> Self {
@@ -60,7 +62,7 @@ impl Grid {
         let middle = filled.len() / 2;
         // A lone point is a flying one, save where cells are as small as the distance of the points.
         let usual = *filled.select_nth_unstable(middle).1;
-        let least = (usual / 4).clamp(1, 3);
+        let least = (usual / 3 + 1).min(3);
         let mut label = vec![0_u32; self.counts.len()];
         let (mut stack, mut best, mut labels) = (Vec::new(), (0_u64, 0_u32), 0);
         for seed in 0..self.counts.len() {
@@ -103,11 +105,15 @@ impl Grid {
             let middle = near.len() / 2;
             if near.len() < 4 { f64::NAN } else { *near.select_nth_unstable_by(middle, f64::total_cmp).1 }
         };
-        let highest = (0..medians.len())
-            .map(|at| (at, smooth(at)))
-            .filter(|(_, m)| m.is_finite())
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        let (at, level) = highest?;
+        let smoothed: Vec<f64> = (0..medians.len()).map(&mut smooth).collect();
+        let finite = smoothed.iter().enumerate().filter(|(_, m)| m.is_finite());
+        let (at, &level) = finite.max_by(|a, b| a.1.total_cmp(b.1))?;
+        // A cell that stands out from all beside it is no dough.
+        for (median, smooth) in medians.iter_mut().zip(&smoothed) {
+            if !((*median - smooth).abs() < 0.2 * level) {
+                *median = f64::NAN;
+            }
+        }
         Some(self.summit(&medians, at, level))
     }
 
@@ -118,6 +124,7 @@ impl Grid {
         let reach = PATCH as f64 + 0.5;
         let row = |u: f64, v: f64| SVector::<f64, 6>::new(1.0, u, v, u * u, u * v, v * v);
         let (mut a, mut b) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
+        let mut cells = 0;
         for k in self.around(at, PATCH).filter(|k| medians[*k].is_finite()) {
             let [x, y] = place(k);
             let (u, v) = ((x - c) / reach, (y - r) / reach);
@@ -125,6 +132,7 @@ impl Grid {
             if medians[k] > 0.6 * level {
                 a += row(u, v) * row(u, v).transpose();
                 b += row(u, v) * medians[k];
+                cells += 1;
             }
         }
         let metres = |u: f64, v: f64| {
@@ -133,7 +141,7 @@ impl Grid {
                 self.origin[1] + (r + 0.5 + v * reach) * self.cell_m,
             ]
         };
-        let Some(k) = a.cholesky().map(|f| f.solve(&b)).filter(|_| a.determinant() > 1e-6) else {
+        let Some(k) = a.cholesky().map(|f| f.solve(&b)).filter(|_| cells >= LEAST_CELLS) else {
             return (level, metres(0.0, 0.0));
         };
         let at = |u: f64, v: f64| row(u, v).dot(&k);
@@ -142,6 +150,8 @@ impl Grid {
         let steps = (-RASTER..=RASTER).map(|i| 0.5 * f64::from(i) / f64::from(RASTER));
         let inner = steps.clone().flat_map(|u| steps.clone().map(move |v| (u, v)));
         let (u, v) = inner.fold((0.0, 0.0), |best, p| if at(p.0, p.1) > at(best.0, best.1) { p } else { best });
-        (at(u, v), metres(u, v))
+        let top = at(u, v);
+        // A quadric over a few cells at an end of the dough may rise out of it.
+        if (top - level).abs() < 0.1 * level { (top, metres(u, v)) } else { (level, metres(0.0, 0.0)) }
     }
 }

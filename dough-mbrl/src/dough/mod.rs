@@ -40,6 +40,18 @@ impl Shape {
     }
 }
 
+impl Shape {
+    /// Corners of its rectangle, on the ground, m.
+    fn corners(&self) -> [[f64; 3]; 4] {
+        let (s, c) = self.yaw_rad.sin_cos();
+        let [x, y] = self.centre_m;
+        [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(a, b)| {
+            let (a, b) = (0.5 * a * self.length_m, 0.5 * b * self.width_m);
+            [x + c * a - s * b, y + s * a + c * b, self.ground_m]
+        })
+    }
+}
+
 /// What is known before of the workspace; the cloud's frame has its z axis up to about 5 degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
@@ -99,7 +111,18 @@ pub enum DoughError {
         /// Points needed.
         least: usize,
     },
+    /// The dough goes on beyond the picture.
+    #[error("the dough lies at the edge of the picture, at column {column:.0} and row {row:.0}: what lies beyond is not seen")]
+    CutOff {
+        /// Column of a corner of the rectangle around it.
+        column: f64,
+        /// Its row.
+        row: f64,
+    },
 }
+
+/// Pixels at the edge of a picture in which a dough is held to go on beyond it.
+const EDGE_PX: f64 = 3.0;
 
 impl View {
     /// The dough in a cloud (m, z up).
@@ -157,7 +180,20 @@ impl View {
         intrinsics: &Intrinsics,
         camera_in_world: &Pose,
     ) -> Result<Shape, DoughError> {
-        self.find(&cloud(depth_m, intrinsics, camera_in_world)?)
+        let shape = self.find(&cloud(depth_m, intrinsics, camera_in_world)?)?;
+        let world_from_camera = isometry(camera_in_world)?;
+        let (width, height) = (depth_m.width() as f64, depth_m.height() as f64);
+        for corner in shape.corners() {
+            let seen = world_from_camera.inverse_transform_point(&corner.into());
+            let inside = |v: f64, size: f64| v >= EDGE_PX && v <= size - 1.0 - EDGE_PX;
+            match intrinsics.pixel(seen.coords.into()) {
+                Some((u, v)) if !(inside(u, width) && inside(v, height)) => {
+                    return Err(DoughError::CutOff { column: u, row: v });
+                }
+                _ => {}
+            }
+        }
+        Ok(shape)
     }
 }
 
@@ -170,13 +206,8 @@ pub fn cloud(
     intrinsics: &Intrinsics,
     camera_in_world: &Pose,
 ) -> Result<Vec<[f64; 3]>, DoughError> {
-    let [x, y, z, w] = camera_in_world.rotation_xyzw;
-    let q = Quaternion::new(w, x, y, z);
-    let at = Vector3::from(camera_in_world.position_m);
-    if !((q.norm() - 1.0).abs() < 1e-6 && at.iter().all(|v| v.is_finite())) {
-        return Err(DoughError::Pose { size: q.norm() });
-    }
-    let world_from_camera = Isometry3::from_parts(Translation3::from(at), UnitQuaternion::new_normalize(q));
+    let world_from_camera = isometry(camera_in_world)?;
+    let at = world_from_camera.translation.vector;
     let rotation = world_from_camera.rotation.to_rotation_matrix();
     let width = depth_m.width();
     let mut cloud = Vec::with_capacity(depth_m.data().len());
@@ -187,4 +218,14 @@ pub fn cloud(
         }));
     }
     Ok(cloud)
+}
+
+fn isometry(pose: &Pose) -> Result<Isometry3<f64>, DoughError> {
+    let [x, y, z, w] = pose.rotation_xyzw;
+    let q = Quaternion::new(w, x, y, z);
+    let at = Vector3::from(pose.position_m);
+    if !((q.norm() - 1.0).abs() < 1e-6 && at.iter().all(|v| v.is_finite())) {
+        return Err(DoughError::Pose { size: q.norm() });
+    }
+    Ok(Isometry3::from_parts(Translation3::from(at), UnitQuaternion::new_normalize(q)))
 }

@@ -38,7 +38,7 @@ impl Eye {
             height: 240,
             intrinsics: Intrinsics { fx: focal, fy: focal, cx: 159.5, cy: 119.5 },
             pose_in_world: Pose {
-                position_m: [0.4, -0.05, 0.5],
+                position_m: [0.4, 0.05, 0.5],
                 rotation_xyzw: [q.i, q.j, q.k, q.w],
             },
             noise_m: 6e-4,

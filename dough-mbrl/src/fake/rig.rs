@@ -74,7 +74,7 @@ const THROWS_M: (f64, f64) = (0.01, 0.12);
 /// Contact is followed in steps of this size, m.
 const STEP_M: f64 = 1.5e-3;
 /// Friction of the band on dough.
-const FRICTION: f64 = 0.22;
+const FRICTION: f64 = 0.3;
 /// Time in which springback comes back, s.
 const RECOVERY_S: f64 = 2.0;
 /// Elastic modulus over hardness.
@@ -91,7 +91,7 @@ impl FakeRig {
         Self {
             body,
             water_g: kind.water_g,
-            band: Elastic { natural_m: 0.025, modulus_n: 2.0, breadth_m: 0.04 },
+            band: Elastic { natural_m: 0.025, modulus_n: 0.85, breadth_m: 0.04 },
             effects,
             eye: Eye::overhead(),
             rng,
