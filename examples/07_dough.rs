@@ -41,7 +41,8 @@ fn main() -> Result<(), Failure> {
         Size { explored: 600, goals: vec![2.0, 4.0, 6.0, 8.0, 10.0], six: 6, ten: 10, fifteen: 15 }
     };
     let of = |kind, seed| explore(kind, NONE, size.explored, seed);
-    let (a, c, unseen) = (rolls(&of(DoughKind::A, 1)?), rolls(&of(DoughKind::C, 2)?), rolls(&of(DoughKind::A, 3)?));
+    let (a, c, unseen) =
+        (rolls(&of(DoughKind::A, 1)?), rolls(&of(DoughKind::C, 2)?), rolls(&of(DoughKind::A, 3)?));
     held_out(&a, &unseen)?;
     let (model_a, model_c) = (Ridge::learn(&a, 2, 1e-3)?, Ridge::learn(&c, 2, 1e-3)?);
     let bars = figure_7_4(&size, &a, &model_a)?;
@@ -56,7 +57,10 @@ fn main() -> Result<(), Failure> {
 
 /// Dynamics compared on rolls that none of them has seen.
 fn held_out(a: &[Roll], unseen: &[Roll]) -> Result<(), Failure> {
-    println!("one roll ahead on {} unseen rolls of dough A (root mean square error; 95 % intervals hold)", unseen.len());
+    println!(
+        "one roll ahead on {} unseen rolls of dough A (root mean square error; 95 % intervals hold)",
+        unseen.len()
+    );
     println!("{:44} {:>9} {:>9} {:>9} {:>8}", "dynamics", "length mm", "width mm", "height mm", "held");
     let show = |name: &str, model: &dyn Predictor| {
         let (mut squares, mut held) = ([0.0; 3], 0);
@@ -73,7 +77,10 @@ fn held_out(a: &[Roll], unseen: &[Roll]) -> Result<(), Failure> {
     show("polynomial of degree 1", &Ridge::learn(a, 1, 1e-3)?);
     show("polynomial of degree 2 (the thesis's)", &Ridge::learn(a, 2, 1e-3)?);
     show("polynomial of degree 3, ridge 1", &Ridge::learn(a, 3, 1.0)?);
-    show("polynomial with remainder, doughs followed", &Dynamics::learn(&a.iter().map(|r| vec![*r]).collect::<Vec<_>>())?);
+    show(
+        "polynomial with remainder, doughs followed",
+        &Dynamics::learn(&a.iter().map(|r| vec![*r]).collect::<Vec<_>>())?,
+    );
     show("Gaussian process", &Process::learn(a)?);
     show("five small networks", &Ensemble::learn(a, 4)?);
     Ok(())
@@ -101,7 +108,10 @@ fn figure_7_4(size: &Size, a: &[Roll], model: &Ridge) -> Result<Vec<picture::Bar
         ("direct, cautious", &|_| controller(model, 10, Some(10), 1.0)),
         ("direct, Gaussian process", &|_| controller(&process, 4, Some(10), 0.0)),
     ];
-    println!("\nfigure 7.4: rolls to the goal, dough A, {} rollouts each, mean +- half the 95 % interval", size.six);
+    println!(
+        "\nfigure 7.4: rolls to the goal, dough A, {} rollouts each, mean +- half the 95 % interval",
+        size.six
+    );
     print!("{:26}", "policy");
     size.goals.iter().for_each(|g| print!("{:>16}", format!("{g} in")));
     println!("{:>10}", "missed");
@@ -124,7 +134,8 @@ fn figure_7_4(size: &Size, a: &[Roll], model: &Ridge) -> Result<Vec<picture::Bar
         let pairs = all[than].values.iter().zip(&all[what].values);
         let parts: Vec<f64> = pairs.map(|(a, b)| 100.0 * (1.0 - b.0 / a.0)).collect();
         let (mean, _) = mean_and_half(&parts);
-        let spread = parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (parts.len() as f64 - 1.0).max(1.0);
+        let spread =
+            parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (parts.len() as f64 - 1.0).max(1.0);
         format!("{mean:.1} +- {:.1} %", spread.sqrt())
     };
     println!("fewer rolls (mean over the goals +- their standard deviation)        here           thesis");
@@ -151,10 +162,15 @@ fn table_7_1() -> Result<[f64; 3], Failure> {
         }
     }
     let band = BandForce::fit(&presses)?;
-    println!("\ntable 7.1: stiffness by palpation, N/mm (band's force fitted to {:.0} mN)", 1e3 * band.sigma_n);
+    println!(
+        "\ntable 7.1: stiffness by palpation, N/mm (band's force fitted to {:.0} mN)",
+        1e3 * band.sigma_n
+    );
     let mut found = [0.0; 3];
     for (k, (name, kind, table)) in
-        [("A", DoughKind::A, 0.49), ("B", DoughKind::B, 0.85), ("C", DoughKind::C, 1.23)].into_iter().enumerate()
+        [("A", DoughKind::A, 0.49), ("B", DoughKind::B, 0.85), ("C", DoughKind::C, 1.23)]
+            .into_iter()
+            .enumerate()
     {
         let felt: Result<Vec<f64>, _> = (10..16)
             .map(|seed| {
@@ -170,7 +186,12 @@ fn table_7_1() -> Result<[f64; 3], Failure> {
 }
 
 /// Wrong, refined and matched models.
-fn figure_7_5(size: &Size, a: &Ridge, c: &Ridge, stiffness: &[f64; 3]) -> Result<Vec<picture::Lines>, Failure> {
+fn figure_7_5(
+    size: &Size,
+    a: &Ridge,
+    c: &Ridge,
+    stiffness: &[f64; 3],
+) -> Result<Vec<picture::Lines>, Failure> {
     let known = [(stiffness[0], a.clone()), (stiffness[2], c.clone())];
     let matched = [0, 1, 2].map(|k| Matched::new(&known, stiffness[k]));
     let [matched_a, matched_b, matched_c] = matched;
@@ -178,7 +199,10 @@ fn figure_7_5(size: &Size, a: &Ridge, c: &Ridge, stiffness: &[f64; 3]) -> Result
     let show = |name: &str, done: &[Rollout]| {
         let (rolls, off) = counts(done);
         let (mean, half) = mean_and_half(&rolls);
-        println!("  {name:44} {mean:>6.1} +- {half:.1}{}", if off > 0 { format!("  ({off} missed)") } else { String::new() });
+        println!(
+            "  {name:44} {mean:>6.1} +- {half:.1}{}",
+            if off > 0 { format!("  ({off} missed)") } else { String::new() }
+        );
         mean
     };
     let run = |kind, inches: f64, seeds, make: Make<'_>| rollouts(kind, NONE, inches * INCH_M, seeds, make);
@@ -189,8 +213,14 @@ fn figure_7_5(size: &Size, a: &Ridge, c: &Ridge, stiffness: &[f64; 3]) -> Result
     let fixed_c = run(DoughKind::C, 4.0, n.clone(), &|_| controller(a, 5, None, 0.0))?;
     let refined_c = run(DoughKind::C, 4.0, n, &|_| controller(a, 5, Some(5), 0.0))?;
     let gain = |before: f64, after: f64| 100.0 * (1.0 - after / before);
-    let at_a = gain(show("dough A to 6 in, model C, fixed", &fixed_a), show("dough A to 6 in, model C, refined", &refined_a));
-    let at_c = gain(show("dough C to 4 in, model A, fixed", &fixed_c), show("dough C to 4 in, model A, refined", &refined_c));
+    let at_a = gain(
+        show("dough A to 6 in, model C, fixed", &fixed_a),
+        show("dough A to 6 in, model C, refined", &refined_a),
+    );
+    let at_c = gain(
+        show("dough C to 4 in, model A, fixed", &fixed_c),
+        show("dough C to 4 in, model A, refined", &refined_c),
+    );
     println!("  refined: {:.1} % fewer rolls on average (thesis 45.8 %)", 0.5 * (at_a + at_c));
     println!("figure 7.5 b: wrong model or matched by stiffness, both refined, {} rollouts", size.ten);
     let n = 300..300 + size.ten;
@@ -205,7 +235,8 @@ fn figure_7_5(size: &Size, a: &Ridge, c: &Ridge, stiffness: &[f64; 3]) -> Result
         ("C", DoughKind::C, 4.0, wrong_c, &matched_c),
     ] {
         let right: Make<'_> = &|_| controller(right, 5, Some(5), 0.0);
-        let (with_wrong, with_right) = (run(kind, inches, n.clone(), wrong)?, run(kind, inches, n.clone(), right)?);
+        let (with_wrong, with_right) =
+            (run(kind, inches, n.clone(), wrong)?, run(kind, inches, n.clone(), right)?);
         let before = show(&format!("dough {name} to {inches} in, wrong model"), &with_wrong);
         gains.push(gain(before, show(&format!("dough {name} to {inches} in, matched"), &with_right)));
         if kind == DoughKind::A {
@@ -231,21 +262,21 @@ mod picture {
     use dough_mbrl::rollout::Rollout;
 
     /// A policy's rolls by goal, mean and half interval.
-    pub struct Bars {
-        pub name: String,
-        pub values: Vec<(f64, f64)>,
+    pub(super) struct Bars {
+        pub(super) name: String,
+        pub(super) values: Vec<(f64, f64)>,
     }
 
     /// Mean throw and depth (mm) by fifths of the progress.
-    pub struct Lines {
-        pub name: String,
-        pub values: Vec<[f64; 2]>,
+    pub(super) struct Lines {
+        pub(super) name: String,
+        pub(super) values: Vec<[f64; 2]>,
     }
 
     const COLOURS: [&str; 6] = ["#999", "#d55e00", "#56b4e9", "#0072b2", "#009e73", "#cc79a7"];
 
     impl Lines {
-        pub fn of(name: &str, rollouts: &[Rollout]) -> Self {
+        pub(super) fn of(name: &str, rollouts: &[Rollout]) -> Self {
             let mut sums = [[0.0; 3]; 5];
             for rollout in rollouts {
                 for (i, rolled) in rollout.rolls.iter().enumerate() {
@@ -259,8 +290,10 @@ mod picture {
         }
     }
 
-    pub fn draw(bars: &[Bars], lines: &[Lines]) -> String {
-        let mut svg = String::from("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 760 640' font-family='sans-serif' font-size='12'><rect width='760' height='640' fill='white'/><text x='50' y='20'>rolls to the goal (figure 7.4), goals from left to right</text>");
+    pub(super) fn draw(bars: &[Bars], lines: &[Lines]) -> String {
+        let mut svg = String::from(
+            "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 760 640' font-family='sans-serif' font-size='12'><rect width='760' height='640' fill='white'/><text x='50' y='20'>rolls to the goal (figure 7.4), goals from left to right</text>",
+        );
         let most = bars.iter().flat_map(|b| &b.values).map(|v| v.0 + v.1).fold(1.0, f64::max);
         let height = |v: f64| 240.0 * v / most;
         for (b, bar) in bars.iter().enumerate() {
@@ -280,21 +313,44 @@ mod picture {
                 );
             }
             let y = 40.0 + 16.0 * b as f64;
-            let _ = write!(svg, "<rect x='52' y='{:.1}' width='10' height='10' fill='{}'/><text x='68' y='{y:.1}'>{}</text>", y - 9.0, COLOURS[b % 6], bar.name);
+            let _ = write!(
+                svg,
+                "<rect x='52' y='{:.1}' width='10' height='10' fill='{}'/><text x='68' y='{y:.1}'>{}</text>",
+                y - 9.0,
+                COLOURS[b % 6],
+                bar.name
+            );
         }
         for (k, title, most) in [(0, "throw, mm (figure 7.6)", 120.0), (1, "depth, mm", 45.0)] {
             let left = 50.0 + 350.0 * f64::from(k);
-            let _ = write!(svg, "<text x='{left}' y='320'>{title}</text><path d='M{left} 330V560H{:.0}' fill='none' stroke='black'/><text x='{left}' y='576'>progress</text>", left + 300.0);
+            let _ = write!(
+                svg,
+                "<text x='{left}' y='320'>{title}</text><path d='M{left} 330V560H{:.0}' fill='none' stroke='black'/><text x='{left}' y='576'>progress</text>",
+                left + 300.0
+            );
             for (n, line) in lines.iter().enumerate() {
                 let points: Vec<String> = line
                     .values
                     .iter()
                     .enumerate()
                     .filter(|(_, v)| v[k as usize].is_finite())
-                    .map(|(i, v)| format!("{:.1},{:.1}", left + 60.0 * i as f64 + 30.0, 560.0 - 220.0 * v[k as usize] / most))
+                    .map(|(i, v)| {
+                        format!(
+                            "{:.1},{:.1}",
+                            left + 60.0 * i as f64 + 30.0,
+                            560.0 - 220.0 * v[k as usize] / most
+                        )
+                    })
                     .collect();
                 let colour = COLOURS[n + 1];
-                let _ = write!(svg, "<polyline points='{}' fill='none' stroke='{colour}' stroke-width='2'/><text x='{:.0}' y='{:.0}' fill='{colour}'>{}</text>", points.join(" "), left + 120.0, 592.0 + 14.0 * n as f64, line.name);
+                let _ = write!(
+                    svg,
+                    "<polyline points='{}' fill='none' stroke='{colour}' stroke-width='2'/><text x='{:.0}' y='{:.0}' fill='{colour}'>{}</text>",
+                    points.join(" "),
+                    left + 120.0,
+                    592.0 + 14.0 * n as f64,
+                    line.name
+                );
             }
         }
         svg.push_str("</svg>\n");

@@ -44,7 +44,9 @@ pub enum GoalError {
         goal_m: f64,
     },
     /// The goal is lower than the band can press.
-    #[error("a dough {length_m:.3} m long would be {height_m:.4} m high, below the smallest depth of {least_m:.4} m")]
+    #[error(
+        "a dough {length_m:.3} m long would be {height_m:.4} m high, below the smallest depth of {least_m:.4} m"
+    )]
     TooThin {
         /// Length of the goal.
         length_m: f64,
@@ -104,7 +106,11 @@ impl Goal {
             return Err(GoalError::Shorter { length_m: from[0], goal_m: length });
         }
         if height <= limits.least_depth_m {
-            return Err(GoalError::TooThin { length_m: length, height_m: height, least_m: limits.least_depth_m });
+            return Err(GoalError::TooThin {
+                length_m: length,
+                height_m: height,
+                least_m: limits.least_depth_m,
+            });
         }
         Ok(())
     }
@@ -122,7 +128,10 @@ mod tests {
         assert_eq!(goal.check(&start, 4e-5, &limits), Ok(()));
         assert!(matches!(goal.check(&start, 8e-5, &limits), Err(GoalError::Volume { .. })));
         assert!(matches!(goal.check(&[0.2, 0.016, 0.016], 4e-5, &limits), Err(GoalError::Shorter { .. })));
-        assert!(matches!(goal.check(&start, f64::NAN, &limits), Err(GoalError::Value { name: "volume", .. })));
+        assert!(matches!(
+            goal.check(&start, f64::NAN, &limits),
+            Err(GoalError::Value { name: "volume", .. })
+        ));
         let thin = Goal::cylinder(3.0, 4e-5).unwrap();
         assert!(matches!(thin.check(&start, 4e-5, &limits), Err(GoalError::TooThin { .. })));
         assert!(Goal::cylinder(f64::NAN, 4e-5).is_err() && Goal::cylinder(0.1, -1.0).is_err());

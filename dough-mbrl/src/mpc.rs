@@ -67,7 +67,13 @@ impl<M: Refit, P: Planner> Mpc<M, P> {
 }
 
 impl<M: Refit, P: Planner> Policy for Mpc<M, P> {
-    fn act(&mut self, state: &State, goal: &Goal, limits: &Limits, rng: &mut dyn Rng) -> Result<Action, PlanError> {
+    fn act(
+        &mut self,
+        state: &State,
+        goal: &Goal,
+        limits: &Limits,
+        rng: &mut dyn Rng,
+    ) -> Result<Action, PlanError> {
         PlanError::check(state)?;
         self.distance_m = self.dynamics.distance_m(state);
         let reach_m = self.settings.reach_m;

@@ -129,8 +129,16 @@ impl Ensemble {
         });
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let members = (0..MEMBERS).map(|_| Member::new(&mut rng)).collect();
-        let mut ensemble =
-            Self { members, rolls: Vec::new(), mean, per_scale, change, sigma: [0.0; 3], rng, trained: false };
+        let mut ensemble = Self {
+            members,
+            rolls: Vec::new(),
+            mean,
+            per_scale,
+            change,
+            sigma: [0.0; 3],
+            rng,
+            trained: false,
+        };
         rolls.iter().try_for_each(|r| ensemble.add(r, 1.0))?;
         ensemble.refit()?;
         Ok(ensemble)
@@ -202,7 +210,8 @@ impl Refit for Ensemble {
             .rolls
             .iter()
             .map(|(r, w)| {
-                let y = std::array::from_fn(|k| (r.next[k] - r.state[k] - self.change[k][0]) / self.change[k][1]);
+                let y =
+                    std::array::from_fn(|k| (r.next[k] - r.state[k] - self.change[k][0]) / self.change[k][1]);
                 (self.input(&r.state, &r.action), y, *w)
             })
             .collect();

@@ -119,5 +119,10 @@ pub trait Planner {
     ///
     /// # Errors
     /// [`PlanError`]; the plan is then as it was.
-    fn plan(&mut self, task: &Task<'_>, plan: &mut Vec<f64>, rng: &mut dyn rand::Rng) -> Result<f64, PlanError>;
+    fn plan(
+        &mut self,
+        task: &Task<'_>,
+        plan: &mut Vec<f64>,
+        rng: &mut dyn rand::Rng,
+    ) -> Result<f64, PlanError>;
 }

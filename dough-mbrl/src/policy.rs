@@ -13,7 +13,13 @@ pub trait Policy {
     ///
     /// # Errors
     /// [`PlanError`].
-    fn act(&mut self, state: &State, goal: &Goal, limits: &Limits, rng: &mut dyn Rng) -> Result<Action, PlanError>;
+    fn act(
+        &mut self,
+        state: &State,
+        goal: &Goal,
+        limits: &Limits,
+        rng: &mut dyn Rng,
+    ) -> Result<Action, PlanError>;
 
     /// Takes note of what a roll did. By default nothing is made of it.
     ///
@@ -29,7 +35,13 @@ pub trait Policy {
 pub struct Explore;
 
 impl Policy for Explore {
-    fn act(&mut self, state: &State, _: &Goal, limits: &Limits, rng: &mut dyn Rng) -> Result<Action, PlanError> {
+    fn act(
+        &mut self,
+        state: &State,
+        _: &Goal,
+        limits: &Limits,
+        rng: &mut dyn Rng,
+    ) -> Result<Action, PlanError> {
         PlanError::check(state)?;
         Ok(limits.at(state).place([rng.random(), rng.random()]))
     }
@@ -49,7 +61,13 @@ impl Default for Heuristic {
 }
 
 impl Policy for Heuristic {
-    fn act(&mut self, state: &State, goal: &Goal, limits: &Limits, _: &mut dyn Rng) -> Result<Action, PlanError> {
+    fn act(
+        &mut self,
+        state: &State,
+        goal: &Goal,
+        limits: &Limits,
+        _: &mut dyn Rng,
+    ) -> Result<Action, PlanError> {
         PlanError::check(state)?;
         let wanted = [self.throw * limits.throw_m.1, state[2] - 0.5 * goal.state[2]];
         Ok(limits.at(state).clamp(wanted))

@@ -2,8 +2,7 @@
 //! doi:10.1093/comjnl/7.2.155), each searched by bracketing and Brent's steps (Brent 1973), never outside the bounds.
 
 use argmin::core::{
-    CostFunction, Error, Executor, IterState, KV, Problem, Solver, TerminationReason,
-    TerminationStatus,
+    CostFunction, Error, Executor, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus,
 };
 use rand::Rng;
 
@@ -28,7 +27,9 @@ pub struct Powell {
 
 /// Why there is no solver.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("bounds of {low} and {high} in dimension {dimension}: expected finite ones, the lower below the upper")]
+#[error(
+    "bounds of {low} and {high} in dimension {dimension}: expected finite ones, the lower below the upper"
+)]
 pub struct BoundsError {
     /// The dimension, from 0; that of the shorter list's end where their lengths differ.
     pub dimension: usize,
@@ -232,10 +233,18 @@ impl Line {
             let fu = cost(u)?;
             asked += 1;
             if fu <= fx {
-                if u < x { b = x } else { a = x }
+                if u < x {
+                    b = x
+                } else {
+                    a = x
+                }
                 (v, fv, w, fw, x, fx) = (w, fw, x, fx, u, fu);
             } else {
-                if u < x { a = u } else { b = u }
+                if u < x {
+                    a = u
+                } else {
+                    b = u
+                }
                 if fu <= fw || w == x {
                     (v, fv, w, fw) = (w, fw, u, fu);
                 } else if fu <= fv || v == x || v == w {
@@ -310,7 +319,11 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Solver<O, Iterate> for Pow
         Ok((state.param(x).cost(cost), None))
     }
 
-    fn next_iter(&mut self, problem: &mut Problem<O>, mut state: Iterate) -> Result<(Iterate, Option<KV>), Error> {
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
         let start = state.get_cost();
         let mut x = state.take_param().unwrap_or_default();
         let value = self.sweep(&mut |x| problem.cost(x), &mut x, start)?;

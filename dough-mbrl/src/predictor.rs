@@ -49,7 +49,9 @@ pub enum PlanError {
         expected: &'static str,
     },
     /// The state is too far from all that was learned.
-    #[error("the state {state:?} is {distance_m:.4} m from the nearest one learned from, farther than {reach_m:.4} m: explore there first")]
+    #[error(
+        "the state {state:?} is {distance_m:.4} m from the nearest one learned from, farther than {reach_m:.4} m: explore there first"
+    )]
     Outside {
         /// The state.
         state: State,
@@ -79,7 +81,12 @@ impl PlanError {
         if good { Ok(()) } else { Err(Self::State { state: *state }) }
     }
 
-    pub(crate) fn setting(name: &'static str, value: f64, good: bool, expected: &'static str) -> Result<(), Self> {
+    pub(crate) fn setting(
+        name: &'static str,
+        value: f64,
+        good: bool,
+        expected: &'static str,
+    ) -> Result<(), Self> {
         if good { Ok(()) } else { Err(Self::Setting { name, value, expected }) }
     }
 }

@@ -160,7 +160,8 @@ impl Predictor for Process {
     fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
         let input = self.standardised(state, action);
         let (length, noise) = (self.log[0].exp(), (2.0 * self.log[1]).exp());
-        let mut told = DVector::from_iterator(self.inputs.len(), self.inputs.iter().map(|o| kernel(&input, o, length)));
+        let mut told =
+            DVector::from_iterator(self.inputs.len(), self.inputs.iter().map(|o| kernel(&input, o, length)));
         self.factor.l_dirty().solve_lower_triangular_mut(&mut told);
         let unsure = (kernel(&input, &input, length) - told.norm_squared()).max(0.0);
         let change = self.mean_change(&input);

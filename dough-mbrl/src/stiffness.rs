@@ -69,7 +69,9 @@ pub enum StiffnessError {
         high: f64,
     },
     /// No dent was seen.
-    #[error("pressed to {depth_m:.4} m, the dough gave way by {deflection_m:.5} m, less than {least_m:.5} m: it is too stiff for this band")]
+    #[error(
+        "pressed to {depth_m:.4} m, the dough gave way by {deflection_m:.5} m, less than {least_m:.5} m: it is too stiff for this band"
+    )]
     NoDent {
         /// The deepest press.
         depth_m: f64,
@@ -92,7 +94,9 @@ impl BandForce {
     /// [`StiffnessError`].
     pub fn fit(presses: &[Press]) -> Result<Self, StiffnessError> {
         let good = |p: &Press| {
-            p.throw_m > 0.0 && p.depth_m > 0.0 && [p.throw_m, p.depth_m, p.force_n].iter().all(|v| v.is_finite())
+            p.throw_m > 0.0
+                && p.depth_m > 0.0
+                && [p.throw_m, p.depth_m, p.force_n].iter().all(|v| v.is_finite())
         };
         if let Some(number) = presses.iter().position(|p| !good(p)) {
             return Err(StiffnessError::Press { number, press: presses[number] });
@@ -131,10 +135,9 @@ impl BandForce {
     /// # Errors
     /// [`StiffnessError::Outside`] where nothing was measured; depths down to 0 are within.
     pub fn force_n(&self, throw_m: f64, depth_m: f64) -> Result<f64, StiffnessError> {
-        for (name, value, [low, high]) in [
-            ("a throw", throw_m, self.range[0]),
-            ("a depth", depth_m, [0.0, self.range[1][1]]),
-        ] {
+        for (name, value, [low, high]) in
+            [("a throw", throw_m, self.range[0]), ("a depth", depth_m, [0.0, self.range[1][1]])]
+        {
             let slack = 1e-3 * (high - low);
             if !(value >= low - slack && value <= high + slack) {
                 return Err(StiffnessError::Outside { name, value, low, high });

@@ -16,7 +16,12 @@ const LONGEST_M: f64 = 0.27;
 ///
 /// # Errors
 /// [`RolloutError`].
-pub fn explore(kind: DoughKind, effects: Effects, rolls: usize, seed: u64) -> Result<Vec<Vec<Rolled>>, RolloutError> {
+pub fn explore(
+    kind: DoughKind,
+    effects: Effects,
+    rolls: usize,
+    seed: u64,
+) -> Result<Vec<Vec<Rolled>>, RolloutError> {
     let mut rig = FakeRig::new(kind, effects, seed);
     let setup = Setup::of(rig.camera_in_world());
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

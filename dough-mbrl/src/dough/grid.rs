@@ -11,8 +11,8 @@ pub(super) struct Grid {
     counts: Vec<u32>,
 }
 
-/// More cells than this would be an extent of kilometres: cells grow instead.
-const MOST_CELLS: f64 = 4e6;
+/// More cells than this along one side would be an extent of many metres: cells grow instead.
+const MOST_ALONG: f64 = 2000.0;
 /// Cells about the highest one through whose medians a quadric is laid, to each side.
 const PATCH: usize = 3;
 /// Cells that a quadric needs.
@@ -28,8 +28,7 @@ impl Grid {
         if points.is_empty() {
             return Self { cell_m, origin: [0.0; 2], columns: 0, rows: 0, counts: Vec::new() };
         }
-        let cells = ((x1 - x0) / cell_m + 1.0) * ((y1 - y0) / cell_m + 1.0);
-        let cell_m = cell_m * (cells / MOST_CELLS).sqrt().max(1.0);
+        let cell_m = cell_m.max((x1 - x0) / MOST_ALONG).max((y1 - y0) / MOST_ALONG);
         let (columns, rows) = (((x1 - x0) / cell_m) as usize + 1, ((y1 - y0) / cell_m) as usize + 1);
         let mut grid = Self { cell_m, origin: [x0, y0], columns, rows, counts: vec![0; columns * rows] };
         for p in points {
@@ -149,7 +148,8 @@ impl Grid {
         const RASTER: i32 = 8;
         let steps = (-RASTER..=RASTER).map(|i| 0.5 * f64::from(i) / f64::from(RASTER));
         let inner = steps.clone().flat_map(|u| steps.clone().map(move |v| (u, v)));
-        let (u, v) = inner.fold((0.0, 0.0), |best, p| if at(p.0, p.1) > at(best.0, best.1) { p } else { best });
+        let (u, v) =
+            inner.fold((0.0, 0.0), |best, p| if at(p.0, p.1) > at(best.0, best.1) { p } else { best });
         let top = at(u, v);
         // A quadric over a few cells at an end of the dough may rise out of it.
         if (top - level).abs() < 0.1 * level { (top, metres(u, v)) } else { (level, metres(0.0, 0.0)) }

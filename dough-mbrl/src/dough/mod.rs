@@ -90,7 +90,9 @@ pub enum DoughError {
         value: f64,
     },
     /// The pose of the camera is none.
-    #[error("the camera's pose is none: its rotation has the size {size}, expected 1, and its position is to be finite")]
+    #[error(
+        "the camera's pose is none: its rotation has the size {size}, expected 1, and its position is to be finite"
+    )]
     Pose {
         /// Size of the quaternion.
         size: f64,
@@ -104,7 +106,9 @@ pub enum DoughError {
         least: f64,
     },
     /// Nothing stands on the ground.
-    #[error("{points} points stand on the ground together, at least {least} are needed: there is no dough in view")]
+    #[error(
+        "{points} points stand on the ground together, at least {least} are needed: there is no dough in view"
+    )]
     NoDough {
         /// Points of the largest thing on the ground.
         points: usize,
@@ -112,7 +116,9 @@ pub enum DoughError {
         least: usize,
     },
     /// The dough goes on beyond the picture.
-    #[error("the dough lies at the edge of the picture, at column {column:.0} and row {row:.0}: what lies beyond is not seen")]
+    #[error(
+        "the dough lies at the edge of the picture, at column {column:.0} and row {row:.0}: what lies beyond is not seen"
+    )]
     CutOff {
         /// Column of a corner of the rectangle around it.
         column: f64,

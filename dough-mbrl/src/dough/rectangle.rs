@@ -85,8 +85,7 @@ pub fn around(hull: &[[f64; 2]]) -> Option<Rectangle> {
             let d = if d[0] < 0.0 || (d[0] == 0.0 && d[1] < 0.0) { [-d[0], -d[1]] } else { d };
             let yaw_rad = d[1].atan2(d[0]);
             let yaw_rad = if yaw_rad <= -std::f64::consts::FRAC_PI_2 { -yaw_rad } else { yaw_rad };
-            let found =
-                Rectangle { length_m: side.max(rise), width_m: side.min(rise), yaw_rad, centre_m };
+            let found = Rectangle { length_m: side.max(rise), width_m: side.min(rise), yaw_rad, centre_m };
             best = Some((side * rise, found));
         }
     }

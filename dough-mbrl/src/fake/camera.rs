@@ -37,10 +37,7 @@ impl Eye {
             width: 320,
             height: 240,
             intrinsics: Intrinsics { fx: focal, fy: focal, cx: 159.5, cy: 119.5 },
-            pose_in_world: Pose {
-                position_m: [0.4, 0.05, 0.5],
-                rotation_xyzw: [q.i, q.j, q.k, q.w],
-            },
+            pose_in_world: Pose { position_m: [0.4, 0.05, 0.5], rotation_xyzw: [q.i, q.j, q.k, q.w] },
             noise_m: 6e-4,
             holes: 0.02,
             flying: 1e-3,
@@ -122,8 +119,7 @@ impl Top {
         };
         let step = (leave - enter) / STEPS as f64;
         let Some(hit) = (0..=STEPS).find(|k| inside(enter + *k as f64 * step)) else { return leave };
-        let (mut low, mut high) =
-            (enter + (hit as f64 - 1.0).max(0.0) * step, enter + hit as f64 * step);
+        let (mut low, mut high) = (enter + (hit as f64 - 1.0).max(0.0) * step, enter + hit as f64 * step);
         for _ in 0..10 {
             let middle = 0.5 * (low + high);
             if inside(middle) { high = middle } else { low = middle }

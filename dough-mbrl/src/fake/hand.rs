@@ -107,11 +107,16 @@ pub(super) fn press(body: &Body, band: &Elastic, fingers: &Fingers, material: &M
 }
 
 /// Lets the dough flow under a press, then turns it by an angle.
-pub(super) fn knead(body: &mut Body, band: &Elastic, y_m: f64, press: &Press, angle_rad: f64, material: &Material) {
-    let parts: Vec<f64> = body
-        .placed()
-        .map(|(faces, slice)| under(faces, y_m, band.breadth_m) / slice.length_m)
-        .collect();
+pub(super) fn knead(
+    body: &mut Body,
+    band: &Elastic,
+    y_m: f64,
+    press: &Press,
+    angle_rad: f64,
+    material: &Material,
+) {
+    let parts: Vec<f64> =
+        body.placed().map(|(faces, slice)| under(faces, y_m, band.breadth_m) / slice.length_m).collect();
     for (slice, part) in body.slices.iter_mut().zip(parts) {
         let squeeze = slice.height_m() - press.level_m;
         // A slice that is covered in part flows in part.

@@ -69,6 +69,8 @@ pub struct FakeRig {
 
 /// Fastest motion of the arm, m/s.
 const FASTEST_M_S: f64 = 0.5;
+/// Lowest level of the tool, m: a camera sees the table's level to a fraction of this.
+const LOWEST_M: f64 = -2e-3;
 /// The gripper's limits, m.
 const THROWS_M: (f64, f64) = (0.01, 0.12);
 /// Contact is followed in steps of this size, m.
@@ -143,15 +145,17 @@ impl FakeRig {
     /// The true length, width and height, m, for those who judge.
     pub fn truth(&self) -> [f64; 3] {
         let most = |f: fn(&super::body::Slice) -> f64| self.body.slices.iter().map(f).fold(0.0, f64::max);
-        [self.body.length_m(), 2.0 * most(super::body::Slice::half_width_m), most(super::body::Slice::height_m)]
+        [
+            self.body.length_m(),
+            2.0 * most(super::body::Slice::half_width_m),
+            most(super::body::Slice::height_m),
+        ]
     }
 
     /// Force on the probe under the band, N, as a force sensor below it tells it; zero where the band is free.
     pub fn probe_force_n(&self) -> f64 {
         match self.rigid {
-            Some(diameter) => {
-                self.band.force_n(self.fingers.throw_m, diameter - self.fingers.at_m[2], 0.0)
-            }
+            Some(diameter) => self.band.force_n(self.fingers.throw_m, diameter - self.fingers.at_m[2], 0.0),
             None => press(&self.body, &self.band, &self.fingers, &self.material()).map_or(0.0, |p| p.force_n),
         }
     }
@@ -193,7 +197,8 @@ impl FakeRig {
 
     fn contact(&mut self, dx: f64, dt: f64) {
         let material = self.material();
-        let pressed = if self.rigid.is_some() { None } else { press(&self.body, &self.band, &self.fingers, &material) };
+        let pressed =
+            if self.rigid.is_some() { None } else { press(&self.body, &self.band, &self.fingers, &material) };
         let Some(pressed) = pressed else {
             if self.touching {
                 self.lift();
@@ -280,7 +285,7 @@ impl Arm for FakeRig {
     fn move_to(&mut self, tool_in_base: Pose, deadline_s: f64) -> Result<(), FakeError> {
         let p = tool_in_base.position_m;
         let size = tool_in_base.rotation_xyzw.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let inside = p.iter().all(|v| v.abs() < 1.0) && p[2] >= 0.0;
+        let inside = p.iter().all(|v| v.abs() < 1.0) && p[2] >= LOWEST_M;
         if !(inside && (size - 1.0).abs() < 1e-6 && deadline_s > 0.0 && deadline_s.is_finite()) {
             return Err(FakeError::OutOfRange);
         }
