@@ -67,6 +67,14 @@ impl Powell {
         Ok(powell)
     }
 
+    /// How finely lines are searched: costs asked for at most, and the part of a line to which a place is found. By default 16
+    /// and 2e-3: enough to plan, coarse for a narrow valley.
+    #[must_use]
+    pub fn with_lines(mut self, most: usize, precision: f64) -> Self {
+        self.line = Line { most, precision: precision.clamp(1e-12, 0.5) };
+        self
+    }
+
     fn reset(&mut self) {
         let n = self.low.len();
         self.directions.fill(0.0);

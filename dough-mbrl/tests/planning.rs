@@ -1,4 +1,10 @@
 //! Dynamics against slow references, planners against their bounds and against known optima.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use argmin::core::{CostFunction, Error, Executor, State as _};
 use dough_mbrl::cem::{Cem, CemSettings};
@@ -230,13 +236,13 @@ impl CostFunction for Bowl {
 
 #[test]
 fn powell_finds_known_minima_and_stays_in_its_box() {
-    let powell = Powell::new(vec![-2.0; 2], vec![2.0; 2], 1e-12).unwrap();
+    let powell = Powell::new(vec![-2.0; 2], vec![2.0; 2], 1e-12).unwrap().with_lines(60, 1e-8);
     let run = Executor::new(Valley, powell)
         .configure(|s| s.param(vec![-1.2, 1.0]).max_iters(400))
         .ctrlc(false)
         .run();
     let best = run.unwrap().state().get_best_param().unwrap().clone();
-    assert!((best[0] - 1.0).abs() < 0.02 && (best[1] - 1.0).abs() < 0.04, "{best:?}");
+    assert!((best[0] - 1.0).abs() < 1e-4 && (best[1] - 1.0).abs() < 1e-4, "{best:?}");
     // On the face x0 = 1 the bowl's least x1 is 0.3 + 1/2.
     let powell = Powell::new(vec![0.0; 3], vec![1.0; 3], 1e-12).unwrap();
     let run =

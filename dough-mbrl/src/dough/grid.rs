@@ -15,6 +15,8 @@ pub(super) struct Grid {
 const MOST_ALONG: f64 = 2000.0;
 /// Cells about the highest one through whose medians a quadric is laid, to each side.
 const PATCH: usize = 3;
+/// Part of the height above which a cell belongs to the top.
+const LEAST_HEIGHT: f64 = 0.85;
 /// Cells that a quadric needs.
 const LEAST_CELLS: usize = 18;
 
@@ -102,7 +104,7 @@ impl Grid {
             near.clear();
             near.extend(self.around(at, 1).map(|k| medians[k]).filter(|m| m.is_finite()));
             let middle = near.len() / 2;
-            if near.len() < 4 { f64::NAN } else { *near.select_nth_unstable_by(middle, f64::total_cmp).1 }
+            if near.len() < 6 { f64::NAN } else { *near.select_nth_unstable_by(middle, f64::total_cmp).1 }
         };
         let smoothed: Vec<f64> = (0..medians.len()).map(&mut smooth).collect();
         let finite = smoothed.iter().enumerate().filter(|(_, m)| m.is_finite());
@@ -117,18 +119,18 @@ impl Grid {
     }
 
     /// The highest point of the quadric through the medians about a cell; the cell itself where there is no such quadric.
-    fn summit(&self, medians: &[f64], at: usize, level: f64) -> (f64, [f64; 2]) {
+    fn summit(&self, medians: &[f64], at_cell: usize, level: f64) -> (f64, [f64; 2]) {
         let place = |k: usize| [(k % self.columns) as f64, (k / self.columns) as f64];
-        let [c, r] = place(at);
+        let [c, r] = place(at_cell);
         let reach = PATCH as f64 + 0.5;
         let row = |u: f64, v: f64| SVector::<f64, 6>::new(1.0, u, v, u * u, u * v, v * v);
         let (mut a, mut b) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
         let mut cells = 0;
-        for k in self.around(at, PATCH).filter(|k| medians[*k].is_finite()) {
+        for k in self.around(at_cell, PATCH) {
             let [x, y] = place(k);
             let (u, v) = ((x - c) / reach, (y - r) / reach);
-            // Steep flanks are no part of the top.
-            if medians[k] > 0.6 * level {
+            // Steep flanks are no part of the top: an ellipse is a parabola only near it.
+            if medians[k] > LEAST_HEIGHT * level {
                 a += row(u, v) * row(u, v).transpose();
                 b += row(u, v) * medians[k];
                 cells += 1;
@@ -144,14 +146,19 @@ impl Grid {
             return (level, metres(0.0, 0.0));
         };
         let at = |u: f64, v: f64| row(u, v).dot(&k);
-        // The vertex of a quadric may be a saddle or far off: the best of a fine raster of the inner patch is neither.
-        const RASTER: i32 = 8;
-        let steps = (-RASTER..=RASTER).map(|i| 0.5 * f64::from(i) / f64::from(RASTER));
-        let inner = steps.clone().flat_map(|u| steps.clone().map(move |v| (u, v)));
+        // The vertex of a quadric may be a saddle or far off; the best place of a cell that was seen is neither.
+        let seen = self.around(at_cell, PATCH).filter(|k| medians[*k] > LEAST_HEIGHT * level);
+        let third = 1.0 / (3.0 * reach);
+        let places = seen.flat_map(|k| {
+            let [x, y] = place(k);
+            let (u, v) = ((x - c) / reach, (y - r) / reach);
+            [-third, 0.0, third].into_iter().flat_map(move |a| [-third, 0.0, third].map(|b| (u + a, v + b)))
+        });
+        let inner = places.filter(|(u, v)| u.abs() < 0.5 && v.abs() < 0.5);
         let (u, v) =
             inner.fold((0.0, 0.0), |best, p| if at(p.0, p.1) > at(best.0, best.1) { p } else { best });
         let top = at(u, v);
         // A quadric over a few cells at an end of the dough may rise out of it.
-        if (top - level).abs() < 0.1 * level { (top, metres(u, v)) } else { (level, metres(0.0, 0.0)) }
+        if (top - level).abs() < 0.05 * level { (top, metres(u, v)) } else { (level, metres(0.0, 0.0)) }
     }
 }

@@ -76,7 +76,7 @@ const THROWS_M: (f64, f64) = (0.01, 0.12);
 /// Contact is followed in steps of this size, m.
 const STEP_M: f64 = 1.5e-3;
 /// Friction of the band on dough.
-const FRICTION: f64 = 0.3;
+const FRICTION: f64 = 0.25;
 /// Time in which springback comes back, s.
 const RECOVERY_S: f64 = 2.0;
 /// Elastic modulus over hardness.
