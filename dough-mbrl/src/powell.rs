@@ -150,8 +150,8 @@ impl Powell {
         }
         if most > 0.0 {
             // Where the sweep would lead if it were made once more; beyond the box there is nothing to learn.
-            for k in 0..n {
-                self.trial[k] = (2.0 * x[k] - self.before[k]).clamp(self.low[k], self.high[k]);
+            for (k, &x) in x.iter().enumerate() {
+                self.trial[k] = (2.0 * x - self.before[k]).clamp(self.low[k], self.high[k]);
             }
             let mut trial = std::mem::take(&mut self.trial);
             let beyond = cost(&mut trial);

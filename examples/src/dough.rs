@@ -77,14 +77,14 @@ pub fn rollouts(
 
 /// Mean and half of its 95 % interval (normal) of some values.
 pub fn mean_and_half(values: &[f64]) -> (f64, f64) {
-    let n = values.len().max(1) as f64;
+    let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     (mean, 1.96 * (variance / n).sqrt())
 }
 
-/// Rolls of each rollout, and how many ended beyond the goal or never reached it.
+/// Rolls of each rollout that did not roll past its goal (one that never reached it counts all its rolls), and how many missed it.
 pub fn counts(rollouts: &[Rollout]) -> (Vec<f64>, usize) {
-    let counts = rollouts.iter().map(|r| r.rolls.len() as f64).collect();
-    (counts, rollouts.iter().filter(|r| r.end != End::Reached).count())
+    let kept = rollouts.iter().filter(|r| r.end != End::TooLong);
+    (kept.map(|r| r.rolls.len() as f64).collect(), rollouts.iter().filter(|r| r.end != End::Reached).count())
 }

@@ -261,9 +261,9 @@ impl FakeRig {
         for (slice, (length, oval)) in self.body.slices.iter_mut().zip(&mut self.coming_back) {
             slice.length_m += part * *length;
             *length *= 1.0 - part;
-            for k in 0..2 {
-                slice.oval_m[k] += part * oval[k];
-                oval[k] *= 1.0 - part;
+            for (now, back) in slice.oval_m.iter_mut().zip(oval) {
+                *now += part * *back;
+                *back *= 1.0 - part;
             }
         }
     }
