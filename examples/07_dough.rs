@@ -199,10 +199,9 @@ fn figure_7_5(
     let show = |name: &str, done: &[Rollout]| {
         let (rolls, off) = counts(done);
         let (mean, half) = mean_and_half(&rolls);
-        println!(
-            "  {name:44} {mean:>6.1} +- {half:.1}{}",
-            if off > 0 { format!("  ({off} missed)") } else { String::new() }
-        );
+        let rolls = if rolls.is_empty() { "-".into() } else { format!("{mean:.1} +- {half:.1}") };
+        let missed = if off > 0 { format!("  ({off} missed)") } else { String::new() };
+        println!("  {name:44} {rolls:>14}{missed}");
         mean
     };
     let run = |kind, inches: f64, seeds, make: Make<'_>| rollouts(kind, NONE, inches * INCH_M, seeds, make);
@@ -221,7 +220,7 @@ fn figure_7_5(
         show("dough C to 4 in, model A, fixed", &fixed_c),
         show("dough C to 4 in, model A, refined", &refined_c),
     );
-    println!("  refined: {:.1} % fewer rolls on average (thesis 45.8 %)", 0.5 * (at_a + at_c));
+    println!("  refined: {} fewer rolls on average (thesis 45.8 %)", average(&[at_a, at_c]));
     println!("figure 7.5 b: wrong model or matched by stiffness, both refined, {} rollouts", size.ten);
     let n = 300..300 + size.ten;
     let mut gains = Vec::new();
@@ -243,7 +242,7 @@ fn figure_7_5(
             lines.push(picture::Lines::of("stiffness-matched", &with_right));
         }
     }
-    println!("  matched: {:.1} % fewer rolls on average (thesis 39.6 %)", gains.iter().sum::<f64>() / 3.0);
+    println!("  matched: {} fewer rolls on average (thesis 39.6 %)", average(&gains));
     lines.insert(0, picture::Lines::of("wrong, refined", &refined_a));
     lines.insert(0, picture::Lines::of("wrong, fixed", &fixed_a));
     println!("figure 7.6: actions over the progress of dough A (throw / depth, mm, by fifths of a rollout)");
@@ -253,6 +252,17 @@ fn figure_7_5(
         println!();
     }
     Ok(lines)
+}
+
+/// The mean of the gains that are known: where all rollouts missed the goal there is none.
+fn average(gains: &[f64]) -> String {
+    let known: Vec<f64> = gains.iter().copied().filter(|g| g.is_finite()).collect();
+    let of = if known.len() < gains.len() {
+        format!(" ({} of {} doughs)", known.len(), gains.len())
+    } else {
+        String::new()
+    };
+    format!("{:.1} %{of}", mean_and_half(&known).0)
 }
 
 /// Bars and lines as SVG.

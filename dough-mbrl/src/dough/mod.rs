@@ -41,13 +41,15 @@ impl Shape {
 }
 
 impl Shape {
-    /// Corners of its rectangle, on the ground, m.
-    fn corners(&self) -> [[f64; 3]; 4] {
+    /// Corners of the box around it, m.
+    fn corners(&self) -> [[f64; 3]; 8] {
         let (s, c) = self.yaw_rad.sin_cos();
         let [x, y] = self.centre_m;
-        [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(a, b)| {
-            let (a, b) = (0.5 * a * self.length_m, 0.5 * b * self.width_m);
-            [x + c * a - s * b, y + s * a + c * b, self.ground_m]
+        std::array::from_fn(|k| {
+            let side = |bit: usize| if k >> bit & 1 == 0 { -0.5 } else { 0.5 };
+            let (a, b) = (side(0) * self.length_m, side(1) * self.width_m);
+            let z = self.ground_m + (side(2) + 0.5) * self.height_m;
+            [x + c * a - s * b, y + s * a + c * b, z]
         })
     }
 }
@@ -120,7 +122,7 @@ pub enum DoughError {
         "the dough lies at the edge of the picture, at column {column:.0} and row {row:.0}: what lies beyond is not seen"
     )]
     CutOff {
-        /// Column of a corner of the rectangle around it.
+        /// Column of a corner of the box around it.
         column: f64,
         /// Its row.
         row: f64,
