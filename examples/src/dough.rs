@@ -1,16 +1,18 @@
 //! Rolled doughs for examples and benches: exploration, rollouts of a policy, many at a time.
 
+use dough_mbrl::dough::DoughError;
 use dough_mbrl::dynamics::Roll;
 use dough_mbrl::fake::{DoughKind, Effects, FakeRig};
 use dough_mbrl::goal::Goal;
 use dough_mbrl::policy::{Explore, Policy};
+use dough_mbrl::roll::RigError;
 use dough_mbrl::rollout::{End, Rolled, Rollout, RolloutError, Setup};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// A dough is put aside once it is this long: further on it leaves the picture.
-const LONGEST_M: f64 = 0.27;
+const LONGEST_M: f64 = 0.26;
 
 /// Random rolls on fresh doughs, one list a dough.
 ///
@@ -35,11 +37,19 @@ pub fn explore(
             doughs.push(Vec::new());
             shape = setup.look(&mut rig)?;
         }
-        let (rolled, after) = setup.step(&mut rig, &mut Explore, &goal, &shape, &mut rng)?;
-        if let Some(last) = doughs.last_mut() {
-            last.push(rolled);
+        match setup.step(&mut rig, &mut Explore, &goal, &shape, &mut rng) {
+            Ok((rolled, after)) => {
+                if let Some(last) = doughs.last_mut() {
+                    last.push(rolled);
+                }
+                (shape, left) = (after, left - 1);
+            }
+            // The last roll took it out of the picture: the next dough.
+            Err(RolloutError::Rig(RigError::Dough(DoughError::CutOff { .. }))) => {
+                shape.length_m = f64::INFINITY
+            }
+            Err(error) => return Err(error),
         }
-        (shape, left) = (after, left - 1);
     }
     Ok(doughs)
 }
