@@ -46,7 +46,7 @@ impl Shape {
         let (s, c) = self.yaw_rad.sin_cos();
         let [x, y] = self.centre_m;
         std::array::from_fn(|k| {
-            let side = |bit: usize| if k >> bit & 1 == 0 { -0.5 } else { 0.5 };
+            let side = |bit: usize| if (k >> bit) & 1 == 0 { -0.5 } else { 0.5 };
             let (a, b) = (side(0) * self.length_m, side(1) * self.width_m);
             let z = self.ground_m + (side(2) + 0.5) * self.height_m;
             [x + c * a - s * b, y + s * a + c * b, z]
