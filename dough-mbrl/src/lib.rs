@@ -1,6 +1,23 @@
 #![doc = include_str!("../README.md")]
 
 pub mod band;
+pub mod cem;
+pub mod dough;
 pub mod dynamics;
+#[cfg(feature = "fake")]
+pub mod fake;
 pub mod features;
 pub mod filter;
+pub mod goal;
+pub mod matching;
+pub mod mpc;
+pub mod network;
+pub mod objective;
+pub mod policy;
+pub mod powell;
+pub mod predictor;
+pub mod process;
+pub mod ridge;
+pub mod roll;
+pub mod rollout;
+pub mod stiffness;

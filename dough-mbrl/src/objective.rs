@@ -1,0 +1,132 @@
+//! What a plan is worth: the discounted objective of eq. 7.1 over predicted states.
+
+use crate::dynamics::{Action, State};
+use crate::goal::Goal;
+use crate::predictor::{PlanError, Predictor};
+use crate::roll::Limits;
+
+/// The objective of a planner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worth {
+    /// Rolls that are looked ahead: H.
+    pub horizon: usize,
+    /// Discount of each further roll: gamma, in (0, 1].
+    pub discount: f64,
+    /// Cost of each sigma of a predicted state, in its own metres: 0 plans as if the dynamics were certain; 1 is cautious.
+    pub caution: f64,
+    /// Part of the goal's tolerance within which a predicted state counts as there: a plan that only just enters it misses half of
+    /// the time, and what is too long stays too long. In (0, 1].
+    pub aim: f64,
+}
+
+impl Default for Worth {
+    /// Ten rolls, 0.9, certain; a third of the tolerance.
+    fn default() -> Self {
+        Self { horizon: 10, discount: 0.9, caution: 0.0, aim: 1.0 / 3.0 }
+    }
+}
+
+/// Most rolls that are looked ahead.
+pub const MOST_HORIZON: usize = 50;
+
+impl Worth {
+    pub(crate) fn check(&self) -> Result<(), PlanError> {
+        let h = self.horizon as f64;
+        PlanError::setting("horizon", h, (1..=MOST_HORIZON).contains(&self.horizon), "1 to 50 rolls")?;
+        let good = self.discount > 0.0 && self.discount <= 1.0;
+        PlanError::setting("discount", self.discount, good, "above 0, at most 1")?;
+        let good = self.caution >= 0.0 && self.caution.is_finite();
+        PlanError::setting("caution", self.caution, good, "at least 0, finite")?;
+        PlanError::setting("aim", self.aim, self.aim > 0.0 && self.aim <= 1.0, "above 0, at most 1")
+    }
+}
+
+/// A state from which rolls are planned.
+///
+/// A plan is a place in the unit square for each roll: between the bounds at the state from which that roll is to start. So no plan
+/// leaves the bounds, whatever a planner makes of it.
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
+    /// The dynamics.
+    pub dynamics: &'a dyn Predictor,
+    /// The present state.
+    pub state: State,
+    /// The state to be reached.
+    pub goal: Goal,
+    /// What is allowed.
+    pub limits: Limits,
+    /// What counts.
+    pub worth: Worth,
+}
+
+impl Task<'_> {
+    /// Refuses what cannot be planned.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn check(&self) -> Result<(), PlanError> {
+        self.worth.check()?;
+        PlanError::check(&self.state)?;
+        let middle = self.limits.at(&self.state).place([0.5; 2]);
+        let good = self.dynamics.next(&self.state, &middle).iter().all(|v| v.is_finite());
+        if good { Ok(()) } else { Err(PlanError::Prediction { state: self.state }) }
+    }
+
+    /// Length of a plan: two numbers a roll.
+    pub fn len(&self) -> usize {
+        2 * self.worth.horizon
+    }
+
+    /// Whether there is nothing to plan; never for a task that was checked.
+    pub fn is_empty(&self) -> bool {
+        self.worth.horizon == 0
+    }
+
+    /// The cost of a plan, m: the sum of the discounted distances from the goal after each roll; the reward of eq. 7.1 with the sign
+    /// turned. What is at the goal stays there. Allocates nothing beyond what the dynamics do.
+    pub fn cost(&self, plan: &[f64]) -> f64 {
+        let mut state = self.state;
+        let (mut cost, mut discount) = (0.0, 1.0);
+        for unit in plan.chunks_exact(2).take(self.worth.horizon) {
+            if self.goal.distance_m(&state) < self.worth.aim * self.goal.within_m {
+                break;
+            }
+            let action = self.limits.at(&state).place([unit[0], unit[1]]);
+            let mut unsure = 0.0;
+            let next = if self.worth.caution > 0.0 {
+                let predicted = self.dynamics.predict(&state, &action);
+                unsure = predicted.iter().map(|p| p.sigma * p.sigma).sum::<f64>().sqrt();
+                predicted.map(|p| p.mean)
+            } else {
+                self.dynamics.next(&state, &action)
+            };
+            // Dynamics that predict no dough predict nothing good.
+            state = next.map(|v| if v.is_nan() { 10.0 } else { v.clamp(1e-3, 10.0) });
+            cost += discount * (self.goal.distance_m(&state) + self.worth.caution * unsure);
+            discount *= self.worth.discount;
+        }
+        cost
+    }
+
+    /// The first roll of a plan.
+    pub fn first(&self, plan: &[f64]) -> Action {
+        let unit = [plan.first().copied().unwrap_or(0.5), plan.get(1).copied().unwrap_or(0.5)];
+        self.limits.at(&self.state).place(unit)
+    }
+}
+
+/// Plans rolls.
+pub trait Planner {
+    /// Improves a plan (two numbers in [0, 1] a roll; what it holds is where to begin) and returns its cost, m.
+    ///
+    /// The plan is lengthened by halves or cut to the task's length; it is never worse than it was.
+    ///
+    /// # Errors
+    /// [`PlanError`]; the plan is then as it was.
+    fn plan(
+        &mut self,
+        task: &Task<'_>,
+        plan: &mut Vec<f64>,
+        rng: &mut dyn rand::Rng,
+    ) -> Result<f64, PlanError>;
+}

@@ -1,0 +1,151 @@
+//! Rollouts: a policy rolls a dough on a rig until the goal.
+
+use hw_traits::arm::{Arm, Pose};
+use hw_traits::camera::DepthCamera;
+use hw_traits::clock::Clock;
+use hw_traits::gripper::Gripper;
+use rand::Rng;
+
+use crate::dough::{Shape, View};
+use crate::dynamics::Roll;
+use crate::goal::{Goal, GoalError};
+use crate::policy::Policy;
+use crate::predictor::PlanError;
+use crate::roll::{Handling, Limits, Motion, RigError, Side, look};
+
+/// All that a rollout is told, but rig and policy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup {
+    /// How pictures are read.
+    pub view: View,
+    /// The camera in the base frame.
+    pub camera_in_world: Pose,
+    /// How the rig moves.
+    pub handling: Handling,
+    /// What is allowed.
+    pub limits: Limits,
+    /// Rolls at most.
+    pub most_rolls: usize,
+}
+
+impl Setup {
+    /// The defaults, for a camera.
+    pub fn of(camera_in_world: Pose) -> Self {
+        Self {
+            view: View::default(),
+            camera_in_world,
+            handling: Handling::default(),
+            limits: Limits::default(),
+            most_rolls: 150,
+        }
+    }
+}
+
+/// One roll of a rollout.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rolled {
+    /// What was seen before and after it, and what was done.
+    pub roll: Roll,
+    /// When it began, on the rig's clock, s.
+    pub t_s: f64,
+}
+
+/// How a rollout ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The goal was reached.
+    Reached,
+    /// The dough is longer than the goal and its tolerance: it cannot be rolled back.
+    TooLong,
+    /// All rolls were made.
+    OutOfRolls,
+}
+
+/// A rollout that ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rollout {
+    /// Its rolls.
+    pub rolls: Vec<Rolled>,
+    /// Its end.
+    pub end: End,
+}
+
+/// Why a rollout broke off; what was rolled until then has been learned by the policy.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RolloutError {
+    /// The rig failed.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The policy had no answer.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The goal is none for this dough.
+    #[error(transparent)]
+    Goal(#[from] GoalError),
+}
+
+impl Setup {
+    /// Looks at the dough.
+    ///
+    /// # Errors
+    /// [`RigError`].
+    pub fn look<R: DepthCamera>(&self, rig: &mut R) -> Result<Shape, RigError> {
+        look(rig, &self.view, &self.camera_in_world)
+    }
+
+    /// One roll of a policy: looks, acts, rolls, looks again.
+    ///
+    /// # Errors
+    /// [`RolloutError`].
+    pub fn step<R: Arm + Gripper + DepthCamera + Clock>(
+        &self,
+        rig: &mut R,
+        policy: &mut dyn Policy,
+        goal: &Goal,
+        before: &Shape,
+        rng: &mut dyn Rng,
+    ) -> Result<(Rolled, Shape), RolloutError> {
+        let mut rng = rng;
+        let state = before.state();
+        let action = policy.act(&state, goal, &self.limits, rng)?;
+        let t_s = rig.now_s().map_err(crate::roll::device("reading the clock"))?;
+        let motion = Motion::constrained(before, action);
+        self.handling.roll(rig, before.ground_m, &motion, Side::draw(&mut rng))?;
+        let after = self.look(rig)?;
+        let roll = Roll { state, action, next: after.state() };
+        policy.learn(&roll)?;
+        Ok((Rolled { roll, t_s }, after))
+    }
+
+    /// Rolls the dough to a goal.
+    ///
+    /// # Errors
+    /// [`RolloutError`].
+    pub fn run<R: Arm + Gripper + DepthCamera + Clock>(
+        &self,
+        rig: &mut R,
+        policy: &mut dyn Policy,
+        goal: &Goal,
+        volume_m3: f64,
+        rng: &mut dyn Rng,
+    ) -> Result<Rollout, RolloutError> {
+        let mut shape = self.look(rig)?;
+        goal.check(&shape.state(), volume_m3, &self.limits)?;
+        let mut rolls = Vec::new();
+        loop {
+            let end = if goal.reached(&shape.state()) {
+                End::Reached
+            } else if shape.length_m > goal.state[0] + goal.within_m {
+                End::TooLong
+            } else if rolls.len() >= self.most_rolls {
+                End::OutOfRolls
+            } else {
+                let (rolled, after) = self.step(rig, policy, goal, &shape, rng)?;
+                rolls.push(rolled);
+                shape = after;
+                continue;
+            };
+            return Ok(Rollout { rolls, end });
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Rolled doughs for examples and benches: exploration, rollouts of a policy, many at a time.
+
+use dough_mbrl::dough::DoughError;
+use dough_mbrl::dynamics::Roll;
+use dough_mbrl::fake::{DoughKind, Effects, FakeRig};
+use dough_mbrl::goal::Goal;
+use dough_mbrl::policy::{Explore, Policy};
+use dough_mbrl::roll::RigError;
+use dough_mbrl::rollout::{End, Rolled, Rollout, RolloutError, Setup};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// A dough is put aside once it is this long: further on it leaves the picture.
+const LONGEST_M: f64 = 0.26;
+
+/// Random rolls on fresh doughs, one list a dough.
+///
+/// # Errors
+/// [`RolloutError`].
+pub fn explore(
+    kind: DoughKind,
+    effects: Effects,
+    rolls: usize,
+    seed: u64,
+) -> Result<Vec<Vec<Rolled>>, RolloutError> {
+    let mut rig = FakeRig::new(kind, effects, seed);
+    let setup = Setup::of(rig.camera_in_world());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Random rolls look at no goal.
+    let goal = Goal::cylinder(LONGEST_M, kind.volume_m3)?;
+    let (mut doughs, mut left) = (vec![Vec::new()], rolls);
+    let mut shape = setup.look(&mut rig)?;
+    while left > 0 {
+        if shape.length_m > LONGEST_M {
+            rig.renew(kind);
+            doughs.push(Vec::new());
+            shape = setup.look(&mut rig)?;
+        }
+        match setup.step(&mut rig, &mut Explore, &goal, &shape, &mut rng) {
+            Ok((rolled, after)) => {
+                if let Some(last) = doughs.last_mut() {
+                    last.push(rolled);
+                }
+                (shape, left) = (after, left - 1);
+            }
+            // The last roll took it out of the picture: the next dough.
+            Err(RolloutError::Rig(RigError::Dough(DoughError::CutOff { .. }))) => {
+                shape.length_m = f64::INFINITY
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(doughs)
+}
+
+/// All rolls of some doughs.
+pub fn rolls(doughs: &[Vec<Rolled>]) -> Vec<Roll> {
+    doughs.iter().flatten().map(|r| r.roll).collect()
+}
+
+/// A policy made anew for each rollout.
+pub type Make<'a> = &'a (dyn Fn(u64) -> Result<Box<dyn Policy>, RolloutError> + Sync);
+
+/// Rollouts to a length, each on a rig of its own, in order.
+///
+/// # Errors
+/// The first [`RolloutError`].
+pub fn rollouts(
+    kind: DoughKind,
+    effects: Effects,
+    length_m: f64,
+    seeds: std::ops::Range<u64>,
+    make: Make<'_>,
+) -> Result<Vec<Rollout>, RolloutError> {
+    seeds
+        .into_par_iter()
+        .map(|seed| {
+            let mut rig = FakeRig::new(kind, effects, seed);
+            let setup = Setup::of(rig.camera_in_world());
+            let goal = Goal::cylinder(length_m, kind.volume_m3)?;
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            setup.run(&mut rig, &mut *make(seed)?, &goal, kind.volume_m3, &mut rng)
+        })
+        .collect()
+}
+
+/// Mean and half of its 95 % interval (normal) of some values.
+pub fn mean_and_half(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    (mean, 1.96 * (variance / n).sqrt())
+}
+
+/// Rolls of each rollout that did not roll past its goal (one that never reached it counts all its rolls), and how many missed it.
+pub fn counts(rollouts: &[Rollout]) -> (Vec<f64>, usize) {
+    let kept = rollouts.iter().filter(|r| r.end != End::TooLong);
+    (kept.map(|r| r.rolls.len() as f64).collect(), rollouts.iter().filter(|r| r.end != End::Reached).count())
+}
