@@ -35,6 +35,9 @@ pub struct Key {
     pub unlisted: Option<String>,
     /// Where a local effect acts.
     pub place: Option<Place>,
+    /// How strong what is hidden is, where the maker knows it: the root of the sum of squares, in sigmas of white noise, of what
+    /// it does to the readings beyond what the baseline's own unknowns can take away.
+    pub strength: Option<f64>,
 }
 
 /// A parameter of a hidden mechanism.
@@ -71,13 +74,20 @@ pub trait Maker: Sync {
 
 /// All makers.
 pub fn makers() -> &'static [&'static dyn Maker] {
-    &[&crate::flights::Flights, &crate::bounces::Bounces]
+    &[&crate::flights::Flights, &crate::bounces::Bounces, &crate::waves::Waves]
 }
 
 impl Key {
     /// An answer without parameters or place.
     pub fn new(hidden: Hidden) -> Self {
-        Self { hidden, mechanisms: Vec::new(), parameters: Vec::new(), unlisted: None, place: None }
+        Self {
+            hidden,
+            mechanisms: Vec::new(),
+            parameters: Vec::new(),
+            unlisted: None,
+            place: None,
+            strength: None,
+        }
     }
 
     /// Adds a mechanism at work, with its parameters.
@@ -126,6 +136,16 @@ pub(crate) mod draw {
             (0..count.min(of)).map(|_| all.swap_remove(whole(rng, 0, all.len() - 1))).collect();
         chosen.sort_unstable();
         chosen
+    }
+
+    /// How strong an effect is to be, in the sigmas of [`super::Key::strength`]: from faint to strong.
+    pub(crate) fn strength(rng: &mut impl Rng) -> f64 {
+        log_between(rng, 3.0, 150.0)
+    }
+
+    /// A sigma as a calibration states it: 2 % off at most.
+    pub(crate) fn stated(rng: &mut impl Rng, sigma: f64) -> f64 {
+        sigma * between(rng, 0.98, 1.02)
     }
 
     /// Noise of the given sigma, as sensors have it: white, or correlated from row to row, or rounded to a coarse digit.

@@ -8,3 +8,7 @@ pub mod flight;
 pub mod flights;
 pub mod noise;
 pub mod pendulum;
+mod quadrature;
+mod sizing;
+pub mod wave;
+pub mod waves;
