@@ -74,7 +74,7 @@ pub trait Maker: Sync {
 
 /// All makers.
 pub fn makers() -> &'static [&'static dyn Maker] {
-    &[&crate::flights::Flights, &crate::bounces::Bounces, &crate::waves::Waves]
+    &[&crate::flights::Flights, &crate::bounces::Bounces, &crate::waves::Waves, &crate::tilts::Tilts]
 }
 
 impl Key {
@@ -143,9 +143,14 @@ pub(crate) mod draw {
         log_between(rng, 3.0, 150.0)
     }
 
-    /// A sigma as a calibration states it: 2 % off at most.
-    pub(crate) fn stated(rng: &mut impl Rng, sigma: f64) -> f64 {
-        sigma * between(rng, 0.98, 1.02)
+    /// One sigma of readings with their rounding, as a calibration finds it.
+    pub(crate) fn sigma(noise: &Noise) -> f64 {
+        noise.sigma.hypot(noise.digit / 12f64.sqrt())
+    }
+
+    /// That sigma as it is stated: 2 % off at most.
+    pub(crate) fn stated(rng: &mut impl Rng, noise: &Noise) -> f64 {
+        sigma(noise) * between(rng, 0.98, 1.02)
     }
 
     /// Noise of the given sigma, as sensors have it: white, or correlated from row to row, or rounded to a coarse digit.

@@ -10,5 +10,7 @@ pub mod noise;
 pub mod pendulum;
 mod quadrature;
 mod sizing;
+pub mod tilt;
+pub mod tilts;
 pub mod wave;
 pub mod waves;

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{between, choose, log_between, noise, sign, stated, strength, whole};
+use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
 use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
 use crate::noise::Noise;
 use crate::sizing::{Basis, change, sized};
@@ -23,11 +23,15 @@ const UNLISTED: usize = 4;
 struct SetUp {
     world: WaveWorld,
     noise: Noise,
+    /// One sigma of a reading.
+    sigma: f64,
     /// Whether the sideways force was recorded in place of the torque.
     sideways: bool,
     /// The second mode's and the arm's angular frequency and damping ratio.
     rings: [[f64; 2]; 2],
     hardens: f64,
+    least_tension_n_m: f64,
+    lag_s: f64,
     machine: [f64; 2],
     slip_s: f64,
 }
@@ -84,6 +88,7 @@ impl SetUp {
         let sideways = whole(rng, 0, 3) == 0;
         // A force is the torque over the arm it acts with, 5 to 15 cm.
         let sigma = if sideways { log_between(rng, 2e-3, 1e-2) } else { log_between(rng, 1.5e-4, 5e-4) };
+        let noise = draw::noise(rng, sigma);
         let radius_m = between(rng, 0.03, 0.055);
         // A leak is seen by the bottom, so the liquid must not be deep.
         let depth = radius_m * if leaks { between(rng, 0.4, 0.7) } else { log_between(rng, 0.6, 2.8) };
@@ -122,7 +127,18 @@ impl SetUp {
         let hardens = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
         let machine = [modes[0] * between(rng, 1.15, 1.8), duration_s * between(rng, 0.2, 0.6)];
         let slip_s = duration_s * between(rng, 0.2, 0.8);
-        Self { noise: noise(rng, sigma), world, sideways, rings, hardens, machine, slip_s }
+        Self {
+            sigma: draw::sigma(&noise),
+            noise,
+            least_tension_n_m: log_between(rng, 0.015, 0.05),
+            lag_s: log_between(rng, 0.015, 0.15),
+            world,
+            sideways,
+            rings,
+            hardens,
+            machine,
+            slip_s,
+        }
     }
 
     /// What the amplitude, the phase and the viscosity of each run can do to the readings.
@@ -134,7 +150,7 @@ impl SetUp {
         for (run, start) in w.starts.iter().enumerate() {
             let own = |start: Start, viscosity_m2_s: f64| {
                 let alone = WaveWorld { starts: vec![start], viscosity_m2_s, ..w.clone() };
-                alone.readings().iter().map(|x| x / self.noise.sigma).collect::<Vec<f64>>()
+                alone.readings().iter().map(|x| x / self.sigma).collect::<Vec<f64>>()
             };
             let first = own(*start, w.viscosity_m2_s);
             let mut turned = *start;
@@ -153,7 +169,7 @@ impl SetUp {
     fn change(&self, effects: Effects) -> Vec<f64> {
         let at_work = WaveWorld { effects, ..self.world.clone() };
         let difference = change(&self.world.readings(), &at_work.readings());
-        difference.iter().map(|x| x / self.noise.sigma).collect()
+        difference.iter().map(|x| x / self.sigma).collect()
     }
 
     /// What the listed effects do when they are small.
@@ -172,12 +188,12 @@ impl SetUp {
     fn bounds(&self, listed: usize) -> [f64; 2] {
         let largest = self.largest();
         match listed {
-            0 => [0.015, 0.08],
+            0 => [self.least_tension_n_m, 0.08],
             1 => [2e-4, 0.06],
             2 => [3e-4 * largest, 0.05 * largest],
             3 => [2e-4 / largest, 0.3 / largest],
-            4 | 5 => [0.02 * self.noise.sigma, 0.4 * largest],
-            _ => [0.005, 0.15],
+            4 | 5 => [0.02 * self.sigma, 0.4 * largest],
+            _ => [0.1 * self.sigma, 1.5 * largest],
         }
     }
 
@@ -191,19 +207,26 @@ impl SetUp {
             3 => e.quadratic = size,
             4 => e.second_mode = ring(self.rings[0]),
             5 => e.arm = ring(self.rings[1]),
-            _ => e.lag_s = size,
+            _ => [e.lag_s, e.lag_start] = [self.lag_s, size],
         }
     }
 
     fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
         let ring = |r: &Ring, omega: f64| {
-            [("omega_rad_s", omega), ("damping_ratio", r.damping_ratio), ("amplitude_nm", r.amplitude)]
+            let amplitude = if self.sideways { "amplitude_n" } else { "amplitude_nm" };
+            [("omega_rad_s", omega), ("damping_ratio", r.damping_ratio), (amplitude, r.amplitude)]
         };
         match listed {
             0 => key.add("surface-tension", &[("surface_tension_n_m", e.surface_tension_n_m)]),
             1 => key.add("nonlinear-frequency", &[("coefficient", e.nonlinear_frequency)]),
-            2 => key.add("contact-line-friction", &[("friction_nm", e.friction)]),
-            3 => key.add("quadratic-damping", &[("coefficient_per_nm", e.quadratic)]),
+            2 => {
+                let name = if self.sideways { "friction_n" } else { "friction_nm" };
+                key.add("contact-line-friction", &[(name, e.friction)]);
+            }
+            3 => {
+                let name = if self.sideways { "coefficient_per_n" } else { "coefficient_per_nm" };
+                key.add("quadratic-damping", &[(name, e.quadratic)]);
+            }
             4 => {
                 // Where there is surface tension it moves the second mode as well.
                 let at_work = WaveWorld { effects: *e, ..self.world.clone() };
@@ -217,7 +240,7 @@ impl SetUp {
 
     fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
         match which {
-            0 | 2 => [0.02 * self.noise.sigma, 0.5 * self.largest()],
+            0 | 2 => [0.02 * self.sigma, 0.5 * self.largest()],
             1 => [1e-3, 0.08],
             _ => [0.02, 1.0],
         }
@@ -255,7 +278,7 @@ impl SetUp {
         let channel = if self.sideways { "fx_n" } else { "tau_z_nm" };
         let mut header = String::from("format = 1\ndomain = \"slosh\"\ndata = \"data.csv\"\n");
         if whole(rng, 0, 2) > 0 {
-            let _ = write!(header, "\n[noise]\n{channel} = {:.3e}\n", stated(rng, self.noise.sigma));
+            let _ = write!(header, "\n[noise]\n{channel} = {:.3e}\n", stated(rng, &self.noise));
         }
         let length = between(rng, 3.5, 6.0) * w.radius_m;
         let length = if whole(rng, 0, 3) > 0 { format!(", length_m = {length:.3}") } else { String::new() };
@@ -311,12 +334,13 @@ mod tests {
     fn nuisances_are_taken_whole() {
         let set_up = SetUp::draw(false, &mut ChaCha8Rng::seed_from_u64(5));
         let mut other = set_up.world.clone();
-        other.starts[0].phases_rad[0] += 0.1;
+        other.starts[0].phases_rad[0] += 0.7;
         other.starts[1].amplitude *= 1.2;
         other.viscosity_m2_s *= 1.01;
         let moved = change(&set_up.world.readings(), &other.readings());
-        let moved: Vec<f64> = moved.iter().map(|x| x / set_up.noise.sigma).collect();
+        let moved: Vec<f64> = moved.iter().map(|x| x / set_up.sigma).collect();
         let whole = moved.iter().map(|x| x * x).sum::<f64>().sqrt();
-        assert!(whole > 30.0 && set_up.basis().left(&moved) < 0.01 * whole);
+        let left = set_up.basis().left(&moved);
+        assert!(whole > 30.0 && left < 0.01 * whole, "{left} of {whole}");
     }
 }
