@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-use crate::quadrature::{gauss, integral};
+use crate::quadrature::gauss;
 
 const GRAVITY_M_S2: f64 = 9.80665;
 
@@ -49,12 +49,14 @@ impl Cavity {
         };
         let mut sum = [0.0; 3];
         for pair in ends.windows(2).filter(|pair| pair[1] > pair[0]) {
-            for (i, part) in sum.iter_mut().enumerate() {
-                *part += integral(rule, [pair[0], pair[1]], |a| {
-                    let (x, [from, to]) = (r * a.cos(), column(r * a.cos()));
-                    let area = 2.0 * r * r * a.sin() * a.sin();
-                    area * [to - from, x * (to - from), 0.5 * (to * to - from * from)][i]
-                });
+            let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
+            for [node, weight] in rule {
+                let (sine, cosine) = (middle + half * node).sin_cos();
+                let (x, [from, to]) = (r * cosine, column(r * cosine));
+                let part = half * weight * 2.0 * r * r * sine * sine * (to - from);
+                sum[0] += part;
+                sum[1] += part * x;
+                sum[2] += part * 0.5 * (from + to);
             }
         }
         sum
@@ -65,7 +67,7 @@ impl Cavity {
         let (s, c) = tilt_rad.sin_cos();
         let (across, along) = ((self.radius_m * s).abs(), self.length_m * c);
         let (mut low, mut high) = (along.min(0.0) - across, along.max(0.0) + across);
-        for _ in 0..48 {
+        for _ in 0..44 {
             let middle = 0.5 * (low + high);
             if self.moments(rule(), tilt_rad, middle)[0] < volume_m3 { low = middle } else { high = middle }
         }
