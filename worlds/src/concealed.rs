@@ -74,7 +74,13 @@ pub trait Maker: Sync {
 
 /// All makers.
 pub fn makers() -> &'static [&'static dyn Maker] {
-    &[&crate::flights::Flights, &crate::bounces::Bounces, &crate::waves::Waves, &crate::tilts::Tilts]
+    &[
+        &crate::flights::Flights,
+        &crate::bounces::Bounces,
+        &crate::waves::Waves,
+        &crate::tilts::Tilts,
+        &crate::presses::Presses,
+    ]
 }
 
 impl Key {

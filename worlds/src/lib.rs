@@ -10,6 +10,7 @@ mod layer;
 pub mod noise;
 pub mod pendulum;
 pub mod press;
+pub mod presses;
 mod quadrature;
 mod sizing;
 pub mod tilt;

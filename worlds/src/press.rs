@@ -4,6 +4,7 @@
 use crate::layer::Layer;
 use crate::quadrature::{gauss, integral};
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// A rigid indenter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,6 +76,12 @@ pub struct PressWorld {
     pub effects: Effects,
 }
 
+/// Exact for the springs of all three indenters.
+fn rule() -> &'static [[f64; 2]] {
+    static RULE: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
+    RULE.get_or_init(|| gauss(4))
+}
+
 impl Indenter {
     /// Half-width of the contact of a half-space at a depth.
     fn half_width_m(self, depth_m: f64) -> f64 {
@@ -109,7 +116,7 @@ impl Indenter {
             return 0.0;
         }
         let spring = |x: f64| depth_m - self.profile_m(x);
-        2.0 * plane_pa * integral(&gauss(4), [0.0, self.half_width_m(depth_m)], spring)
+        2.0 * plane_pa * integral(rule(), [0.0, self.half_width_m(depth_m)], spring)
     }
 }
 
@@ -147,7 +154,7 @@ impl PressWorld {
         let mut forces = self.forces(plane, steps, &depths, layer);
         if e.compliance_m_n > 0.0 {
             // The load cell gives way by a small part of the depth: the fixed point is soon found.
-            for _ in 0..40 {
+            for _ in 0..60 {
                 for ((depth, step), force) in depths.iter_mut().zip(steps).zip(&forces) {
                     *depth = step.delta_m - e.compliance_m_n * force;
                 }
