@@ -115,7 +115,8 @@ impl SetUp {
         let plane = softest / (1.0 - poisson_ratio * poisson_ratio);
         let force_n = indenter.force_n(plane, deepest_m);
         // A load cell that suits the forces.
-        let noise = draw::noise(rng, (force_n * log_between(rng, 3e-3, 2e-2)).clamp(5e-4, 1.5e-2));
+        let force = (force_n * log_between(rng, 3e-3, 2e-2)).clamp(5e-4, 1.5e-2);
+        let noise = draw::noise(rng, force);
         Self {
             force_n,
             stiffest_n: force_n * moduli_pa[kinds - 1] / softest,
