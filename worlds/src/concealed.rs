@@ -169,3 +169,83 @@ pub(crate) mod draw {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KINDS: [Hidden; 4] = [Hidden::Nothing, Hidden::One, Hidden::Two, Hidden::Unlisted];
+
+    fn file<'a>(world: &'a Concealed, name: &str) -> &'a str {
+        world.files.iter().find(|(n, _)| n == name).map_or("", |(_, text)| text)
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
+        for maker in makers() {
+            for hidden in KINDS {
+                let world = maker.conceal(hidden, 11);
+                assert_eq!(world, maker.conceal(hidden, 11), "{}", maker.domain());
+                assert_ne!(world.files, maker.conceal(hidden, 12).files, "{}", maker.domain());
+            }
+        }
+    }
+
+    /// Every row has a field a column, finite numbers in all but labels, times that rise within a run, and two runs at least.
+    #[test]
+    fn files_are_well_formed() {
+        const LABELS: [&str; 3] = ["run", "segment", "site"];
+        for (maker, seed) in makers().iter().flat_map(|m| [(m, 3), (m, 4)]) {
+            for hidden in KINDS {
+                let world = maker.conceal(hidden, seed);
+                let header = file(&world, "recording.toml");
+                assert!(header.starts_with("format = 1\n"), "{header}");
+                assert!(header.contains(&format!("domain = \"{}\"\n", maker.domain())), "{header}");
+                assert!(header.contains("data = \"data.csv\"\n"), "{header}");
+                let mut rows = file(&world, "data.csv").lines();
+                let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
+                assert_eq!(columns[0], "run");
+                let time = columns.iter().position(|c| *c == "t_s");
+                let (mut runs, mut before) = (Vec::new(), f64::NEG_INFINITY);
+                for row in rows {
+                    let fields: Vec<&str> = row.split(',').collect();
+                    assert_eq!(fields.len(), columns.len(), "{row}");
+                    for (column, field) in columns.iter().zip(&fields).filter(|(c, _)| !LABELS.contains(c)) {
+                        assert!(field.parse::<f64>().is_ok_and(f64::is_finite), "{column}: {row}");
+                    }
+                    if runs.last() != Some(&fields[0]) {
+                        runs.push(fields[0]);
+                        before = f64::NEG_INFINITY;
+                    }
+                    if let Some(time) = time {
+                        let t: f64 = fields[time].parse().unwrap();
+                        assert!(t > before, "{row}");
+                        before = t;
+                    }
+                }
+                let mut once = runs.clone();
+                once.dedup();
+                assert!(runs.len() >= 2 && once.len() == runs.len(), "{}", maker.domain());
+            }
+        }
+    }
+
+    #[test]
+    fn the_key_says_what_is_hidden() {
+        for (maker, seed) in makers().iter().flat_map(|m| [(m, 21), (m, 22)]) {
+            let keys = KINDS.map(|hidden| maker.conceal(hidden, seed).key);
+            // Wind brings its drag with it.
+            let counts =
+                keys.each_ref().map(|k| k.mechanisms.iter().filter(|m| *m != "quadratic-drag").count());
+            assert!(counts[0] == 0 && counts[1] <= 1 && counts[2] <= 2 && counts[3] == 0, "{keys:?}");
+            assert!(!keys[1].mechanisms.is_empty() && keys[2].mechanisms.len() >= 2, "{keys:?}");
+            for (key, hidden) in keys.iter().zip(KINDS) {
+                assert_eq!((key.hidden, key.unlisted.is_some()), (hidden, hidden == Hidden::Unlisted));
+                assert!(key.parameters.iter().all(|p| p.value.is_finite() && p.value != 0.0), "{key:?}");
+                assert!(key.mechanisms.iter().all(|m| key.parameters.iter().any(|p| p.mechanism == *m)));
+                assert!(key.strength.is_none_or(|s| s > 0.5 && s.is_finite()), "{key:?}");
+                assert!(key.place.as_ref().is_none_or(|p| p.from < p.to), "{key:?}");
+            }
+        }
+    }
+}
