@@ -108,7 +108,8 @@ impl WaveWorld {
         (pull * (k * depth_m).tanh()).sqrt()
     }
 
-    /// Damping ratio of the first mode (thesis, eq. 2.4, with 1.841 for its 1.84: the same digits as the frequency).
+    /// Damping ratio of the first mode (thesis, eq. 2.4).
+    #[allow(clippy::approx_constant, reason = "a fitted coefficient, as printed")]
     fn damping_ratio(&self, depth_m: f64) -> f64 {
         let deep = depth_m / self.radius_m;
         let wall = 0.318 / (1.84 * deep).sinh() * (1.0 + (1.0 - deep) / (1.84 * deep).cosh());
