@@ -36,7 +36,8 @@ pub struct Key {
     /// Where a local effect acts.
     pub place: Option<Place>,
     /// How strong what is hidden is, where the maker knows it: the root of the sum of squares, in sigmas of white noise, of what
-    /// it does to the readings beyond what the baseline's own unknowns can take away.
+    /// it does to the readings beyond what the baseline's own unknowns can take away (and, where it is unlisted, any two listed
+    /// mechanisms with them).
     pub strength: Option<f64>,
 }
 

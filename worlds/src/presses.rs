@@ -74,6 +74,9 @@ impl Maker for Presses {
             set_up.set(&mut effects, listed, size);
             set_up.say(&effects, listed, &mut key);
         }
+        if count > 0 {
+            key.strength = Some(plain.left(&set_up.change(effects)));
+        }
         if hidden == Hidden::Unlisted {
             let bases = plain.with_pairs(&set_up.directions());
             let rest = |e: Effects| {
@@ -84,9 +87,9 @@ impl Maker for Presses {
             let size =
                 sized(wanted, set_up.unlisted_bounds(which), |size| rest(set_up.unlisted(which, size)));
             effects = set_up.unlisted(which, size);
+            key.strength = Some(rest(effects));
             set_up.say_unlisted(which, &mut key);
         }
-        key.strength = (hidden != Hidden::Nothing).then(|| plain.left(&set_up.change(effects)));
         set_up.world.effects = effects;
         let [header, data] = set_up.files(&mut rng);
         Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }

@@ -61,6 +61,9 @@ impl Maker for Tilts {
             set_up.set(&mut effects, listed, size);
             set_up.say(&effects, listed, &mut key);
         }
+        if count > 0 {
+            key.strength = Some(plain.left(&set_up.change(effects)));
+        }
         if hidden == Hidden::Unlisted {
             let which = whole(&mut rng, 0, UNLISTED - 1);
             let bases = plain.with_pairs(&set_up.directions());
@@ -72,9 +75,9 @@ impl Maker for Tilts {
             let bounds = set_up.unlisted_bounds(which);
             let size = sized(wanted, bounds, |size| rest(set_up.unlisted(which, turn, size)));
             effects = set_up.unlisted(which, turn, size);
+            key.strength = Some(rest(effects));
             set_up.say_unlisted(which, &mut key);
         }
-        key.strength = (hidden != Hidden::Nothing).then(|| plain.left(&set_up.change(effects)));
         set_up.world.effects = effects;
         let [header, data] = set_up.files(&mut rng);
         Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }

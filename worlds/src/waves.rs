@@ -64,6 +64,9 @@ impl Maker for Waves {
             set_up.set(&mut effects, listed, size);
             set_up.say(&effects, listed, &mut key);
         }
+        if count > 0 {
+            key.strength = Some(plain.left(&set_up.change(effects)));
+        }
         if hidden == Hidden::Unlisted {
             let bases = plain.with_pairs(&set_up.directions());
             let rest = |e: Effects| {
@@ -74,9 +77,9 @@ impl Maker for Waves {
             let (bounds, turn) = (set_up.unlisted_bounds(which), sign(&mut rng));
             let size = sized(wanted, bounds, |size| rest(set_up.unlisted(which, turn, size)));
             effects = set_up.unlisted(which, turn, size);
+            key.strength = Some(rest(effects));
             set_up.say_unlisted(which, &mut key);
         }
-        key.strength = (hidden != Hidden::Nothing).then(|| plain.left(&set_up.change(effects)));
         set_up.world.effects = effects;
         let [header, data] = set_up.files(&mut rng);
         Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
