@@ -179,9 +179,12 @@ mod tests {
 
     const KINDS: [Hidden; 4] = [Hidden::Nothing, Hidden::One, Hidden::Two, Hidden::Unlisted];
 
-    /// Every maker's worlds of every kind, from a seed each.
-    fn worlds(seed: u64) -> &'static [(&'static str, [Concealed; 4])] {
-        static WORLDS: [OnceLock<Vec<(&'static str, [Concealed; 4])>>; 2] = [const { OnceLock::new() }; 2];
+    /// A domain with worlds of every kind.
+    type Drawn = (&'static str, [Concealed; 4]);
+
+    /// Every maker's worlds, drawn once from each seed.
+    fn worlds(seed: u64) -> &'static [Drawn] {
+        static WORLDS: [OnceLock<Vec<Drawn>>; 2] = [const { OnceLock::new() }; 2];
         let draw = |m: &&'static dyn Maker| (m.domain(), KINDS.map(|hidden| m.conceal(hidden, seed)));
         WORLDS[(seed % 2) as usize].get_or_init(|| makers().iter().map(draw).collect())
     }
