@@ -37,6 +37,10 @@ pub struct Key {
     pub unlisted: Option<String>,
     /// Where a local effect acts.
     pub place: Option<Place>,
+    /// How strong what is hidden is, where the maker knows it: the root of the sum of squares, in sigmas of white noise, of what
+    /// it does to the readings beyond what the baseline's own unknowns can take away (and, where it is unlisted, any two listed
+    /// mechanisms with them).
+    pub strength: Option<f64>,
 }
 
 /// A parameter of a hidden mechanism.
@@ -73,7 +77,13 @@ pub trait Maker: Sync {
 
 /// All makers.
 pub fn makers() -> &'static [&'static dyn Maker] {
-    &[&crate::flights::Flights, &crate::bounces::Bounces]
+    &[
+        &crate::flights::Flights,
+        &crate::bounces::Bounces,
+        &crate::waves::Waves,
+        &crate::tilts::Tilts,
+        &crate::presses::Presses,
+    ]
 }
 
 impl Key {
@@ -86,6 +96,7 @@ impl Key {
             parameters: Vec::new(),
             unlisted: None,
             place: None,
+            strength: None,
         }
     }
 
@@ -137,6 +148,21 @@ pub(crate) mod draw {
         chosen
     }
 
+    /// How strong an effect is to be, in the sigmas of [`super::Key::strength`]: from faint to strong.
+    pub(crate) fn strength(rng: &mut impl Rng) -> f64 {
+        log_between(rng, 3.0, 150.0)
+    }
+
+    /// One sigma of readings with their rounding, as a calibration finds it.
+    pub(crate) fn sigma(noise: &Noise) -> f64 {
+        noise.sigma.hypot(noise.digit / 12f64.sqrt())
+    }
+
+    /// That sigma as it is stated: 2 % off at most.
+    pub(crate) fn stated(rng: &mut impl Rng, noise: &Noise) -> f64 {
+        sigma(noise) * between(rng, 0.98, 1.02)
+    }
+
     /// Noise of the given sigma, as sensors have it: white, or correlated from row to row, or rounded to a coarse digit.
     pub(crate) fn noise(rng: &mut impl Rng, sigma: f64) -> Noise {
         let white = Noise::white(sigma);
@@ -144,6 +170,96 @@ pub(crate) mod draw {
             0 => Noise { correlation: between(rng, 0.2, 0.7), ..white },
             1 => Noise { digit: sigma * between(rng, 0.5, 2.0), ..white },
             _ => white,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::OnceLock;
+
+    use super::*;
+
+    const KINDS: [Hidden; 4] = [Hidden::Nothing, Hidden::One, Hidden::Two, Hidden::Unlisted];
+
+    /// A domain with worlds of every kind.
+    type Drawn = (&'static str, [Concealed; 4]);
+
+    /// Every maker's worlds, drawn once from each seed.
+    fn worlds(seed: u64) -> &'static [Drawn] {
+        static WORLDS: [OnceLock<Vec<Drawn>>; 2] = [const { OnceLock::new() }; 2];
+        let draw = |m: &&'static dyn Maker| (m.domain(), KINDS.map(|hidden| m.conceal(hidden, seed)));
+        WORLDS[(seed % 2) as usize].get_or_init(|| makers().iter().map(draw).collect())
+    }
+
+    fn file<'a>(world: &'a Concealed, name: &str) -> &'a str {
+        world.files.iter().find(|(n, _)| n == name).map_or("", |(_, text)| text)
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
+        for ((maker, (_, worlds)), (_, others)) in makers().iter().zip(worlds(11)).zip(worlds(12)) {
+            for ((hidden, world), other) in KINDS.iter().zip(worlds).zip(others) {
+                assert_eq!(*world, maker.conceal(*hidden, 11), "{}", maker.domain());
+                assert_ne!(world.files, other.files, "{}", maker.domain());
+            }
+        }
+    }
+
+    /// Every row has a field a column, finite numbers in all but labels, times that rise within a run, and two runs at least.
+    #[test]
+    fn files_are_well_formed() {
+        const LABELS: [&str; 3] = ["run", "segment", "site"];
+        for (domain, worlds) in worlds(11).iter().chain(worlds(12)) {
+            for world in worlds {
+                let header = file(world, "recording.toml");
+                assert!(header.starts_with("format = 1\n"), "{header}");
+                assert!(header.contains(&format!("domain = \"{domain}\"\n")), "{header}");
+                assert!(header.contains("data = \"data.csv\"\n"), "{header}");
+                let mut rows = file(world, "data.csv").lines();
+                let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
+                assert_eq!(columns[0], "run");
+                let time = columns.iter().position(|c| *c == "t_s");
+                let (mut runs, mut before) = (Vec::new(), f64::NEG_INFINITY);
+                for row in rows {
+                    let fields: Vec<&str> = row.split(',').collect();
+                    assert_eq!(fields.len(), columns.len(), "{row}");
+                    for (column, field) in columns.iter().zip(&fields).filter(|(c, _)| !LABELS.contains(c)) {
+                        assert!(field.parse::<f64>().is_ok_and(f64::is_finite), "{column}: {row}");
+                    }
+                    if runs.last() != Some(&fields[0]) {
+                        runs.push(fields[0]);
+                        before = f64::NEG_INFINITY;
+                    }
+                    if let Some(time) = time {
+                        let t: f64 = fields[time].parse().unwrap();
+                        assert!(t > before, "{row}");
+                        before = t;
+                    }
+                }
+                let mut once = runs.clone();
+                once.dedup();
+                assert!(runs.len() >= 2 && once.len() == runs.len(), "{domain}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_key_says_what_is_hidden() {
+        for (_, worlds) in worlds(11).iter().chain(worlds(12)) {
+            let keys = worlds.each_ref().map(|w| &w.key);
+            // Wind brings its drag with it.
+            let counts =
+                keys.each_ref().map(|k| k.mechanisms.iter().filter(|m| *m != "quadratic-drag").count());
+            assert!(counts[0] == 0 && counts[1] <= 1 && counts[2] <= 2 && counts[3] == 0, "{keys:?}");
+            assert!(!keys[1].mechanisms.is_empty() && keys[2].mechanisms.len() >= 2, "{keys:?}");
+            for (key, hidden) in keys.iter().zip(KINDS) {
+                assert_eq!((key.hidden, key.unlisted.is_some()), (hidden, hidden == Hidden::Unlisted));
+                assert!(key.parameters.iter().all(|p| p.value.is_finite() && p.value != 0.0), "{key:?}");
+                assert!(key.mechanisms.iter().all(|m| key.parameters.iter().any(|p| p.mechanism == *m)));
+                assert!(key.strength.is_none_or(|s| s > 0.5 && s.is_finite()), "{key:?}");
+                assert!(key.place.as_ref().is_none_or(|p| p.from < p.to), "{key:?}");
+            }
         }
     }
 }

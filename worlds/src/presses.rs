@@ -1,0 +1,380 @@
+//! Indentations with concealed effects.
+
+use std::fmt::Write as _;
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use crate::noise::Noise;
+use crate::press::{Effects, Indenter, PressWorld, Step};
+use crate::sizing::{Basis, change, sized};
+
+/// The domain `indentation`.
+#[derive(Debug, Clone, Copy)]
+pub struct Presses;
+
+/// Listed effects; the last three act on spheres only, and viscoelasticity needs times.
+const LISTED: usize = 10;
+const FOR_ALL: usize = 7;
+const RELAXES: usize = 6;
+const UNLISTED: usize = 3;
+
+/// Conditions: name of the column, and their labels.
+type Conditions = (&'static str, Vec<String>);
+
+/// An indenter with its load cell, and what effects will look like before their size is known.
+struct SetUp {
+    world: PressWorld,
+    conditions: Option<Conditions>,
+    timed: bool,
+    noise: Noise,
+    /// One sigma of a reading.
+    sigma: f64,
+    deepest_m: f64,
+    /// Force at the deepest of the softest condition without effects.
+    force_n: f64,
+    /// The same of the stiffest.
+    stiffest_n: f64,
+    signs: [f64; 2],
+    tau_s: f64,
+    /// Depth at which a rim is met, or a membrane slips.
+    depth_m: f64,
+    pitch_m: f64,
+}
+
+impl Maker for Presses {
+    fn domain(&self) -> &'static str {
+        "indentation"
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let count = match hidden {
+            Hidden::Nothing | Hidden::Unlisted => 0,
+            Hidden::One => 1,
+            Hidden::Two => 2,
+        };
+        let sphere = whole(&mut rng, 0, 4) > 0;
+        let listed = choose(&mut rng, if sphere { LISTED } else { FOR_ALL }, count);
+        let which = whole(&mut rng, 0, UNLISTED - 1);
+        let returns = hidden == Hidden::Unlisted && which == 0;
+        let mut set_up = SetUp::draw(sphere, returns, listed.contains(&RELAXES), &mut rng);
+        let plain = set_up.basis();
+        let mut effects = Effects::default();
+        for listed in listed {
+            let wanted = strength(&mut rng);
+            let size = sized(wanted, set_up.bounds(listed), |size| {
+                let mut e = Effects::default();
+                set_up.set(&mut e, listed, size);
+                plain.left(&set_up.change(e))
+            });
+            set_up.set(&mut effects, listed, size);
+            set_up.say(&effects, listed, &mut key);
+        }
+        if count > 0 {
+            key.strength = Some(plain.left(&set_up.change(effects)));
+        }
+        if hidden == Hidden::Unlisted {
+            let bases = plain.with_pairs(&set_up.directions());
+            let rest = |e: Effects| {
+                let change = set_up.change(e);
+                bases.iter().map(|b| b.left(&change)).fold(f64::INFINITY, f64::min)
+            };
+            let wanted = strength(&mut rng);
+            let size =
+                sized(wanted, set_up.unlisted_bounds(which), |size| rest(set_up.unlisted(which, size)));
+            effects = set_up.unlisted(which, size);
+            key.strength = Some(rest(effects));
+            set_up.say_unlisted(which, &mut key);
+        }
+        set_up.world.effects = effects;
+        let [header, data] = set_up.files(&mut rng);
+        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+    }
+}
+
+impl SetUp {
+    fn draw(sphere: bool, returns: bool, relaxes: bool, rng: &mut ChaCha8Rng) -> Self {
+        let radius_m = [0.005, 0.0075, 0.01, 0.0125][whole(rng, 0, 3)];
+        let indenter =
+            if sphere { Indenter::Sphere(radius_m) } else { Indenter::Cone(between(rng, 0.3, 0.9)) };
+        let deepest_m = 1e-4 * (1e4 * radius_m * between(rng, 0.25, 0.7)).round();
+        let conditions = conditions(rng);
+        let kinds = conditions.as_ref().map_or(1, |(_, labels)| labels.len());
+        let softest = log_between(rng, 8e3, 5e4);
+        let stiffer = between(rng, 0.3, 1.2);
+        let moduli_pa: Vec<f64> = (0..kinds).map(|k| softest * (1.0 + stiffer * k as f64)).collect();
+        let timed = whole(rng, 0, 4) < 3 || relaxes;
+        let rests = timed && (whole(rng, 0, 2) > 0 || relaxes);
+        let up = returns || (timed && whole(rng, 0, 1) == 0);
+        let speed_m_s = log_between(rng, 3e-4, 3e-3);
+        let path = path(deepest_m, whole(rng, 25, 60), speed_m_s, rests.then(|| between(rng, 4.0, 15.0)), up);
+        let repeats = whole(rng, if kinds == 1 { 2 } else { 1 }, 3);
+        let runs = (0..kinds * repeats).map(|run| (run / repeats, path.clone())).collect();
+        let poisson_ratio = if whole(rng, 0, 3) == 0 { 0.45 } else { 0.5 };
+        let plane = softest / (1.0 - poisson_ratio * poisson_ratio);
+        let force_n = indenter.force_n(plane, deepest_m);
+        // A load cell that suits the forces.
+        let force = (force_n * log_between(rng, 3e-3, 2e-2)).clamp(5e-4, 1.5e-2);
+        let noise = draw::noise(rng, force);
+        Self {
+            force_n,
+            stiffest_n: force_n * moduli_pa[kinds - 1] / softest,
+            world: PressWorld { indenter, poisson_ratio, moduli_pa, runs, effects: Effects::default() },
+            conditions,
+            timed: timed || returns,
+            sigma: draw::sigma(&noise),
+            noise,
+            deepest_m,
+            signs: [sign(rng), sign(rng)],
+            tau_s: log_between(rng, 0.3, 8.0),
+            depth_m: deepest_m * between(rng, 0.4, 0.75),
+            pitch_m: deepest_m * between(rng, 0.12, 0.3),
+        }
+    }
+
+    /// What the moduli can do to the readings.
+    fn basis(&self) -> Basis {
+        let plain = self.whitened(Effects::default(), &self.world.moduli_pa);
+        let mut basis = Basis::default();
+        for condition in 0..self.world.moduli_pa.len() {
+            let mut moduli_pa = self.world.moduli_pa.clone();
+            moduli_pa[condition] *= 1.01;
+            basis.add(&change(&plain, &self.whitened(Effects::default(), &moduli_pa)));
+        }
+        basis
+    }
+
+    /// Readings in sigmas.
+    fn whitened(&self, effects: Effects, moduli_pa: &[f64]) -> Vec<f64> {
+        let world = PressWorld { effects, moduli_pa: moduli_pa.to_vec(), ..self.world.clone() };
+        world.readings().iter().map(|force| force / self.sigma).collect()
+    }
+
+    /// What effects do to the readings, in sigmas.
+    fn change(&self, effects: Effects) -> Vec<f64> {
+        let moduli = &self.world.moduli_pa;
+        change(&self.whitened(Effects::default(), moduli), &self.whitened(effects, moduli))
+    }
+
+    /// What the listed effects do when they are small.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        let count = if matches!(self.world.indenter, Indenter::Sphere(_)) { LISTED } else { FOR_ALL };
+        (0..count)
+            .filter(|listed| self.timed || *listed != RELAXES)
+            .map(|listed| {
+                let mut e = Effects::default();
+                let [low, high] = self.bounds(listed);
+                self.set(&mut e, listed, (low * high).sqrt());
+                self.change(e)
+            })
+            .collect()
+    }
+
+    /// Between what sizes an effect is plausible.
+    fn bounds(&self, listed: usize) -> [f64; 2] {
+        let (d, f) = (self.deepest_m, self.force_n);
+        match listed {
+            0 => [1e-3 * d, 0.15 * d],
+            1 => [1e-3 * f / d, 0.7 * f / d],
+            2 => [1e-3 * f / d.powi(3), 0.7 * f / d.powi(3)],
+            3 => [1e-3 * f / d, f / d],
+            4 => [1e-4 * d / self.stiffest_n, 0.2 * d / self.stiffest_n],
+            5 => [2e-2 * self.sigma, 0.2 * f],
+            RELAXES => [2e-3, 0.5],
+            7 => [1e-4, 0.5],
+            8 => [0.01, 0.45],
+            _ => [1e-3, 0.6],
+        }
+    }
+
+    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
+        match listed {
+            0 => e.contact_offset_m = self.signs[0] * size,
+            1 => e.tension_n_m = size,
+            2 => e.stretching_n_m3 = size,
+            3 => e.rim = [self.depth_m, size],
+            4 => e.compliance_m_n = size,
+            5 => e.force_offset_n = self.signs[1] * size,
+            RELAXES => (e.relaxed_fraction, e.tau_s) = (size, self.tau_s),
+            7 => e.adhesion_j_m2 = size,
+            8 => {
+                if let Indenter::Sphere(radius) = self.world.indenter {
+                    e.thickness_m = (radius * self.deepest_m).sqrt() / size;
+                }
+            }
+            _ => e.stiffening = size,
+        }
+    }
+
+    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
+        match listed {
+            0 => key.add("contact-offset", &[("offset_m", e.contact_offset_m)]),
+            1 => key.add("membrane-tension", &[("stiffness_n_m", e.tension_n_m)]),
+            2 => key.add("membrane-stretching", &[("coefficient_n_m3", e.stretching_n_m3)]),
+            3 => {
+                key.add("rim-contact", &[("depth_m", e.rim[0]), ("stiffness_n_m", e.rim[1])]);
+                key.place = Some(self.deep());
+            }
+            4 => key.add("load-cell-compliance", &[("compliance_m_n", e.compliance_m_n)]),
+            5 => key.add("force-offset", &[("offset_n", e.force_offset_n)]),
+            RELAXES => {
+                key.add("viscoelasticity", &[("relaxed_fraction", e.relaxed_fraction), ("tau_s", e.tau_s)]);
+            }
+            7 => key.add("adhesion", &[("work_of_adhesion_j_m2", e.adhesion_j_m2)]),
+            8 => key.add("finite-thickness", &[("thickness_m", e.thickness_m)]),
+            _ => key.add("strain-stiffening", &[("coefficient", e.stiffening)]),
+        }
+    }
+
+    fn deep(&self) -> Place {
+        Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
+    }
+
+    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+        match which {
+            0 => [2e-3, 0.6],
+            1 => [0.05 * self.sigma, 0.2 * self.force_n],
+            _ => [0.05 * self.sigma, 0.3 * self.force_n],
+        }
+    }
+
+    fn unlisted(&self, which: usize, size: f64) -> Effects {
+        let none = Effects::default();
+        match which {
+            0 => Effects { dent: size, ..none },
+            1 => Effects { ripple: [size, self.pitch_m], ..none },
+            _ => Effects { slip: [self.depth_m, size], ..none },
+        }
+    }
+
+    fn say_unlisted(&self, which: usize, key: &mut Key) {
+        let (what, place) = match which {
+            0 => ("a dent that stays: the way back is another", None),
+            1 => ("a ripple of the drive, periodic in depth", None),
+            _ => ("a membrane that slips at a depth", Some(self.deep())),
+        };
+        key.unlisted = Some(what.into());
+        key.place = place;
+    }
+
+    fn files(&self, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let w = &self.world;
+        let mut header = String::from("format = 1\ndomain = \"indentation\"\ndata = \"data.csv\"\n");
+        if whole(rng, 0, 2) > 0 {
+            let _ = write!(header, "\n[noise]\nforce_n = {:.3e}\n", stated(rng, &self.noise));
+        }
+        let indenter = match w.indenter {
+            Indenter::Sphere(radius) => format!("shape = \"sphere\", radius_m = {radius}"),
+            Indenter::Cylinder(radius) => format!("shape = \"cylinder\", radius_m = {radius}"),
+            Indenter::Cone(angle) => format!("shape = \"cone\", angle_rad = {angle}"),
+        };
+        let _ = write!(header, "\n[rig]\nindenter = {{ {indenter} }}\npoisson_ratio = {}\n", w.poisson_ratio);
+        let mut data = String::from("run,delta_m,force_n");
+        data.push_str(if self.timed { ",t_s,segment" } else { "" });
+        if let Some((column, _)) = &self.conditions {
+            let _ = write!(data, ",{column}");
+        }
+        data.push('\n');
+        let readings = w.readings();
+        let mut rest = readings.as_slice();
+        for (run, (condition, steps)) in w.runs.iter().enumerate() {
+            let (own, others) = rest.split_at(steps.len());
+            rest = others;
+            let mut forces = own.to_vec();
+            self.noise.apply(&mut forces, rng);
+            for (i, (step, force)) in steps.iter().zip(&forces).enumerate() {
+                let _ = write!(data, "{},{:.6},{force:.6}", run + 1, step.delta_m);
+                if self.timed {
+                    let rests = i > 0 && step.down && steps[i - 1].delta_m >= step.delta_m;
+                    let segment = if rests {
+                        "hold"
+                    } else if step.down {
+                        "load"
+                    } else {
+                        "unload"
+                    };
+                    let _ = write!(data, ",{:.4},{segment}", step.t_s);
+                }
+                if let Some((_, labels)) = &self.conditions {
+                    let _ = write!(data, ",{}", labels[*condition]);
+                }
+                data.push('\n');
+            }
+        }
+        [header, data]
+    }
+}
+
+/// What people vary from run to run, if anything.
+fn conditions(rng: &mut ChaCha8Rng) -> Option<Conditions> {
+    let count = whole(rng, 2, 4);
+    let numbers = |step: f64| (0..count).map(|k| format!("{}", step * k as f64)).collect();
+    match whole(rng, 0, 3) {
+        0 => None,
+        1 => Some(("pressure_pa", numbers([500.0, 1000.0, 2000.0][whole(rng, 0, 2)]))),
+        2 => Some(("stretch_m", numbers([0.01, 0.02][whole(rng, 0, 1)]))),
+        _ => Some(("site", (0..count).map(|k| format!("s{k}")).collect())),
+    }
+}
+
+/// Down in even steps, a rest of some seconds, and up again.
+fn path(deepest_m: f64, rows: usize, speed_m_s: f64, rest_s: Option<f64>, up: bool) -> Vec<Step> {
+    // Readings are written to a micrometre.
+    let depth = |k: usize| (deepest_m * k as f64 / rows as f64 * 1e6).round() * 1e-6;
+    let step_s = deepest_m / rows as f64 / speed_m_s;
+    let mut path: Vec<Step> =
+        (0..=rows).map(|k| Step { delta_m: depth(k), t_s: depth(k) / speed_m_s, down: true }).collect();
+    let mut t_s = rows as f64 * step_s;
+    if let Some(rest_s) = rest_s {
+        path.extend((1..=rows).map(|k| Step {
+            delta_m: depth(rows),
+            t_s: t_s + rest_s * k as f64 / rows as f64,
+            down: true,
+        }));
+        t_s += rest_s;
+    }
+    if up {
+        path.extend((1..=rows).map(|k| Step {
+            delta_m: depth(rows - k),
+            t_s: t_s + k as f64 * step_s,
+            down: false,
+        }));
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
+        for seed in 0..3 {
+            let set_up = SetUp::draw(true, true, true, &mut ChaCha8Rng::seed_from_u64(seed));
+            let plain = set_up.basis();
+            let left = |e: Effects| plain.left(&set_up.change(e));
+            for listed in 0..LISTED {
+                let strong = |size: f64| {
+                    let mut e = Effects::default();
+                    set_up.set(&mut e, listed, size);
+                    left(e)
+                };
+                let [low, high] = set_up.bounds(listed);
+                assert!(
+                    strong(high) > 5.0 * strong(low) && strong(high) > 10.0,
+                    "{listed}: {}",
+                    strong(high)
+                );
+            }
+            for which in 0..UNLISTED {
+                let [_, high] = set_up.unlisted_bounds(which);
+                assert!(left(set_up.unlisted(which, high)) > 10.0, "{which}");
+            }
+            assert!(left(Effects::default()) < 1e-9);
+        }
+    }
+}

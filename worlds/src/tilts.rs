@@ -1,0 +1,375 @@
+//! Tilted containers with concealed effects.
+
+use std::f64::consts::FRAC_PI_2;
+use std::fmt::Write as _;
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use crate::noise::Noise;
+use crate::sizing::{Basis, change, sized};
+use crate::tilt::{Cavity, Effects, Sweep, TiltWorld};
+
+/// The domain `liquid-tilt`.
+#[derive(Debug, Clone, Copy)]
+pub struct Tilts;
+
+const LISTED: usize = 9;
+const UNLISTED: usize = 4;
+
+/// A container in a gripper with its sensor, and what effects will look like before their size is known.
+struct SetUp {
+    world: TiltWorld,
+    density_kg_m3: f64,
+    density_known: bool,
+    volumes_known: bool,
+    /// Noise of forces and torque.
+    noise: [Noise; 2],
+    /// One sigma of each.
+    sigma: [f64; 2],
+    /// Sign of each listed effect.
+    signs: [f64; LISTED],
+    slip_at: [usize; 2],
+    taut_from_rad: f64,
+}
+
+impl Maker for Tilts {
+    fn domain(&self) -> &'static str {
+        "liquid-tilt"
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let mut set_up = SetUp::draw(&mut rng);
+        let plain = set_up.basis();
+        let mut effects = Effects::default();
+        let count = match hidden {
+            Hidden::Nothing | Hidden::Unlisted => 0,
+            Hidden::One => 1,
+            Hidden::Two => 2,
+        };
+        for listed in choose(&mut rng, LISTED, count) {
+            let wanted = strength(&mut rng);
+            let size = sized(wanted, set_up.bounds(listed), |size| {
+                let mut e = Effects::default();
+                set_up.set(&mut e, listed, size);
+                plain.left(&set_up.change(e))
+            });
+            set_up.set(&mut effects, listed, size);
+            set_up.say(&effects, listed, &mut key);
+        }
+        if count > 0 {
+            key.strength = Some(plain.left(&set_up.change(effects)));
+        }
+        if hidden == Hidden::Unlisted {
+            let which = whole(&mut rng, 0, UNLISTED - 1);
+            let bases = plain.with_pairs(&set_up.directions());
+            let rest = |e: Effects| {
+                let change = set_up.change(e);
+                bases.iter().map(|b| b.left(&change)).fold(f64::INFINITY, f64::min)
+            };
+            let (wanted, turn) = (strength(&mut rng), sign(&mut rng));
+            let bounds = set_up.unlisted_bounds(which);
+            let size = sized(wanted, bounds, |size| rest(set_up.unlisted(which, turn, size)));
+            effects = set_up.unlisted(which, turn, size);
+            key.strength = Some(rest(effects));
+            set_up.say_unlisted(which, &mut key);
+        }
+        set_up.world.effects = effects;
+        let [header, data] = set_up.files(&mut rng);
+        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+    }
+}
+
+impl SetUp {
+    fn draw(rng: &mut ChaCha8Rng) -> Self {
+        let outside = Cavity { radius_m: between(rng, 0.03, 0.05), length_m: between(rng, 0.15, 0.23) };
+        let density_kg_m3 = between(rng, 780.0, 1350.0);
+        let tilts_rad = poses(rng);
+        // Some sweep up and down by turns, so that an effect of the order shows.
+        let both_ways = whole(rng, 0, 2) == 0;
+        let runs = whole(rng, 3, 6);
+        let sweeps: Vec<Sweep> = (0..runs)
+            .map(|run| {
+                // Fills that are spread over the container, none of them empty or brim full.
+                let fill = 0.12 + 0.68 * (run as f64 + between(rng, 0.1, 0.9)) / runs as f64;
+                // Measured in to a millilitre; the file states it so.
+                let volume_m3 = (fill * outside.volume_m3() * 1e6).round() * 1e-6;
+                let mut tilts_rad = tilts_rad.clone();
+                if both_ways && run % 2 == 1 {
+                    tilts_rad.reverse();
+                }
+                Sweep { mass_kg: density_kg_m3 * volume_m3, volume_m3, tilts_rad }
+            })
+            .collect();
+        let [force, torque] = [log_between(rng, 8e-3, 3e-2), log_between(rng, 1.2e-4, 5e-4)];
+        let noise = [draw::noise(rng, force), draw::noise(rng, torque)];
+        let slip_run = whole(rng, 0, runs - 1);
+        Self {
+            density_kg_m3,
+            density_known: whole(rng, 0, 9) < 6,
+            volumes_known: whole(rng, 0, 1) == 0,
+            sigma: [draw::sigma(&noise[0]), draw::sigma(&noise[1])],
+            noise,
+            signs: std::array::from_fn(|_| sign(rng)),
+            slip_at: [slip_run, whole(rng, tilts_rad.len() / 4, 3 * tilts_rad.len() / 4)],
+            taut_from_rad: between(rng, 0.3, 0.65) * tilts_rad.iter().copied().fold(0.0, f64::max),
+            world: TiltWorld {
+                outside,
+                container_kg: between(rng, 0.05, 0.13),
+                gripper_kg: between(rng, 0.25, 0.6),
+                grasp_m: outside.length_m * between(rng, 0.25, 0.8),
+                sweeps,
+                effects: Effects::default(),
+            },
+        }
+    }
+
+    /// What is not known of the liquid can be anything: mass and volume of each run, as far as they are not stated.
+    fn basis(&self) -> Basis {
+        let plain = self.whitened(&self.world);
+        let mut basis = Basis::default();
+        for run in 0..self.world.sweeps.len() {
+            for part in [0, 1] {
+                let mut moved = self.world.clone();
+                let sweep = &mut moved.sweeps[run];
+                match (part, self.density_known, self.volumes_known) {
+                    (0, false, _) => sweep.mass_kg *= 1.001,
+                    (1, false, false) => sweep.volume_m3 *= 1.001,
+                    (1, true, false) => {
+                        sweep.mass_kg *= 1.001;
+                        sweep.volume_m3 *= 1.001;
+                    }
+                    _ => continue,
+                }
+                basis.add(&change(&plain, &self.whitened(&moved)));
+            }
+        }
+        basis
+    }
+
+    /// Readings in sigmas.
+    fn whitened(&self, world: &TiltWorld) -> Vec<f64> {
+        let [force, torque] = self.sigma;
+        world.readings().iter().flat_map(|[f, t]| [f / force, t / torque]).collect()
+    }
+
+    /// What effects do to the readings, in sigmas.
+    fn change(&self, effects: Effects) -> Vec<f64> {
+        let at_work = TiltWorld { effects, ..self.world.clone() };
+        change(&self.whitened(&self.world), &self.whitened(&at_work))
+    }
+
+    /// What the listed effects do when they are small.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        (0..LISTED)
+            .map(|listed| {
+                let mut e = Effects::default();
+                let [low, high] = self.bounds(listed);
+                self.set(&mut e, listed, (low * high).sqrt());
+                self.change(e)
+            })
+            .collect()
+    }
+
+    fn rows(&self) -> f64 {
+        self.world.sweeps.iter().map(|s| s.tilts_rad.len() as f64).sum()
+    }
+
+    /// Between what sizes an effect is plausible.
+    fn bounds(&self, listed: usize) -> [f64; 2] {
+        match listed {
+            0 => [1e-4, 4e-3],
+            1 => [2e-4, 0.1],
+            2 => [1e-5, 0.03],
+            3 | 8 => [1e-4, 0.12],
+            4 | 6 => [2e-5, 0.015],
+            5 => [1e-4, 0.2 * self.world.outside.length_m],
+            _ => [1e-5 / self.rows(), 0.03 / self.rows()],
+        }
+    }
+
+    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
+        let signed = self.signs[listed] * size;
+        match listed {
+            0 => e.wall_m = size,
+            1 => e.force_gain = signed,
+            2 => e.torque_offset_nm = signed,
+            3 => e.angle_offset_rad = signed,
+            4 => e.grasp_offset_m = signed,
+            5 => e.cap_shift_m = signed,
+            6 => (e.slip_m, e.slip_at) = (signed, self.slip_at),
+            7 => e.drift_nm_per_row = signed,
+            _ => e.surface_lag_rad = signed,
+        }
+    }
+
+    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
+        match listed {
+            0 => key.add("wall-thickness", &[("thickness_m", e.wall_m)]),
+            1 => key.add("force-gain", &[("gain", e.force_gain)]),
+            2 => key.add("torque-offset", &[("offset_nm", e.torque_offset_nm)]),
+            3 => key.add("angle-offset", &[("angle_rad", e.angle_offset_rad)]),
+            4 => key.add("grasp-offset", &[("offset_m", e.grasp_offset_m)]),
+            5 => key.add("cap-mass", &[("shift_m", e.cap_shift_m)]),
+            6 => {
+                key.add("grasp-slip", &[("slip_m", e.slip_m)]);
+                key.place = Some(self.late());
+            }
+            7 => key.add("sensor-drift", &[("rate_nm_per_row", e.drift_nm_per_row)]),
+            _ => key.add("surface-lag", &[("angle_rad", e.surface_lag_rad)]),
+        }
+    }
+
+    /// From the pose of the slip to the end of its run.
+    fn late(&self) -> Place {
+        let [run, pose] = self.slip_at;
+        let late = &self.world.sweeps[run].tilts_rad[pose..];
+        Place {
+            variable: "theta_rad".into(),
+            from: late.iter().copied().fold(f64::INFINITY, f64::min),
+            to: late.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
+    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+        match which {
+            0 => [1e-4, 0.05],
+            1 => [2e-5, 0.01],
+            2 => [1e-3, 5.0],
+            _ => [2e-4, 0.2 * self.world.sweeps[self.slip_at[0]].mass_kg],
+        }
+    }
+
+    fn unlisted(&self, which: usize, turn: f64, size: f64) -> Effects {
+        let none = Effects::default();
+        match which {
+            0 => Effects { cable: [turn * size, self.taut_from_rad], ..none },
+            1 => Effects { play_nm: size, ..none },
+            2 => Effects { flex: turn * size, ..none },
+            _ => Effects { spilt_kg: size, slip_at: self.slip_at, ..none },
+        }
+    }
+
+    fn say_unlisted(&self, which: usize, key: &mut Key) {
+        let (what, place) = match which {
+            0 => {
+                let to = self.world.sweeps[0].tilts_rad.iter().copied().fold(0.0, f64::max);
+                let place = Place { variable: "theta_rad".into(), from: self.taut_from_rad, to };
+                ("a cable that is taut beyond an angle", Some(place))
+            }
+            1 => ("hysteresis of the torque sensor", None),
+            2 => ("a gripper that gives way with the torque squared", None),
+            _ => ("liquid that is spilt once", Some(self.late())),
+        };
+        key.unlisted = Some(what.into());
+        key.place = place;
+    }
+
+    fn files(&self, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let w = &self.world;
+        let mut header = String::from("format = 1\ndomain = \"liquid-tilt\"\ndata = \"data.csv\"\n");
+        if whole(rng, 0, 2) > 0 {
+            let [force, torque] = [stated(rng, &self.noise[0]), stated(rng, &self.noise[1])];
+            let _ = write!(
+                header,
+                "\n[noise]\nfx_n = {force:.3e}\nfy_n = {force:.3e}\ntau_z_nm = {torque:.3e}\n"
+            );
+        }
+        let _ = write!(
+            header,
+            "\n[rig]\ncontainer = {{ shape = \"cylinder\", radius_m = {}, length_m = {} }}\ncontainer_mass_kg = {}\ngripper_mass_kg = {}\ngrasp_height_m = {}\n",
+            w.outside.radius_m, w.outside.length_m, w.container_kg, w.gripper_kg, w.grasp_m
+        );
+        if self.density_known {
+            let _ = writeln!(header, "density_kg_m3 = {}", self.density_kg_m3);
+        }
+        let volume = if self.volumes_known { ",volume_m3" } else { "" };
+        let mut data = format!("run,theta_rad,fx_n,fy_n,tau_z_nm{volume}\n");
+        let readings = w.readings();
+        let mut sideways = vec![0.0; readings.len()];
+        let [mut down, mut torque]: [Vec<f64>; 2] =
+            [0, 1].map(|channel| readings.iter().map(|r| r[channel]).collect());
+        self.noise[0].apply(&mut sideways, rng);
+        self.noise[0].apply(&mut down, rng);
+        self.noise[1].apply(&mut torque, rng);
+        let mut row = 0;
+        for (run, sweep) in w.sweeps.iter().enumerate() {
+            for tilt in &sweep.tilts_rad {
+                let _ = write!(
+                    data,
+                    "{},{tilt},{:.5},{:.5},{:.7}",
+                    run + 1,
+                    sideways[row],
+                    down[row],
+                    torque[row]
+                );
+                if self.volumes_known {
+                    let _ = write!(data, ",{:.6}", sweep.volume_m3);
+                }
+                data.push('\n');
+                row += 1;
+            }
+        }
+        [header, data]
+    }
+}
+
+/// Stated tilts of a sweep, from upright on, in steps of whole half degrees.
+fn poses(rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let count = whole(rng, 12, 25);
+    let last = FRAC_PI_2 * between(rng, 0.75, 1.9);
+    let half_degree = std::f64::consts::PI / 360.0;
+    let step = (last / (count - 1) as f64 / half_degree).round() * half_degree;
+    (0..count).map(|pose| ((pose as f64 * step) * 1e6).round() * 1e-6).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
+        for seed in 0..3 {
+            let mut set_up = SetUp::draw(&mut ChaCha8Rng::seed_from_u64(seed));
+            set_up.density_known = true;
+            let plain = set_up.basis();
+            let left = |e: Effects| plain.left(&set_up.change(e));
+            for listed in 0..LISTED {
+                let strong = |size: f64| {
+                    let mut e = Effects::default();
+                    set_up.set(&mut e, listed, size);
+                    left(e)
+                };
+                let [low, high] = set_up.bounds(listed);
+                assert!(
+                    strong(high) > 5.0 * strong(low) && strong(high) > 10.0,
+                    "{listed}: {}",
+                    strong(high)
+                );
+            }
+            for which in 0..UNLISTED {
+                let [_, high] = set_up.unlisted_bounds(which);
+                assert!(left(set_up.unlisted(which, 1.0, high)) > 10.0, "{which}");
+            }
+            assert!(left(Effects::default()) < 1e-9);
+        }
+    }
+
+    /// With neither density nor volumes a gain of the forces is as good as another mass, until the torque is looked at; a run's
+    /// mass is known where both are.
+    #[test]
+    fn what_is_stated_is_not_free() {
+        let mut set_up = SetUp::draw(&mut ChaCha8Rng::seed_from_u64(8));
+        let gain = Effects { force_gain: 0.002, ..Effects::default() };
+        let mut left = |density, volumes| {
+            (set_up.density_known, set_up.volumes_known) = (density, volumes);
+            set_up.basis().left(&set_up.change(gain))
+        };
+        let [nothing, density, both] = [left(false, false), left(true, false), left(true, true)];
+        assert!(both > density && density > nothing, "{both} {density} {nothing}");
+    }
+}

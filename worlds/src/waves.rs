@@ -1,0 +1,349 @@
+//! Sloshing with concealed effects.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use crate::noise::Noise;
+use crate::sizing::{Basis, change, sized};
+use crate::wave::{Effects, ROOTS, Ring, Start, WaveWorld};
+
+/// The domain `slosh`.
+#[derive(Debug, Clone, Copy)]
+pub struct Waves;
+
+const LISTED: usize = 7;
+const UNLISTED: usize = 4;
+
+/// A cylinder, its sensor, and what effects will look like before their size is known.
+struct SetUp {
+    world: WaveWorld,
+    noise: Noise,
+    /// One sigma of a reading.
+    sigma: f64,
+    /// Whether the sideways force was recorded in place of the torque.
+    sideways: bool,
+    /// The second mode's and the arm's angular frequency and damping ratio.
+    rings: [[f64; 2]; 2],
+    hardens: f64,
+    least_tension_n_m: f64,
+    lag_s: f64,
+    machine: [f64; 2],
+    slip_s: f64,
+}
+
+impl Maker for Waves {
+    fn domain(&self) -> &'static str {
+        "slosh"
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let which = whole(&mut rng, 0, UNLISTED - 1);
+        let leaks = hidden == Hidden::Unlisted && which == 1;
+        let mut set_up = SetUp::draw(leaks, &mut rng);
+        let plain = set_up.basis();
+        let mut effects = Effects::default();
+        let count = match hidden {
+            Hidden::Nothing | Hidden::Unlisted => 0,
+            Hidden::One => 1,
+            Hidden::Two => 2,
+        };
+        for listed in choose(&mut rng, LISTED, count) {
+            let wanted = strength(&mut rng);
+            let size = sized(wanted, set_up.bounds(listed), |size| {
+                let mut e = Effects::default();
+                set_up.set(&mut e, listed, size);
+                plain.left(&set_up.change(e))
+            });
+            set_up.set(&mut effects, listed, size);
+            set_up.say(&effects, listed, &mut key);
+        }
+        if count > 0 {
+            key.strength = Some(plain.left(&set_up.change(effects)));
+        }
+        if hidden == Hidden::Unlisted {
+            let bases = plain.with_pairs(&set_up.directions());
+            let rest = |e: Effects| {
+                let change = set_up.change(e);
+                bases.iter().map(|b| b.left(&change)).fold(f64::INFINITY, f64::min)
+            };
+            let wanted = strength(&mut rng);
+            let (bounds, turn) = (set_up.unlisted_bounds(which), sign(&mut rng));
+            let size = sized(wanted, bounds, |size| rest(set_up.unlisted(which, turn, size)));
+            effects = set_up.unlisted(which, turn, size);
+            key.strength = Some(rest(effects));
+            set_up.say_unlisted(which, &mut key);
+        }
+        set_up.world.effects = effects;
+        let [header, data] = set_up.files(&mut rng);
+        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+    }
+}
+
+impl SetUp {
+    fn draw(leaks: bool, rng: &mut ChaCha8Rng) -> Self {
+        let sideways = whole(rng, 0, 3) == 0;
+        // A force is the torque over the arm it acts with, 5 to 15 cm.
+        let sigma = if sideways { log_between(rng, 2e-3, 1e-2) } else { log_between(rng, 1.5e-4, 5e-4) };
+        let noise = draw::noise(rng, sigma);
+        let radius_m = between(rng, 0.03, 0.055);
+        // A leak is seen by the bottom, so the liquid must not be deep.
+        let depth = radius_m * if leaks { between(rng, 0.4, 0.7) } else { log_between(rng, 0.6, 2.8) };
+        let volume_m3 = std::f64::consts::PI * radius_m * radius_m * depth;
+        let largest = sigma * log_between(rng, 10.0, 60.0);
+        let runs = if leaks { whole(rng, 3, 6) } else { whole(rng, 2, 6) };
+        let starts = (0..runs)
+            .map(|_| Start {
+                amplitude: largest * between(rng, 0.5, 1.0),
+                phases_rad: std::array::from_fn(|_| between(rng, 0.0, TAU)),
+                reading: between(rng, -1.0, 1.0),
+            })
+            .collect();
+        let rate_hz = [50.0, 100.0, 125.0][whole(rng, 0, 2)];
+        let duration_s = between(rng, 5.0, 10.0);
+        let world = WaveWorld {
+            radius_m,
+            mass_kg: volume_m3 * between(rng, 780.0, 1300.0),
+            volume_m3,
+            viscosity_m2_s: log_between(rng, 8e-7, 3e-5),
+            starts,
+            rows: (duration_s * rate_hz) as usize,
+            rate_hz,
+            effects: Effects::default(),
+        };
+        let mode = |root: f64| world.omega_rad_s(root, world.depth_m());
+        // An arm's frequency is its own: far from the first three modes.
+        let modes = [mode(ROOTS[0]), mode(ROOTS[1]), mode(8.536)];
+        let arm = loop {
+            let omega = log_between(rng, 28.0, 110.0);
+            if modes.iter().all(|m| (omega / m - 1.0).abs() > 0.12) {
+                break omega;
+            }
+        };
+        let rings = [[modes[1], log_between(rng, 0.004, 0.03)], [arm, log_between(rng, 0.003, 0.03)]];
+        let hardens = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
+        let machine = [modes[0] * between(rng, 1.15, 1.8), duration_s * between(rng, 0.2, 0.6)];
+        let slip_s = duration_s * between(rng, 0.2, 0.8);
+        Self {
+            sigma: draw::sigma(&noise),
+            noise,
+            least_tension_n_m: log_between(rng, 0.015, 0.05),
+            lag_s: log_between(rng, 0.015, 0.15),
+            world,
+            sideways,
+            rings,
+            hardens,
+            machine,
+            slip_s,
+        }
+    }
+
+    /// What the amplitude, the phase and the viscosity of each run can do to the readings.
+    fn basis(&self) -> Basis {
+        let (w, rows) = (&self.world, self.world.rows);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let thicker = 1.02 * w.viscosity_m2_s;
+        let mut basis = Basis::default();
+        for (run, start) in w.starts.iter().enumerate() {
+            let own = |start: Start, viscosity_m2_s: f64| {
+                let alone = WaveWorld { starts: vec![start], viscosity_m2_s, ..w.clone() };
+                alone.readings().iter().map(|x| x / self.sigma).collect::<Vec<f64>>()
+            };
+            let first = own(*start, w.viscosity_m2_s);
+            let mut turned = *start;
+            turned.phases_rad[0] += quarter;
+            let thick = change(&first, &own(*start, thicker));
+            for part in [first, own(turned, w.viscosity_m2_s), thick] {
+                let mut column = vec![0.0; rows * w.starts.len()];
+                column[run * rows..(run + 1) * rows].copy_from_slice(&part);
+                basis.add(&column);
+            }
+        }
+        basis
+    }
+
+    /// What effects do to the readings, in sigmas.
+    fn change(&self, effects: Effects) -> Vec<f64> {
+        let at_work = WaveWorld { effects, ..self.world.clone() };
+        let difference = change(&self.world.readings(), &at_work.readings());
+        difference.iter().map(|x| x / self.sigma).collect()
+    }
+
+    /// What the listed effects do when they are small.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        (0..LISTED)
+            .map(|listed| {
+                let mut e = Effects::default();
+                let [low, high] = self.bounds(listed);
+                self.set(&mut e, listed, (low * high).sqrt());
+                self.change(e)
+            })
+            .collect()
+    }
+
+    /// Between what sizes an effect is plausible.
+    fn bounds(&self, listed: usize) -> [f64; 2] {
+        let largest = self.largest();
+        match listed {
+            0 => [self.least_tension_n_m, 0.08],
+            1 => [2e-4, 0.06],
+            2 => [3e-4 * largest, 0.05 * largest],
+            3 => [2e-4 / largest, 0.3 / largest],
+            4 | 5 => [0.02 * self.sigma, 0.4 * largest],
+            _ => [0.1 * self.sigma, 1.5 * largest],
+        }
+    }
+
+    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
+        let ring =
+            |[omega_rad_s, damping_ratio]: [f64; 2]| Ring { omega_rad_s, damping_ratio, amplitude: size };
+        match listed {
+            0 => e.surface_tension_n_m = size,
+            1 => e.nonlinear_frequency = self.hardens * size,
+            2 => e.friction = size,
+            3 => e.quadratic = size,
+            4 => e.second_mode = ring(self.rings[0]),
+            5 => e.arm = ring(self.rings[1]),
+            _ => [e.lag_s, e.lag_start] = [self.lag_s, size],
+        }
+    }
+
+    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
+        let ring = |r: &Ring, omega: f64| {
+            let amplitude = if self.sideways { "amplitude_n" } else { "amplitude_nm" };
+            [("omega_rad_s", omega), ("damping_ratio", r.damping_ratio), (amplitude, r.amplitude)]
+        };
+        match listed {
+            0 => key.add("surface-tension", &[("surface_tension_n_m", e.surface_tension_n_m)]),
+            1 => key.add("nonlinear-frequency", &[("coefficient", e.nonlinear_frequency)]),
+            2 => {
+                let name = if self.sideways { "friction_n" } else { "friction_nm" };
+                key.add("contact-line-friction", &[(name, e.friction)]);
+            }
+            3 => {
+                let name = if self.sideways { "coefficient_per_n" } else { "coefficient_per_nm" };
+                key.add("quadratic-damping", &[(name, e.quadratic)]);
+            }
+            4 => {
+                // Where there is surface tension it moves the second mode as well.
+                let at_work = WaveWorld { effects: *e, ..self.world.clone() };
+                let omega = at_work.omega_rad_s(ROOTS[1], at_work.depth_m());
+                key.add("second-mode", &ring(&e.second_mode, omega));
+            }
+            5 => key.add("arm-compliance", &ring(&e.arm, e.arm.omega_rad_s)),
+            _ => key.add("sensor-lag", &[("tau_s", e.lag_s)]),
+        }
+    }
+
+    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+        match which {
+            0 | 2 => [0.02 * self.sigma, 0.5 * self.largest()],
+            1 => [1e-3, 0.08],
+            _ => [0.02, 1.0],
+        }
+    }
+
+    fn unlisted(&self, which: usize, turn: f64, size: f64) -> Effects {
+        let none = Effects::default();
+        match which {
+            0 => Effects { machine: [size, self.machine[0], self.machine[1]], ..none },
+            1 => Effects { leak: size, ..none },
+            2 => Effects { slip: [turn * size, self.slip_s], slip_run: self.world.starts.len() / 2, ..none },
+            _ => Effects { swirl_rad_s: size, ..none },
+        }
+    }
+
+    fn say_unlisted(&self, which: usize, key: &mut Key) {
+        let end = self.world.rows as f64 / self.world.rate_hz;
+        let from = |from: f64| Some(Place { variable: "t_s".into(), from, to: end });
+        let (what, place) = match which {
+            0 => ("a machine near by that starts", from(self.machine[1])),
+            1 => ("a leak: less liquid from run to run", None),
+            2 => ("a grip that slips once, in one run", from(self.slip_s)),
+            _ => ("a wave whose plane turns", None),
+        };
+        key.unlisted = Some(what.into());
+        key.place = place;
+    }
+
+    fn largest(&self) -> f64 {
+        self.world.starts.iter().map(|s| s.amplitude).fold(0.0, f64::max)
+    }
+
+    fn files(&self, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let w = &self.world;
+        let channel = if self.sideways { "fx_n" } else { "tau_z_nm" };
+        let mut header = String::from("format = 1\ndomain = \"slosh\"\ndata = \"data.csv\"\n");
+        if whole(rng, 0, 2) > 0 {
+            let _ = write!(header, "\n[noise]\n{channel} = {:.3e}\n", stated(rng, &self.noise));
+        }
+        let length = between(rng, 3.5, 6.0) * w.radius_m;
+        let length = if whole(rng, 0, 3) > 0 { format!(", length_m = {length:.3}") } else { String::new() };
+        let _ = write!(
+            header,
+            "\n[rig]\ncontainer = {{ shape = \"cylinder\", radius_m = {}{length} }}\nliquid_mass_kg = {}\nvolume_m3 = {}\n",
+            w.radius_m, w.mass_kg, w.volume_m3
+        );
+        if whole(rng, 0, 1) == 1 {
+            header.push_str("temperature_k = 294\n");
+        }
+        let mut data = format!("run,t_s,{channel}\n");
+        for run in 0..w.starts.len() {
+            let mut readings = w.run(run);
+            self.noise.apply(&mut readings, rng);
+            for (row, value) in readings.iter().enumerate() {
+                let _ = writeln!(data, "{},{:.4},{value:.7}", run + 1, row as f64 / w.rate_hz);
+            }
+        }
+        [header, data]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
+        for seed in 0..3 {
+            let set_up = SetUp::draw(true, &mut ChaCha8Rng::seed_from_u64(seed));
+            let plain = set_up.basis();
+            let left = |e: Effects| plain.left(&set_up.change(e));
+            for listed in 0..LISTED {
+                let strong = |size: f64| {
+                    let mut e = Effects::default();
+                    set_up.set(&mut e, listed, size);
+                    left(e)
+                };
+                let [low, high] = set_up.bounds(listed);
+                assert!(strong(high) > 1.3 * strong(low) && strong(high) > 3.0, "{listed}: {}", strong(high));
+            }
+            for which in 0..UNLISTED {
+                let [_, high] = set_up.unlisted_bounds(which);
+                assert!(left(set_up.unlisted(which, 1.0, high)) > 5.0, "{which}");
+            }
+            assert!(left(Effects::default()) < 1e-9);
+        }
+    }
+
+    /// Another amplitude, phase and viscosity are nothing new.
+    #[test]
+    fn nuisances_are_taken_whole() {
+        let set_up = SetUp::draw(false, &mut ChaCha8Rng::seed_from_u64(5));
+        let mut other = set_up.world.clone();
+        other.starts[0].phases_rad[0] += 0.7;
+        other.starts[1].amplitude *= 1.2;
+        other.viscosity_m2_s *= 1.01;
+        let moved = change(&set_up.world.readings(), &other.readings());
+        let moved: Vec<f64> = moved.iter().map(|x| x / set_up.sigma).collect();
+        let whole = moved.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let left = set_up.basis().left(&moved);
+        assert!(whole > 30.0 && left < 0.01 * whole, "{left} of {whole}");
+    }
+}
