@@ -29,8 +29,12 @@ pub struct Flaws {
     pub blur_px: f64,
     /// Sigma of a pixel's noise in m, added after the blur.
     pub noise_m: f64,
-    /// Share of pixels that are missing.
+    /// Share of pixels that are missing wherever they are.
     pub missing: f64,
+    /// Share of the pixels at an edge that are missing beside those.
+    pub missing_at_edges: f64,
+    /// Step of depth to a neighbour, in m, from which a pixel is at an edge.
+    pub edge_m: f64,
 }
 
 impl Camera {
@@ -77,15 +81,31 @@ impl Camera {
         depth
     }
 
+    /// Whether the depth steps by more than `edge_m` from a pixel to one of its four neighbours.
+    pub fn is_edge(&self, depth_m: &[f64], pixel: usize, edge_m: f64) -> bool {
+        let width = self.size_px[0];
+        let beside = |other: Option<usize>| {
+            other.and_then(|o| depth_m.get(o)).is_some_and(|d| (d - depth_m[pixel]).abs() > edge_m)
+        };
+        let column = pixel % width;
+        beside((column > 0).then(|| pixel - 1))
+            || beside((column + 1 < width).then(|| pixel + 1))
+            || beside(pixel.checked_sub(width))
+            || beside(Some(pixel + width))
+    }
+
     /// The counts that the camera gives for depths in m; 0 where a pixel is missing.
     pub fn expose(&self, depth_m: &[f64], flaws: &Flaws, rng: &mut dyn Rng) -> Vec<u16> {
         let mut blurred = depth_m.to_vec();
         blur(&mut blurred, self.size_px, flaws.blur_px);
         blurred
             .iter()
-            .map(|d| {
+            .enumerate()
+            .map(|(i, d)| {
                 let noise: f64 = StandardNormal.sample(&mut *rng);
-                if rng.random::<f64>() < flaws.missing {
+                let edge = flaws.missing_at_edges > 0.0 && self.is_edge(depth_m, i, flaws.edge_m);
+                let share = flaws.missing + if edge { flaws.missing_at_edges } else { 0.0 };
+                if rng.random::<f64>() < share {
                     return 0;
                 }
                 ((d + flaws.noise_m * noise) / self.depth_unit_m).round().clamp(1.0, 65535.0) as u16

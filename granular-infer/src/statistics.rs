@@ -3,14 +3,15 @@
 //! Lengths are scaled by `L = d N^(1/3)`, the edge of the cube that holds the grains in rows. All of them but the ground's are
 //! of heights above the fitted ground; missing pixels do not count.
 
+use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use crate::seeing::HeightMap;
 
 /// Edges of the rings in L.
 const RINGS: [f64; 10] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1, 3.0];
-/// The first ring whose mean height is taken by its root, which evens out how much it varies from pour to pour.
-const FIRST_ROOT: usize = 5;
+/// Least height that moments are divided by, over what the grains' volume should give.
+const LEAST: f64 = 0.3;
 /// Heap and strays part here, in L.
 const FOOT: f64 = 1.0;
 /// Where strays end, in L.
@@ -45,7 +46,6 @@ pub static STATISTICS: LazyLock<Vec<(String, Symmetry)>> = LazyLock::new(|| {
     list.push(("roughness_2_over_1_px".into(), Symmetry::Scalar));
     list.push(("roughness_4_over_2_px".into(), Symmetry::Scalar));
     list.push(("stray_height".into(), Symmetry::Scalar));
-    list.push(("stray_roughness".into(), Symmetry::Scalar));
     list.push(("centroid_x".into(), Symmetry::Vector));
     list.push(("centroid_y".into(), Symmetry::Second));
     list.push(("oval_xx_yy".into(), Symmetry::Tensor));
@@ -54,13 +54,14 @@ pub static STATISTICS: LazyLock<Vec<(String, Symmetry)>> = LazyLock::new(|| {
 });
 
 /// Number of [`STATISTICS`].
-pub const COUNT: usize = 3 + RINGS.len() - 1 + LAGS.len() + 6;
+pub const COUNT: usize = 3 + RINGS.len() - 1 + LAGS.len() + 5;
 
 /// The statistics of a picture of `count` grains of a mean diameter in m.
 pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT] {
     let length = diameter_m * (count as f64).cbrt();
     let d = diameter_m;
     let variance = map.noise_m * map.noise_m;
+    let clear = (4.0 * map.noise_m).max(0.35 * d);
     let (mut ring, mut pixels) = ([0.0; RINGS.len() - 1], [0usize; RINGS.len() - 1]);
     let (mut mass, mut first) = (0.0, [0.0; 2]);
     let (mut inner, mut second) = (0.0, [0.0; 2]);
@@ -86,9 +87,9 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
             second[0] += z * (x * x - y * y);
             second[1] += z * 2.0 * x * y;
         }
-        if (FOOT..FAR).contains(&r) {
+        if (FOOT..FAR).contains(&r) && z > clear {
             stray += z;
-            square += z * z - variance;
+            square += z * z;
         }
     }
     let mut out = [0.0; COUNT];
@@ -96,37 +97,38 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
     out[1] = map.slope[0];
     out[2] = map.slope[1];
     for k in 0..ring.len() {
-        let mean = ring[k] / pixels[k].max(1) as f64 / d;
-        // A hundredth of a diameter keeps noise about zero inside the root.
-        out[3 + k] = if k < FIRST_ROOT { mean } else { (mean + 0.01).max(0.0).sqrt() };
+        // A root evens out how much a height varies from pour to pour; a hundredth of a diameter keeps noise inside it.
+        out[3 + k] = (ring[k] / pixels[k].max(1) as f64 / d + 0.01).max(0.0).sqrt();
     }
     let at = 3 + ring.len();
     let [one, two, four] = LAGS.map(|lag| {
-        let all = differences(map, &radii, lag, 0.0, FOOT) - 2.0 * variance;
+        let all = differences(map, &radii, lag) - 2.0 * variance;
         all.max(1e-4 * d * d)
     });
     out[at] = (one / (d * d)).ln();
     out[at + 1] = (two / one).ln();
     out[at + 2] = (four / two).ln();
-    // Means weighted by height: what is alone on the ground stands as high as a grain.
-    out[at + 3] = ((square.max(0.0) + 2.0 * d * d) / (stray.max(0.0) + 2.0 * d) / d).ln();
-    let rough = differences(map, &radii, 1, FOOT, FAR) - 2.0 * variance;
-    let strays = pixels[FIRST_ROOT..].iter().sum::<usize>() as f64;
-    out[at + 4] = ((rough.max(0.0) * strays + 2.0 * d * d) / (square.max(0.0) + 2.0 * d * d)).ln();
-    let mass = mass.max(1e-3 * d);
-    let inner = inner.max(1e-3 * d) * length * length;
-    out[at + 5] = first[0] / mass / length;
-    out[at + 6] = first[1] / mass / length;
-    out[at + 7] = second[0] / inner;
-    out[at + 8] = second[1] / inner;
+    // Mean height weighted by height: what is alone on the ground stands as high as a grain. A few pixels of an ordinary grain
+    // stand in where there are no strays.
+    let usual = 0.6 * d;
+    out[at + 3] = ((square + 10.0 * usual * usual) / (stray + 10.0 * usual) / d).ln();
+    // Heights of all grains in a pixel's area, summed: N pi/6 d^3 = pi/6 L^3.
+    let pixel_m2 = PI * (FAR * length).powi(2) / pixels.iter().sum::<usize>().max(1) as f64;
+    let least = LEAST * PI / 6.0 * length.powi(3) / pixel_m2;
+    let mass = mass.max(least);
+    let inner = inner.max(least) * length * length;
+    out[at + 4] = first[0] / mass / length;
+    out[at + 5] = first[1] / mass / length;
+    out[at + 6] = second[0] / inner;
+    out[at + 7] = second[1] / inner;
     out
 }
 
-/// Mean square difference between pixels that lie `lag` apart along a row or a column, both within a ring.
-fn differences(map: &HeightMap, radii: &[f64], lag: usize, from: f64, to: f64) -> f64 {
+/// Mean square difference between pixels that lie `lag` apart along a row or a column, both within the foot.
+fn differences(map: &HeightMap, radii: &[f64], lag: usize) -> f64 {
     let [width, height] = map.size_px;
     let (mut sum, mut n) = (0.0, 0usize);
-    let within = |r: f64| r >= from && r < to;
+    let within = |r: f64| r < FOOT;
     let mut add = |i: usize, j: usize| {
         if within(radii[i]) && within(radii[j]) {
             sum += (map.heights_m[i] - map.heights_m[j]).powi(2);

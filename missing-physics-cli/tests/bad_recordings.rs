@@ -54,7 +54,7 @@ fn every_rule_of_the_header_has_its_line() {
         ("format = 1\ndomain = \"flight\"\n".into(), format!("key domain is \"flight\", {one}")),
         (
             "format = 1\ndomain = \"grain-pour\"\n".into(),
-            format!("key domain is \"grain-pour\", {one} (the others are not in this version yet)"),
+            "key rig.grain_count is missing, expected a number from 50 to 5000".into(),
         ),
         (
             "format = 1\ndomain = \"trajectory\"\n".into(),

@@ -1,12 +1,13 @@
 //! The full model of pours: an emulator of what their pictures show.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
-use granular_infer::camera::{Camera, Flaws};
+use granular_infer::camera::Flaws;
 use granular_infer::campaign::{Conditions, Grains};
 use granular_infer::emulator::{Emulator, EmulatorError, Sample};
 use granular_infer::seeing::HeightMap;
-use granular_infer::statistics::{COUNT, STATISTICS, statistics};
+use granular_infer::statistics::{COUNT, STATISTICS, Symmetry, statistics};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
 use nalgebra::{DMatrix, DVector};
@@ -23,6 +24,10 @@ const MOST_BLUR_PX: f64 = 3.0;
 /// What the ground's level and slopes are known to beyond the pictures' noise: in m, and in rad.
 const LEVEL_M: f64 = 3e-5;
 const SLOPE: f64 = 5e-4;
+/// How well mean heights are known to, in diameters.
+const RING_D: f64 = 2e-3;
+/// The first statistics, which are the ground's.
+const GROUND: usize = 3;
 /// Two codes that simulate the same grains differ by about this part of the spread from pour to pour.
 const DISCREPANCY: f64 = 0.5;
 /// Draws and refinements of the search for where the spread is taken.
@@ -64,25 +69,64 @@ fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
     let unit = read.camera.depth_unit_m;
     // Rounding to counts adds its own part again.
     let noise_m = (noise * noise - unit * unit / 12.0).max(0.0).sqrt();
-    let missing = read.pictures.iter().map(|p| p.map.missing).sum::<f64>() / read.pictures.len().max(1) as f64;
+    let volume_m3 = read.rig.count as f64 * PI / 6.0 * read.rig.diameter_m.powi(3);
+    let flaws = missing(campaign, read, Flaws { noise_m, ..Flaws::default() });
     let one = |(pour, grains): &(u32, Grains)| {
         let conditions = campaign.ranges.draw(Campaign::SEED, u64::from(*pour));
-        let scaled = Grains {
-            positions_m: grains.positions_m.iter().map(|p| p.map(|v| campaign.scale * v)).collect(),
-            radii_m: grains.radii_m.iter().map(|r| campaign.scale * r).collect(),
-        };
-        let depth = read.camera.render(&scaled);
+        let depth = read.camera.render(&scaled(grains, campaign.scale));
         let mut rng = ChaCha8Rng::seed_from_u64(Campaign::SEED);
         rng.set_stream(u64::from(*pour));
         let blurred = MOST_BLUR_PX * rng.random::<f64>();
         [0.0, blurred].into_iter().filter_map(move |blur_px| {
-            let counts = read.camera.expose(&depth, &Flaws { blur_px, noise_m, missing }, &mut rng);
-            let map = HeightMap::new(&read.camera, &counts, 0.0).ok()?;
+            let counts = read.camera.expose(&depth, &Flaws { blur_px, ..flaws }, &mut rng);
+            let map = HeightMap::new(&read.camera, &counts, volume_m3).ok()?;
             let seen = statistics(&map, read.rig.count, read.rig.diameter_m);
             Some(Sample { conditions, blur_px2: blur_px * blur_px, statistics: seen })
         }).collect::<Vec<_>>()
     };
     campaign.pours.par_iter().flat_map_iter(one).collect()
+}
+
+fn scaled(grains: &Grains, scale: f64) -> Grains {
+    Grains {
+        positions_m: grains.positions_m.iter().map(|p| p.map(|v| scale * v)).collect(),
+        radii_m: grains.radii_m.iter().map(|r| scale * r).collect(),
+    }
+}
+
+/// Which pixels are missing: some everywhere, as far out, and more at edges, as in the heap.
+fn missing(campaign: &Campaign, read: &Read, flaws: Flaws) -> Flaws {
+    /// Pours over which edges are counted.
+    const POURS: usize = 30;
+    let edge_m = 0.5 * read.rig.diameter_m;
+    let length = read.rig.diameter_m * (read.rig.count as f64).cbrt();
+    let (mut inner, mut outer) = ([0usize; 2], [0usize; 2]);
+    for map in read.pictures.iter().map(|p| &p.map) {
+        for ([x, y], z) in map.places_m.iter().zip(&map.heights_m) {
+            let r = x.hypot(*y) / length;
+            let count = if r < 1.0 { &mut inner } else { &mut outer };
+            if r < 1.0 || r > 2.1 {
+                count[0] += usize::from(!z.is_finite());
+                count[1] += 1;
+            }
+        }
+    }
+    let share = |[part, all]: [usize; 2]| part as f64 / all.max(1) as f64;
+    let mut edges = [0usize; 2];
+    for (_, grains) in campaign.pours.iter().take(POURS) {
+        let depth = read.camera.render(&scaled(grains, campaign.scale));
+        for i in 0..depth.len() {
+            let [x, y] =
+                read.camera.place_m(i % read.camera.size_px[0], i / read.camera.size_px[0], depth[i]);
+            if x.hypot(y) < length {
+                edges[0] += usize::from(read.camera.is_edge(&depth, i, edge_m));
+                edges[1] += 1;
+            }
+        }
+    }
+    let missing = share(outer);
+    let missing_at_edges = ((share(inner) - missing) / share(edges).max(0.01)).clamp(0.0, 0.9);
+    Flaws { missing, missing_at_edges, edge_m, ..flaws }
 }
 
 impl PourModel {
@@ -141,10 +185,21 @@ impl PourModel {
         sigma[0] = sigma[0].hypot(LEVEL_M / self.diameter_m);
         sigma[1] = sigma[1].hypot(SLOPE);
         sigma[2] = sigma[2].hypot(SLOPE);
+        // The outer rings hang on the ground's level to within some micrometres.
+        let mean = self.emulator.mean(&view.conditions, view.blur_px2);
+        for (k, (name, _)) in STATISTICS.iter().enumerate() {
+            if name.starts_with("height_") {
+                sigma[k] = sigma[k].hypot(0.5 * RING_D / mean[k].max(0.1));
+            }
+        }
         let correlation = self.emulator.correlation();
         let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
-            let own = if i == j { DISCREPANCY * DISCREPANCY } else { 0.0 };
-            sigma[i] * sigma[j] * (correlation[(i, j)] + own)
+            // What vanishes by symmetry does so in every code.
+            let scalar = i == j && STATISTICS[i].1 == Symmetry::Scalar;
+            let own = if scalar { DISCREPANCY * DISCREPANCY } else { 0.0 };
+            // Where the ground reads is the camera's, and says nothing of the grains.
+            let tied = if i != j && i.min(j) < GROUND { 0.0 } else { correlation[(i, j)] };
+            sigma[i] * sigma[j] * (tied + own)
         });
         covariance
             .cholesky()
@@ -285,10 +340,4 @@ impl Model for PourModel {
 pub(super) fn any_spec() -> Spec {
     let ranges = granular_infer::campaign::Ranges::default();
     build(&ranges, [0.4, 0.1, 0.5], 0.04, 0.12).0
-}
-
-/// Whether a camera sees the ground out to where strays lie, in m.
-pub(super) fn sees_m(camera: &Camera) -> f64 {
-    let half = |axis: usize| 0.5 * camera.size_px[axis] as f64 / camera.focal_px[axis] * camera.height_m;
-    half(0).min(half(1))
 }
