@@ -89,7 +89,8 @@ impl Emulator {
                 }));
                 let freedom = (width * samples.len()) as f64 / (width * samples.len() - mean.len()) as f64;
                 let left = |s: usize, i: usize| values(s, i) - rows[s][i].dot(&mean);
-                let floor = (0..samples.len()).map(|i| left(0, i).powi(2)).sum::<f64>() / samples.len() as f64;
+                let floor =
+                    (0..samples.len()).map(|i| left(0, i).powi(2)).sum::<f64>() / samples.len() as f64;
                 let log = |s: usize, i: usize| {
                     (freedom * left(s, i).powi(2) + 1e-6 * floor + 1e-300).ln() - LOG_CHI2
                 };

@@ -69,7 +69,9 @@ pub enum SeeError {
         least: f64,
     },
     /// Nothing stands above the ground.
-    #[error("{volume_m3:.2e} m3 stand above the ground, expected about {expected_m3:.2e} m3: there are no grains")]
+    #[error(
+        "{volume_m3:.2e} m3 stand above the ground, expected about {expected_m3:.2e} m3: there are no grains"
+    )]
     NoGrains {
         /// What is seen, m3.
         volume_m3: f64,
@@ -176,11 +178,8 @@ fn ground(camera: &Camera, depths: &[f64]) -> Result<Plane, SeeError> {
     let finite = depths.iter().filter(|d| d.is_finite()).count();
     let mut within = 0;
     for round in 0..12 {
-        let left: Vec<f64> = depths
-            .iter()
-            .enumerate()
-            .map(|(i, d)| d - plane.depth(camera, i % width, i / width))
-            .collect();
+        let left: Vec<f64> =
+            depths.iter().enumerate().map(|(i, d)| d - plane.depth(camera, i % width, i / width)).collect();
         // Deeper than the ground is only noise: its spread is the noise's.
         let deeper: Vec<f64> = left.iter().copied().filter(|r| *r > 0.0 && *r < MOST_NOISE).collect();
         plane.noise = (1.4826 * median(deeper)).clamp(0.3 * camera.depth_unit_m, MOST_NOISE);

@@ -82,9 +82,8 @@ pub fn read(shard: &[u8], rig: &Rig) -> Result<Vec<(u32, Grains)>, ShardError> {
             return Err(ShardError::Count { pour, received: n, expected: rig.count });
         }
         let Some(body) = shard.get(at + HEAD..at + HEAD + GRAIN * n) else { return Err(short) };
-        let value = |axis: usize, i: usize| {
-            i16::from_le_bytes([body[axis * n + i], body[(3 + axis) * n + i]])
-        };
+        let value =
+            |axis: usize, i: usize| i16::from_le_bytes([body[axis * n + i], body[(3 + axis) * n + i]]);
         let mut x = 0i16;
         let mut grains = Grains::default();
         for i in 0..n {

@@ -28,7 +28,11 @@ fn heap(turned_rad: f64) -> Grains {
         // A sunflower: even in area, higher in the middle, longer along x and aside.
         let (r, a) = (0.05 * (f64::from(k) / 1000.0).sqrt(), 2.399_963 * f64::from(k));
         let (x, y) = (1.3 * r * a.cos() + 3e-3, r * a.sin());
-        grains.positions_m.push([cosine * x - sine * y, sine * x + cosine * y, 2e-3 + 0.02 * (1.0 - r / 0.05)]);
+        grains.positions_m.push([
+            cosine * x - sine * y,
+            sine * x + cosine * y,
+            2e-3 + 0.02 * (1.0 - r / 0.05),
+        ]);
         grains.radii_m.push(0.5 * D);
     }
     grains
@@ -47,7 +51,13 @@ fn at(name: &str) -> usize {
 /// Every pixel's depth against the nearest of all intersections of its ray, found by small steps along it.
 #[test]
 fn a_rendered_depth_is_the_first_thing_on_the_ray() {
-    let camera = Camera { size_px: [24, 24], centre_px: [11.5, 11.5], focal_px: [60.0, 80.0], height_m: 0.1, ..CAMERA };
+    let camera = Camera {
+        size_px: [24, 24],
+        centre_px: [11.5, 11.5],
+        focal_px: [60.0, 80.0],
+        height_m: 0.1,
+        ..CAMERA
+    };
     let grains = Grains {
         positions_m: vec![[0.0, 0.0, 0.01], [0.008, 0.004, 0.02], [-0.012, 0.01, 0.005], [0.01, 0.004, 0.03]],
         radii_m: vec![0.01, 0.006, 0.005, 0.004],
@@ -58,9 +68,11 @@ fn a_rendered_depth_is_the_first_thing_on_the_ray() {
             let [x, y] = camera.place_m(u, v, 1.0);
             let inside = |t: f64| {
                 let p = [x * t, y * t, 0.1 - t];
-                grains.positions_m.iter().zip(&grains.radii_m).any(|(c, r)| {
-                    p.iter().zip(c).map(|(a, b)| (a - b).powi(2)).sum::<f64>() < r * r
-                })
+                grains
+                    .positions_m
+                    .iter()
+                    .zip(&grains.radii_m)
+                    .any(|(c, r)| p.iter().zip(c).map(|(a, b)| (a - b).powi(2)).sum::<f64>() < r * r)
             };
             let slow = (0..20_000).map(|k| 5e-6 * f64::from(k)).find(|&t| inside(t)).unwrap_or(0.1);
             assert!((depth[v * 24 + u] - slow).abs() < 2e-5, "{u} {v}: {} and {slow}", depth[v * 24 + u]);
@@ -128,7 +140,8 @@ fn noise_is_taken_out_and_blur_is_seen() {
     for k in 0..COUNT {
         assert!((clean[k] - noisy[k]).abs() < 0.12, "{}: {} and {}", STATISTICS[k].0, clean[k], noisy[k]);
     }
-    let blurred = statistics(&seen(&CAMERA, &heap(0.0), &Flaws { blur_px: 2.0, ..Flaws::default() }), 1000, D);
+    let blurred =
+        statistics(&seen(&CAMERA, &heap(0.0), &Flaws { blur_px: 2.0, ..Flaws::default() }), 1000, D);
     assert!(blurred[at("roughness")] < clean[at("roughness")] - 1.0);
     assert!((blurred[3] - clean[3]).abs() < 0.3);
 }
@@ -139,7 +152,8 @@ fn pictures_without_sense_are_refused() {
     let n = 200 * 200;
     let volume = 3.35e-5;
     let read = |counts: &[u16]| HeightMap::new(&CAMERA, counts, volume).unwrap_err();
-    let good = CAMERA.expose(&CAMERA.render(&heap(0.0)), &Flaws::default(), &mut ChaCha8Rng::seed_from_u64(1));
+    let good =
+        CAMERA.expose(&CAMERA.render(&heap(0.0)), &Flaws::default(), &mut ChaCha8Rng::seed_from_u64(1));
     assert!(HeightMap::new(&CAMERA, &good, volume).is_ok());
     assert!(matches!(read(&good[1..]), SeeError::Size { .. }));
     assert!(matches!(read(&vec![0; n]), SeeError::Missing { .. }));

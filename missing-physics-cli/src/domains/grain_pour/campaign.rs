@@ -48,7 +48,8 @@ impl Campaign {
         let ranges = Ranges::default();
         let inside = low / scale >= 1.2 * ranges.height_m[0] && high / scale <= 0.98 * ranges.height_m[1];
         if inside && similar(rig, scale) {
-            let fail = |why: String| ReadError::Open { file: "the pours that come with the tool".into(), why };
+            let fail =
+                |why: String| ReadError::Open { file: "the pours that come with the tool".into(), why };
             let mut bytes = Vec::new();
             std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(BUNDLED), &mut bytes)
                 .map_err(|e| fail(e.to_string()))?;
@@ -123,8 +124,8 @@ fn cache_file(rig: &Rig, ranges: &Ranges) -> Option<PathBuf> {
     let folder = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
     // FNV-1a over everything that the pours depend on.
     let text = format!("1 {SEED} {rig:?} {ranges:?}");
-    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
-        (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
+    let hash = text
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
     Some(folder.join("missing-physics").join(format!("pours-{hash:016x}.bin")))
 }

@@ -43,7 +43,10 @@ impl Domain for GrainPour {
     fn reads(&self) -> &'static [(&'static str, &'static str)] {
         &[
             ("run, funnel_height_m, depth_image", "one row a pour; the picture is a 16-bit greyscale PNG"),
-            ("[camera] fx_px, fy_px, cx_px, cy_px, height_m, depth_unit_m", "it looks straight down; 0 counts: missing"),
+            (
+                "[camera] fx_px, fy_px, cx_px, cy_px, height_m, depth_unit_m",
+                "it looks straight down; 0 counts: missing",
+            ),
             ("[rig] grain_diameter_m, grain_mass_kg, grain_count", "means, and how many are poured"),
             ("[rig] funnel", "{ outlet_radius_m, cone_half_angle_rad, tube_radius_m }"),
             ("[noise] depth_m", "optional, for the record: the ground shows the noise of a pixel"),
@@ -76,7 +79,12 @@ impl Domain for GrainPour {
             .map(|picture| run(&picture.label, picture.height_m, &model.shown(picture, &read)))
             .collect();
         let experiments = [0.6 * range[0], 1.15 * range[1]]
-            .map(|height| height.clamp(1.02 * campaign.scale * campaign.ranges.height_m[0], 0.98 * campaign.scale * campaign.ranges.height_m[1]))
+            .map(|height| {
+                height.clamp(
+                    1.02 * campaign.scale * campaign.ranges.height_m[0],
+                    0.98 * campaign.scale * campaign.ranges.height_m[1],
+                )
+            })
             .map(|height| propose(&mut model, height));
         let recording = Recording {
             channels: STATISTICS.iter().map(|(name, _)| Quantity::new(name, "sigma")).collect(),
@@ -90,7 +98,13 @@ impl Domain for GrainPour {
             "each statistic is shown less what those before it say of it, in standard deviations from pour to pour".into(),
             "grains that are not spheres are not in the model: they would be unexplained".into(),
         ];
-        Ok(Loaded { recording, model: Box::new(model), experiments: experiments.into(), undetermined, impacts: Vec::new() })
+        Ok(Loaded {
+            recording,
+            model: Box::new(model),
+            experiments: experiments.into(),
+            undetermined,
+            impacts: Vec::new(),
+        })
     }
 }
 

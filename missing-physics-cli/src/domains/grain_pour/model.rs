@@ -77,12 +77,15 @@ fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
         let mut rng = ChaCha8Rng::seed_from_u64(Campaign::SEED);
         rng.set_stream(u64::from(*pour));
         let blurred = MOST_BLUR_PX * rng.random::<f64>();
-        [0.0, blurred].into_iter().filter_map(move |blur_px| {
-            let counts = read.camera.expose(&depth, &Flaws { blur_px, ..flaws }, &mut rng);
-            let map = HeightMap::new(&read.camera, &counts, volume_m3).ok()?;
-            let seen = statistics(&map, read.rig.count, read.rig.diameter_m);
-            Some(Sample { conditions, blur_px2: blur_px * blur_px, statistics: seen })
-        }).collect::<Vec<_>>()
+        [0.0, blurred]
+            .into_iter()
+            .filter_map(move |blur_px| {
+                let counts = read.camera.expose(&depth, &Flaws { blur_px, ..flaws }, &mut rng);
+                let map = HeightMap::new(&read.camera, &counts, volume_m3).ok()?;
+                let seen = statistics(&map, read.rig.count, read.rig.diameter_m);
+                Some(Sample { conditions, blur_px2: blur_px * blur_px, statistics: seen })
+            })
+            .collect::<Vec<_>>()
     };
     campaign.pours.par_iter().flat_map_iter(one).collect()
 }
@@ -171,9 +174,11 @@ impl PourModel {
 
     /// Another run, for an experiment, with the spread of an existing one.
     pub(super) fn propose(&mut self, label: &str, height_m: f64) {
-        if let Some(shown) = self.runs.values().min_by(|a, b| {
-            (a.height_m - height_m).abs().total_cmp(&(b.height_m - height_m).abs())
-        }) {
+        if let Some(shown) = self
+            .runs
+            .values()
+            .min_by(|a, b| (a.height_m - height_m).abs().total_cmp(&(b.height_m - height_m).abs()))
+        {
             let shown = Shown { height_m, ..shown.clone() };
             self.runs.insert(label.to_owned(), shown);
         }
@@ -248,10 +253,8 @@ impl PourModel {
                     let mut view = best.1;
                     let c = &mut view.conditions;
                     let clamp = |v: f64, [a, b]: [f64; 2]| v.clamp(a, b);
-                    c.sliding_friction =
-                        clamp(c.sliding_friction * step().exp(), ranges.sliding_friction);
-                    c.rolling_friction =
-                        clamp(c.rolling_friction * step().exp(), ranges.rolling_friction);
+                    c.sliding_friction = clamp(c.sliding_friction * step().exp(), ranges.sliding_friction);
+                    c.rolling_friction = clamp(c.rolling_friction * step().exp(), ranges.rolling_friction);
                     c.restitution = clamp(c.restitution + 0.4 * step(), ranges.restitution);
                     c.work_of_adhesion_j_m2 *= step().exp();
                     c.work_of_adhesion_j_m2 = c.work_of_adhesion_j_m2.min(ranges.work_of_adhesion_j_m2);

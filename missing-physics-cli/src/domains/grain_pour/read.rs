@@ -113,7 +113,11 @@ fn rig(header: &Header) -> Result<Rig, ReadError> {
     let density = rig.density_kg_m3();
     if !(50.0..=25_000.0).contains(&density) {
         let expected = "a mass that fits the diameter: 50 to 25000 kg/m3";
-        return Err(section.unfit("grain_mass_kg", format!("{} ({density:.0} kg/m3)", rig.mass_kg), expected));
+        return Err(section.unfit(
+            "grain_mass_kg",
+            format!("{} ({density:.0} kg/m3)", rig.mass_kg),
+            expected,
+        ));
     }
     Ok(rig)
 }

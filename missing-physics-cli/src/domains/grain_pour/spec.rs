@@ -35,13 +35,8 @@ pub(super) fn build(ranges: &Ranges, start: [f64; 3], lowest_m: f64, highest_m: 
     b.spec.baseline =
         "equal rigid spheres with sliding friction, rolling friction and restitution, poured onto level ground".into();
     let within = |[low, high]: [f64; 2], v: f64| v.clamp(low, high);
-    p.friction = b.shared(
-        "mu_s",
-        "",
-        within(ranges.sliding_friction, start[0]),
-        ranges.sliding_friction,
-        0.1,
-    );
+    p.friction =
+        b.shared("mu_s", "", within(ranges.sliding_friction, start[0]), ranges.sliding_friction, 0.1);
     p.rolling =
         b.shared("mu_r", "", within(ranges.rolling_friction, start[1]), ranges.rolling_friction, 0.03);
     p.restitution = b.shared("e", "", within(ranges.restitution, start[2]), ranges.restitution, 0.1);
