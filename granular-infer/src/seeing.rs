@@ -182,7 +182,7 @@ fn ground(camera: &Camera, depths: &[f64]) -> Result<Plane, SeeError> {
             depths.iter().enumerate().map(|(i, d)| d - plane.depth(camera, i % width, i / width)).collect();
         // Deeper than the ground is only noise: its spread is the noise's.
         let deeper: Vec<f64> = left.iter().copied().filter(|r| *r > 0.0 && *r < MOST_NOISE).collect();
-        plane.noise = (1.4826 * median(deeper)).clamp(0.3 * camera.depth_unit_m, MOST_NOISE);
+        plane.noise = (1.4826 * median(deeper)).max(0.3 * camera.depth_unit_m).min(MOST_NOISE);
         let band = 2.5 * plane.noise * if round == 0 { 2.0 } else { 1.0 };
         let mut normal = nalgebra::Matrix3::<f64>::zeros();
         let mut right = nalgebra::Vector3::<f64>::zeros();
@@ -219,7 +219,8 @@ fn commonest(camera: &Camera, depths: &[f64]) -> f64 {
         }
     }
     let most = bins.iter().enumerate().max_by_key(|(_, n)| **n).map_or(0, |(i, _)| i);
-    (most as f64 + 0.5) * bin
+    let middle = (most as f64 + 0.5) * bin;
+    median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.5 * bin).collect())
 }
 
 /// The median, NaN of nothing.
