@@ -88,8 +88,10 @@ const MOST_SATURATED: f64 = 20.0;
 const UNIT_FACTOR: f64 = 1.3;
 /// Fewest pixels on the ground, percent.
 const LEAST_GROUND: f64 = 25.0;
-/// Noise in m that no sensible camera is above: what is rougher is no ground.
+/// Depths in m below the ground over which its noise is looked for.
 const MOST_NOISE: f64 = 0.02;
+/// Noise over that depth from which there is no ground: depths that are spread evenly have 0.74.
+const ROUGH: f64 = 0.6;
 /// Least share of the grains' volume that has to be seen.
 const LEAST_VOLUME: f64 = 0.2;
 
@@ -203,7 +205,8 @@ fn ground(camera: &Camera, depths: &[f64]) -> Result<Plane, SeeError> {
         }
     }
     let share = 100.0 * within as f64 / finite.max(1) as f64;
-    if share < LEAST_GROUND || plane.noise >= MOST_NOISE || plane.slope.iter().any(|s| s.abs() > 1.0) {
+    if share < LEAST_GROUND || plane.noise >= ROUGH * MOST_NOISE || plane.slope.iter().any(|s| s.abs() > 1.0)
+    {
         return Err(SeeError::NoGround { share, least: LEAST_GROUND });
     }
     Ok(plane)
