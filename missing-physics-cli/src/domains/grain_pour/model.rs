@@ -108,7 +108,7 @@ fn missing(campaign: &Campaign, read: &Read, flaws: Flaws) -> Flaws {
         for ([x, y], z) in map.places_m.iter().zip(&map.heights_m) {
             let r = x.hypot(*y) / length;
             let count = if r < 1.0 { &mut inner } else { &mut outer };
-            if r < 1.0 || r > 2.1 {
+            if !(1.0..=2.1).contains(&r) {
                 count[0] += usize::from(!z.is_finite());
                 count[1] += 1;
             }
@@ -236,7 +236,7 @@ impl PourModel {
         let draw = |k: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(0x9e3);
             rng.set_stream(k);
-            let blur: f64 = if k % 3 == 0 { rng.random::<f64>() * MOST_BLUR_PX } else { 0.0 };
+            let blur: f64 = if k.is_multiple_of(3) { rng.random::<f64>() * MOST_BLUR_PX } else { 0.0 };
             View { conditions: ranges.draw(0x51, k), blur_px2: blur * blur }
         };
         let scored: Vec<(f64, View)> =
