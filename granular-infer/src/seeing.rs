@@ -154,7 +154,9 @@ impl HeightMap {
     /// Volume in m3 between the ground and what clearly stands above it.
     fn volume_m3(&self, camera: &Camera) -> f64 {
         let clear = self.heights_m.iter().filter(|z| **z > 4.0 * self.noise_m);
-        clear.map(|z| z * (camera.height_m - z).powi(2) / (camera.focal_px[0] * camera.focal_px[1])).sum()
+        let area = |z: &f64| (camera.height_m - z).powi(2) / (camera.focal_px[0] * camera.focal_px[1]);
+        // A sum of nothing is -0.
+        clear.map(|z| z * area(z)).sum::<f64>() + 0.0
     }
 }
 
