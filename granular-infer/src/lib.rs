@@ -1,3 +1,9 @@
 #![doc = include_str!("../README.md")]
 
+pub mod camera;
+pub mod campaign;
 pub mod dem;
+pub mod emulator;
+pub mod seeing;
+pub mod shard;
+pub mod statistics;

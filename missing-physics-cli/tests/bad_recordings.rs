@@ -54,7 +54,7 @@ fn every_rule_of_the_header_has_its_line() {
         ("format = 1\ndomain = \"flight\"\n".into(), format!("key domain is \"flight\", {one}")),
         (
             "format = 1\ndomain = \"grain-pour\"\n".into(),
-            format!("key domain is \"grain-pour\", {one} (the others are not in this version yet)"),
+            "key rig.grain_count is missing, expected a number from 50 to 5000".into(),
         ),
         (
             "format = 1\ndomain = \"trajectory\"\n".into(),
@@ -300,4 +300,65 @@ fn a_template_is_a_sound_recording() {
     let (status, _, err) = tool(&["new", "trajectory", fresh]);
     assert_eq!((status, err.contains("exists, expected a new or empty folder")), (2, true));
     assert_eq!(tool(&["new", "weather", fresh]).0, 2);
+}
+
+/// Each kind of picture that shows no grains on a ground, or is no picture of depths, has its line.
+#[test]
+fn every_rule_of_a_depth_picture_has_its_line() {
+    let header = "format = 1\ndomain = \"grain-pour\"\ndata = \"data.csv\"\n[camera]\nfx_px = 50\nfy_px = 50\ncx_px = 19.5\n\
+                  cy_px = 19.5\nheight_m = 0.35\ndepth_unit_m = 0.0001\n[rig]\ngrain_diameter_m = 0.004\n\
+                  grain_mass_kg = 4.356e-5\ngrain_count = 1000\n\
+                  funnel = { outlet_radius_m = 0.014, cone_half_angle_rad = 0.7854, tube_radius_m = 0.04 }\n";
+    let csv = "run,funnel_height_m,depth_image\n1,0.06,a.png\n";
+    let picture = |depth: png::BitDepth, counts: &[u16]| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 40, 40);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(depth);
+        let wide = depth == png::BitDepth::Sixteen;
+        let data: Vec<u8> =
+            counts.iter().flat_map(|c| c.to_be_bytes()[usize::from(!wide)..].to_vec()).collect();
+        encoder.write_header().unwrap().write_image_data(&data).unwrap();
+        bytes
+    };
+    let said = |csv: &str, bytes: Option<&[u8]>| {
+        let folder = folder(header, csv.as_bytes());
+        if let Some(bytes) = bytes {
+            std::fs::write(folder.path().join("a.png"), bytes).unwrap();
+        }
+        let error = domains::load(folder.path()).err().unwrap().to_string();
+        error.replace(&format!("{}/", folder.path().display()), "")
+    };
+    let sixteen = |counts: &[u16]| picture(png::BitDepth::Sixteen, counts);
+    let wild: Vec<u16> = (0..1600).map(|i| 2800 + ((i * 7919) % 1400) as u16).collect();
+    let cases: Vec<(Option<Vec<u8>>, &str)> = vec![
+        (None, "a.png: no such file"),
+        (Some(b"not a picture".to_vec()), "a.png: not a sound PNG: "),
+        (
+            Some(sixteen(&[3500; 1600])[..200.min(sixteen(&[3500; 1600]).len() - 20)].to_vec()),
+            "a.png: not a sound PNG: ",
+        ),
+        (
+            Some(picture(png::BitDepth::Eight, &[7; 1600])),
+            "a.png: Eight bits, Grayscale, expected 16-bit greyscale",
+        ),
+        (Some(sixteen(&[0; 1600])), "a.png: 100 % of the pixels are missing, expected at most 60 %"),
+        (Some(sixteen(&[u16::MAX; 1600])), "a.png: 100 % of the pixels are at the limit of 65535 counts"),
+        (
+            Some(sixteen(&[350; 1600])),
+            "a.png: the middle depth is 0.0350 m and the camera stands 0.35 m high",
+        ),
+        (Some(sixteen(&[3500; 1600])), "a.png: 0.00e0 m3 stand above the ground, expected about 3.35e-5 m3"),
+        (Some(sixteen(&wild)), "a.png: "),
+    ];
+    for (bytes, expected) in cases {
+        let got = said(csv, bytes.as_deref());
+        assert!(got.starts_with(expected) && got.lines().count() == 1, "{got}, expected {expected}");
+    }
+    let twice = format!("{csv}1,0.08,a.png\n");
+    assert!(said(&twice, Some(&sixteen(&[3500; 1600]))).contains("expected one row a run"));
+    let outside = csv.replace("a.png", "../a.png");
+    assert!(said(&outside, None).contains("a file in the recording's folder"));
+    let low = csv.replace("0.06", "-0.06");
+    assert!(said(&low, None).contains("expected above 0 and below 10"));
 }

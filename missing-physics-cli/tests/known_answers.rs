@@ -139,6 +139,11 @@ fn practice_doughs() {
     practice_cases_but("dough-roll", &[("c05", "unexplained")]);
 }
 
+#[test]
+fn practice_pours() {
+    practice_cases_get_the_verdicts_of_their_keys("grain-pour");
+}
+
 /// Measured drops: drag where there is drag, and no other set; the golf ball proves nothing.
 #[test]
 fn measured_drops_are_drag_or_nothing() {

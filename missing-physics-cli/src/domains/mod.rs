@@ -4,6 +4,7 @@ pub mod bounce;
 mod builder;
 pub mod custom;
 pub mod dough_roll;
+pub mod grain_pour;
 pub mod indentation;
 pub mod liquid_tilt;
 mod reading;
@@ -88,12 +89,10 @@ pub fn all() -> &'static [&'static dyn Domain] {
         &indentation::Indentation,
         &bounce::Bounce,
         &dough_roll::DoughRoll,
+        &grain_pour::GrainPour,
         &custom::Custom,
     ]
 }
-
-/// Domains of the format that this version does not have yet.
-const LATER: [&str; 1] = ["grain-pour"];
 
 /// The domain of an identifier.
 ///
@@ -103,10 +102,6 @@ pub fn find(id: &str) -> Result<&'static dyn Domain, String> {
     let known: Vec<&str> = all().iter().map(|d| d.id()).collect();
     match all().iter().find(|d| d.id() == id) {
         Some(domain) => Ok(*domain),
-        None if LATER.contains(&id) => Err(format!(
-            "domain \"{id}\" is not available in this version, expected one of: {}",
-            known.join(", ")
-        )),
         None => Err(format!(
             "unknown domain {}, expected one of: {}",
             crate::recording::quoted(id),
@@ -139,11 +134,7 @@ fn load_with(header: &Header) -> Result<(&'static dyn Domain, Loaded), ReadError
         file: header.file.clone(),
         key: "domain".into(),
         got: crate::recording::quoted(id),
-        expected: if LATER.contains(&id) {
-            format!("{expected} (the others are not in this version yet)")
-        } else {
-            expected
-        },
+        expected,
     })?;
     let loaded = domain.load(header)?;
     header.finish()?;

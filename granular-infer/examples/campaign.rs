@@ -1,0 +1,41 @@
+//! Pours a shard of a campaign: `cargo run --release -p granular-infer --example campaign -- FIRST LAST FILE`.
+//!
+//! 1,000 grains of 4 mm and 1,300 kg/m3 through the funnel of the recordings. Shards of one campaign merge with `cat`.
+#![allow(
+    clippy::print_stdout,
+    clippy::approx_constant,
+    reason = "says how far it is; the angle is as recordings state it"
+)]
+
+use granular_infer::campaign::{Ranges, Rig};
+use granular_infer::shard;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [first, last, file] = arguments.as_slice() else {
+        return Err("expected FIRST LAST FILE".into());
+    };
+    let (first, last): (u32, u32) = (first.parse()?, last.parse()?);
+    let rig = Rig {
+        count: 1000,
+        diameter_m: 4e-3,
+        mass_kg: 4.356e-5,
+        outlet_radius_m: 0.014,
+        cone_half_angle_rad: 0.7854,
+        tube_radius_m: 0.04,
+    };
+    let mut bytes = Vec::new();
+    for pour in first..last {
+        let conditions = Ranges::default().draw(1, u64::from(pour));
+        match rig.pour(&conditions, u64::from(pour)) {
+            Ok(grains) => shard::append(&mut bytes, pour, &rig, &grains),
+            Err(error) => println!("pour {pour}: {error}, at {conditions:?}"),
+        }
+        if (pour + 1 - first) % 20 == 0 || pour + 1 == last {
+            // What was poured is on disk, should this end early.
+            std::fs::write(file, &bytes)?;
+            println!("{} of {}", pour + 1 - first, last - first);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,346 @@
+//! The full model of pours: an emulator of what their pictures show.
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+use granular_infer::camera::Flaws;
+use granular_infer::campaign::{Conditions, Grains};
+use granular_infer::emulator::{Emulator, EmulatorError, Sample};
+use granular_infer::seeing::HeightMap;
+use granular_infer::statistics::{COUNT, STATISTICS, Symmetry, statistics};
+use missing_physics::data::Run;
+use missing_physics::model::{Model, PredictError, Spec};
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::campaign::Campaign;
+use super::read::{Picture, Read};
+use super::spec::{Places, build};
+
+/// Most blur that pictures are made with, px.
+const MOST_BLUR_PX: f64 = 3.0;
+/// What the ground's level and slopes are known to beyond the pictures' noise: in m, and in rad.
+const LEVEL_M: f64 = 3e-5;
+const SLOPE: f64 = 5e-4;
+/// How well mean heights are known to, in diameters.
+const RING_D: f64 = 2e-3;
+/// The first statistics, which are the ground's.
+const GROUND: usize = 3;
+/// Two codes that simulate the same grains differ by about this part of the spread from pour to pour.
+const DISCREPANCY: f64 = 0.5;
+/// Draws and refinements of the search for where the spread is taken.
+const DRAWS: u64 = 3000;
+
+/// Everything that a prediction depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct View {
+    conditions: Conditions,
+    blur_px2: f64,
+}
+
+/// A run as the engine is to see it: statistics less `centre`, made independent and of variance one.
+#[derive(Debug, Clone)]
+struct Shown {
+    height_m: f64,
+    centre: [f64; COUNT],
+    factor: DMatrix<f64>,
+}
+
+/// The model of the domain `grain-pour`.
+#[derive(Debug)]
+pub(super) struct PourModel {
+    emulator: Emulator,
+    spec: Spec,
+    places: Places,
+    diameter_m: f64,
+    /// Lengths of the recording over those of the campaign; work of adhesion likewise.
+    scale: f64,
+    adhesion_scale: f64,
+    runs: HashMap<String, Shown>,
+}
+
+/// Pictures of a campaign's pours, as the recording's camera would have taken them.
+fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
+    let mut noises: Vec<f64> = read.pictures.iter().map(|p| p.map.noise_m).collect();
+    noises.sort_by(f64::total_cmp);
+    let noise = noises.get(noises.len() / 2).copied().unwrap_or(0.0);
+    let unit = read.camera.depth_unit_m;
+    // Rounding to counts adds its own part again.
+    let noise_m = (noise * noise - unit * unit / 12.0).max(0.0).sqrt();
+    let volume_m3 = read.rig.count as f64 * PI / 6.0 * read.rig.diameter_m.powi(3);
+    let flaws = missing(campaign, read, Flaws { noise_m, ..Flaws::default() });
+    let one = |(pour, grains): &(u32, Grains)| {
+        let conditions = campaign.ranges.draw(Campaign::SEED, u64::from(*pour));
+        let depth = read.camera.render(&scaled(grains, campaign.scale));
+        let mut rng = ChaCha8Rng::seed_from_u64(Campaign::SEED);
+        rng.set_stream(u64::from(*pour));
+        let blurred = MOST_BLUR_PX * rng.random::<f64>();
+        [0.0, blurred]
+            .into_iter()
+            .filter_map(move |blur_px| {
+                let counts = read.camera.expose(&depth, &Flaws { blur_px, ..flaws }, &mut rng);
+                let map = HeightMap::new(&read.camera, &counts, volume_m3).ok()?;
+                let seen = statistics(&map, read.rig.count, read.rig.diameter_m);
+                Some(Sample { conditions, blur_px2: blur_px * blur_px, statistics: seen })
+            })
+            .collect::<Vec<_>>()
+    };
+    campaign.pours.par_iter().flat_map_iter(one).collect()
+}
+
+fn scaled(grains: &Grains, scale: f64) -> Grains {
+    Grains {
+        positions_m: grains.positions_m.iter().map(|p| p.map(|v| scale * v)).collect(),
+        radii_m: grains.radii_m.iter().map(|r| scale * r).collect(),
+    }
+}
+
+/// Which pixels are missing: some everywhere, as far out, and more at edges, as in the heap.
+fn missing(campaign: &Campaign, read: &Read, flaws: Flaws) -> Flaws {
+    /// Pours over which edges are counted.
+    const POURS: usize = 30;
+    let edge_m = 0.5 * read.rig.diameter_m;
+    let length = read.rig.diameter_m * (read.rig.count as f64).cbrt();
+    let (mut inner, mut outer) = ([0usize; 2], [0usize; 2]);
+    for map in read.pictures.iter().map(|p| &p.map) {
+        for ([x, y], z) in map.places_m.iter().zip(&map.heights_m) {
+            let r = x.hypot(*y) / length;
+            let count = if r < 1.0 { &mut inner } else { &mut outer };
+            if !(1.0..=2.1).contains(&r) {
+                count[0] += usize::from(!z.is_finite());
+                count[1] += 1;
+            }
+        }
+    }
+    let share = |[part, all]: [usize; 2]| part as f64 / all.max(1) as f64;
+    let mut edges = [0usize; 2];
+    for (_, grains) in campaign.pours.iter().take(POURS) {
+        let depth = read.camera.render(&scaled(grains, campaign.scale));
+        for i in 0..depth.len() {
+            let [x, y] =
+                read.camera.place_m(i % read.camera.size_px[0], i / read.camera.size_px[0], depth[i]);
+            if x.hypot(y) < length {
+                edges[0] += usize::from(read.camera.is_edge(&depth, i, edge_m));
+                edges[1] += 1;
+            }
+        }
+    }
+    let missing = share(outer);
+    let missing_at_edges = ((share(inner) - missing) / share(edges).max(0.01)).clamp(0.0, 0.9);
+    Flaws { missing, missing_at_edges, edge_m, ..flaws }
+}
+
+impl PourModel {
+    pub(super) fn new(campaign: &Campaign, read: &Read) -> Result<Self, EmulatorError> {
+        let emulator = Emulator::learn(&campaign.ranges, &samples(campaign, read))?;
+        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / campaign.scale).collect();
+        let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = heights.iter().copied().fold(0.0, f64::max);
+        let density = |rig: &granular_infer::campaign::Rig| rig.density_kg_m3() * rig.diameter_m.powi(2);
+        let mut model = Self {
+            emulator,
+            spec: Spec::default(),
+            places: Places::default(),
+            diameter_m: read.rig.diameter_m,
+            scale: campaign.scale,
+            adhesion_scale: density(&read.rig) / density(&campaign.rig),
+            runs: HashMap::new(),
+        };
+        let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| model.statistics(p, read)).collect();
+        let near = model.nearest(&heights, &seen, campaign);
+        let c = near.conditions;
+        let start = [c.sliding_friction, c.rolling_friction, c.restitution];
+        (model.spec, model.places) = build(&campaign.ranges, start, lowest, highest);
+        for (label, height) in read.pictures.iter().map(|p| (p.label.clone(), p.height_m)) {
+            model.add(label, height, &near);
+        }
+        Ok(model)
+    }
+
+    fn statistics(&self, picture: &Picture, read: &Read) -> [f64; COUNT] {
+        statistics(&picture.map, read.rig.count, read.rig.diameter_m)
+    }
+
+    /// Adds a run at a height in m; the spread is that of `near`.
+    fn add(&mut self, label: String, height_m: f64, near: &View) {
+        let mut view = *near;
+        view.conditions.height_m = height_m / self.scale;
+        let factor = self.factor(&view);
+        let centre = self.emulator.mean(&view.conditions, view.blur_px2);
+        self.runs.insert(label, Shown { height_m, centre, factor });
+    }
+
+    /// Another run, for an experiment, with the spread of an existing one.
+    pub(super) fn propose(&mut self, label: &str, height_m: f64) {
+        if let Some(shown) = self
+            .runs
+            .values()
+            .min_by(|a, b| (a.height_m - height_m).abs().total_cmp(&(b.height_m - height_m).abs()))
+        {
+            let shown = Shown { height_m, ..shown.clone() };
+            self.runs.insert(label.to_owned(), shown);
+        }
+    }
+
+    /// Cholesky factor of the covariance of a picture's statistics.
+    fn factor(&self, view: &View) -> DMatrix<f64> {
+        let mut sigma = self.emulator.sigma(&view.conditions, view.blur_px2);
+        sigma[0] = sigma[0].hypot(LEVEL_M / self.diameter_m);
+        sigma[1] = sigma[1].hypot(SLOPE);
+        sigma[2] = sigma[2].hypot(SLOPE);
+        // The outer rings hang on the ground's level to within some micrometres.
+        let mean = self.emulator.mean(&view.conditions, view.blur_px2);
+        for (k, (name, _)) in STATISTICS.iter().enumerate() {
+            if name.starts_with("height_") {
+                sigma[k] = sigma[k].hypot(0.5 * RING_D / mean[k].max(0.1));
+            }
+        }
+        let correlation = self.emulator.correlation();
+        let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
+            // What vanishes by symmetry does so in every code.
+            let scalar = i == j && STATISTICS[i].1 == Symmetry::Scalar;
+            let own = if scalar { DISCREPANCY * DISCREPANCY } else { 0.0 };
+            // Where the ground reads is the camera's, and says nothing of the grains.
+            let tied = if i != j && i.min(j) < GROUND { 0.0 } else { correlation[(i, j)] };
+            sigma[i] * sigma[j] * (tied + own)
+        });
+        covariance
+            .cholesky()
+            .map_or_else(|| DMatrix::from_diagonal(&DVector::from_row_slice(&sigma)), |c| c.unpack())
+    }
+
+    /// Conditions near which pictures like these are poured: the likeliest of many draws, refined by smaller and smaller steps.
+    fn nearest(&self, heights: &[f64], seen: &[[f64; COUNT]], campaign: &Campaign) -> View {
+        let ranges = &campaign.ranges;
+        let score = |view: &View| -> f64 {
+            heights
+                .iter()
+                .zip(seen)
+                .map(|(&height_m, seen)| {
+                    let mut view = *view;
+                    view.conditions.height_m = height_m;
+                    let mean = self.emulator.mean(&view.conditions, view.blur_px2);
+                    let factor = self.factor(&view);
+                    let mut left = DVector::from_fn(COUNT, |k, _| seen[k] - mean[k]);
+                    // The ground's level says nothing of the grains.
+                    left[0] = 0.0;
+                    factor.solve_lower_triangular_mut(&mut left);
+                    // A misfit that nothing explains must not decide alone.
+                    let bounded: f64 = left.iter().map(|v| 9.0 * (1.0 + v * v / 9.0).ln()).sum();
+                    bounded + 2.0 * factor.diagonal().iter().map(|v| v.ln()).sum::<f64>()
+                })
+                .sum()
+        };
+        let draw = |k: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(0x9e3);
+            rng.set_stream(k);
+            let blur: f64 = if k.is_multiple_of(3) { rng.random::<f64>() * MOST_BLUR_PX } else { 0.0 };
+            View { conditions: ranges.draw(0x51, k), blur_px2: blur * blur }
+        };
+        let scored: Vec<(f64, View)> =
+            (0..DRAWS).into_par_iter().map(|k| (score(&draw(k)), draw(k))).collect();
+        let Some(mut best) = scored.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return draw(0) };
+        for round in 0..30 {
+            let size = 0.5 * 0.85_f64.powi(round);
+            let tries: Vec<(f64, View)> = (0..40u64)
+                .into_par_iter()
+                .map(|k| {
+                    let mut rng = ChaCha8Rng::seed_from_u64(round as u64);
+                    rng.set_stream(k);
+                    let mut step = || size * (2.0 * rng.random::<f64>() - 1.0);
+                    let mut view = best.1;
+                    let c = &mut view.conditions;
+                    let clamp = |v: f64, [a, b]: [f64; 2]| v.clamp(a, b);
+                    c.sliding_friction = clamp(c.sliding_friction * step().exp(), ranges.sliding_friction);
+                    c.rolling_friction = clamp(c.rolling_friction * step().exp(), ranges.rolling_friction);
+                    c.restitution = clamp(c.restitution + 0.4 * step(), ranges.restitution);
+                    c.work_of_adhesion_j_m2 *= step().exp();
+                    c.work_of_adhesion_j_m2 = c.work_of_adhesion_j_m2.min(ranges.work_of_adhesion_j_m2);
+                    c.size_variation = (c.size_variation * step().exp()).min(ranges.size_variation);
+                    c.tilt_rad = c.tilt_rad.map(|t| t + 0.03 * step());
+                    view.blur_px2 *= step().exp();
+                    (score(&view), view)
+                })
+                .collect();
+            for one in tries {
+                if one.0 < best.0 {
+                    best = one;
+                }
+            }
+        }
+        best.1
+    }
+
+    /// What the engine is to see of a picture.
+    pub(super) fn shown(&self, picture: &Picture, read: &Read) -> Vec<f64> {
+        match self.runs.get(&picture.label) {
+            Some(shown) => whiten(shown, self.statistics(picture, read)),
+            None => vec![f64::NAN; COUNT],
+        }
+    }
+
+    /// Mean statistics of a picture at shared parameters.
+    fn mean(&self, height_m: f64, shared: &[f64]) -> [f64; COUNT] {
+        let p = &self.places;
+        let at = |place: super::super::builder::At| shared[place.slot];
+        let conditions = Conditions {
+            sliding_friction: at(p.friction),
+            rolling_friction: at(p.rolling),
+            restitution: at(p.restitution),
+            height_m: height_m / self.scale + at(p.funnel_offset),
+            work_of_adhesion_j_m2: at(p.adhesion) / self.adhesion_scale,
+            ground_ratio: at(p.ground_ratio),
+            size_variation: at(p.size_variance).max(0.0).sqrt(),
+            tilt_rad: p.tilt.map(at),
+            drag_per_m: at(p.drag) * self.scale,
+        };
+        let mut mean = self.emulator.mean(&conditions, at(p.blur_px2));
+        mean[0] += at(p.depth_offset) / self.diameter_m;
+        for (k, (name, _)) in STATISTICS.iter().enumerate() {
+            match name.as_str() {
+                "centroid_x" => mean[k] += at(p.aside[0]),
+                "centroid_y" => mean[k] += at(p.aside[1]),
+                "oval_xx_yy" => mean[k] += at(p.oval[0]),
+                "oval_xy" => mean[k] += at(p.oval[1]),
+                "roughness" => mean[k] += at(p.rougher),
+                _ if name.starts_with("height_") => mean[k] *= 1.0 + at(p.larger),
+                _ => {}
+            }
+        }
+        mean
+    }
+}
+
+/// Statistics less what is expected, independent and of variance one.
+fn whiten(shown: &Shown, statistics: [f64; COUNT]) -> Vec<f64> {
+    let mut left = DVector::from_fn(COUNT, |k, _| statistics[k] - shown.centre[k]);
+    shown.factor.solve_lower_triangular_mut(&mut left);
+    left.iter().copied().collect()
+}
+
+impl Model for PourModel {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        let Some(shown) = self.runs.get(&run.label) else {
+            return Err(PredictError { run: run.label.clone(), reason: "no such pour".into() });
+        };
+        out.copy_from_slice(&whiten(shown, self.mean(shown.height_m, shared)));
+        Ok(())
+    }
+
+    /// Pours are independent.
+    fn longest_noise(&self) -> f64 {
+        0.0
+    }
+}
+
+/// A camera for the specification of no recording in particular.
+pub(super) fn any_spec() -> Spec {
+    let ranges = granular_infer::campaign::Ranges::default();
+    build(&ranges, [0.4, 0.1, 0.5], 0.04, 0.12).0
+}
