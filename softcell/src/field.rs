@@ -127,18 +127,21 @@ impl Plan {
         }
         let mean = |k: usize| places.iter().map(|p| p[k]).sum::<f64>() / n as f64;
         let middle = [mean(0), mean(1)];
-        let scale = places
-            .iter()
-            .map(|p| (p[0] - middle[0]).hypot(p[1] - middle[1]))
-            .fold(0.0, f64::max);
+        let scale = places.iter().map(|p| (p[0] - middle[0]).hypot(p[1] - middle[1])).fold(0.0, f64::max);
         if !(scale > 0.0) {
             return Err(FieldError::Degenerate);
         }
         // Lengths over the markers' extent: the system's condition does not depend on the unit.
         let kernel = match kernel {
             Kernel::ThinPlate => kernel,
-            Kernel::Multiquadric { width } | Kernel::Gaussian { width } if !(width > 0.0 && width.is_finite()) => {
-                return Err(FieldError::Setting { what: "the kernel's width", expected: "above 0", got: width });
+            Kernel::Multiquadric { width } | Kernel::Gaussian { width }
+                if !(width > 0.0 && width.is_finite()) =>
+            {
+                return Err(FieldError::Setting {
+                    what: "the kernel's width",
+                    expected: "above 0",
+                    got: width,
+                });
             }
             Kernel::Multiquadric { width } => Kernel::Multiquadric { width: width / scale },
             Kernel::Gaussian { width } => Kernel::Gaussian { width: width / scale },
@@ -256,8 +259,10 @@ impl Lattice<'_> {
                 let (b, c, d) = (a + 1, a + self.columns, a + self.columns + 1);
                 for corners in [[a, b, d], [a, d, c]] {
                     let pairs = [(0, 1), (1, 2), (0, 2)];
-                    let crossings: Vec<_> =
-                        pairs.iter().filter_map(|&(i, k)| self.crossing(corners[i], corners[k], level)).collect();
+                    let crossings: Vec<_> = pairs
+                        .iter()
+                        .filter_map(|&(i, k)| self.crossing(corners[i], corners[k], level))
+                        .collect();
                     if let [first, second] = crossings[..] {
                         out.push([first, second]);
                     }

@@ -18,7 +18,7 @@ use crate::slip::{SlipDetector, SlipError};
 #[derive(Debug, thiserror::Error)]
 pub enum GraspError<E: std::fmt::Debug> {
     /// A device failed.
-    #[error("{}: {0:?}", .1)]
+    #[error("{1}: {0:?}")]
     Device(E, ErrorKind),
     /// The markers cannot be followed.
     #[error(transparent)]

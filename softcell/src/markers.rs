@@ -161,7 +161,8 @@ fn take_apart(pixels: &[usize], width: usize, parts: usize) -> Vec<Marker> {
         for i in pixels {
             let p = [(i % width) as f64, (i / width) as f64];
             let to = |c: &[f64; 2]| (c[0] - p[0]).powi(2) + (c[1] - p[1]).powi(2);
-            let nearest = (0..parts).min_by(|&a, &b| to(&centres[a]).total_cmp(&to(&centres[b]))).unwrap_or(0);
+            let nearest =
+                (0..parts).min_by(|&a, &b| to(&centres[a]).total_cmp(&to(&centres[b]))).unwrap_or(0);
             let s = &mut sums[nearest];
             *s = [s[0] + p[0], s[1] + p[1], s[2] + 1.0];
         }

@@ -203,9 +203,10 @@ impl Stiffness {
         indentation_sigma_m: f64,
         probe_m: f64,
     ) -> Result<Bounded, ModulusError> {
-        for (what, got) in
-            [("the indentation", indentation_m), ("the indentation's standard deviation", indentation_sigma_m)]
-        {
+        for (what, got) in [
+            ("the indentation", indentation_m),
+            ("the indentation's standard deviation", indentation_sigma_m),
+        ] {
             if !(got >= 0.0 && got.is_finite()) {
                 return Err(ModulusError::Value { what, expected: "a finite number, 0 or more", got });
             }

@@ -1,8 +1,9 @@
 //! Shear, indentation and torsion told apart.
 //!
 //! The thesis calls a motion shear where the displacements' directions spread less than a hand-set threshold (section 5.5). Here
-//! all three are fitted at once, `d_i = w(r_i) [t + a (r_i - c) + b J (r_i - c)] + e_i`, where `w = exp(-|r - c|^2/(2 s^2))` fades
-//! away from the contact at c, t is shear, a indentation (outward), b torsion (J turns by a right angle). A part is there
+//! all three are fitted at once, `d_i = w(r_i) [t + a (r_i - c)] + w(r_i)^3 b J (r_i - c) + e_i`, where t is shear, a indentation
+//! (outward), b torsion (J turns by a right angle). The weight `w = (1 + (|r - c|/s)^4)^(-1/4)` is flat over the contact at c and
+//! fades like 1/r, as what is pushed does far away; what is twisted fades like 1/r^3. A part is there
 //! where leaving it out makes the misfit worse than chance would: an F test with c and s fitted anew, the three
 //! at a common level (Holm's procedure), and where it makes up a share of the motion that the bump, which is no membrane's true
 //! shape, could not feign. Nothing moved where the displacements are within the markers' noise (chi-squared).
@@ -90,15 +91,15 @@ pub struct Motion {
     pub moved: bool,
     /// How likely noise alone is to look like this.
     pub p_value: f64,
-    /// Displacement at the contact, (column, row), in pixels.
+    /// Displacement of the contact, (column, row), in pixels: mean of the fit over the markers within the reach.
     pub shear: [f64; 2],
     /// Part of it.
     pub shear_part: Part,
-    /// Spreading at the contact, relative: above 0 outward.
+    /// Spreading of the contact, relative: above 0 outward.
     pub indentation: f64,
     /// Part of it.
     pub indentation_part: Part,
-    /// Turning at the contact in rad, from columns to rows (clockwise in a picture whose rows go down).
+    /// Turning of the contact in rad, from columns to rows (clockwise in a picture whose rows go down).
     pub torsion_rad: f64,
     /// Part of it.
     pub torsion_part: Part,
@@ -143,7 +144,7 @@ pub fn motion(markers: &[Moved], settings: &MotionSettings) -> Result<Motion, Mo
     holm(&mut parts, settings, moved);
     let mean = |k: usize| markers.iter().map(|m| m.by[k]).sum::<f64>() / n as f64;
     let [shear_part, indentation_part, torsion_part] = parts;
-    let x = full.linear;
+    let x = full.over_contact(markers);
     Ok(Motion {
         moved,
         p_value,
@@ -234,12 +235,12 @@ impl Frame {
     fn search(&self, markers: &[Moved], with: &[bool; 4], from: Option<&Fitted>) -> Fitted {
         let at = |u: f64, v: f64, s: f64| {
             let centre = [self.middle[0] + u * self.extent, self.middle[1] + v * self.extent];
-            Fitted::at(markers, with, centre, s * self.extent)
+            Fitted::at(markers, with, centre, s * self.extent, self.extent)
         };
         // Without a fade-out the centre only shifts t against a and b.
         let mut best = at(0.0, 0.0, f64::INFINITY);
         if let Some(f) = from {
-            best = best.or(Fitted::at(markers, with, f.centre, f.reach));
+            best = best.or(Fitted::at(markers, with, f.centre, f.reach, self.extent));
         }
         for u in -2..=2 {
             for v in -2..=2 {
@@ -262,10 +263,12 @@ impl Frame {
                 for sign in [-1.0, 1.0] {
                     let by = sign * step * self.extent;
                     let centre = [best.centre[0] + du * by, best.centre[1] + dv * by];
-                    let near = (centre[0] - self.middle[0]).hypot(centre[1] - self.middle[1]) <= 1.5 * self.extent;
-                    let reach = (best.reach * (sign * step * ds).exp()).clamp(0.15 * self.extent, 8.0 * self.extent);
+                    let near =
+                        (centre[0] - self.middle[0]).hypot(centre[1] - self.middle[1]) <= 1.5 * self.extent;
+                    let reach =
+                        (best.reach * (sign * step * ds).exp()).clamp(0.15 * self.extent, 8.0 * self.extent);
                     if near {
-                        best = best.or(Fitted::at(markers, with, centre, reach));
+                        best = best.or(Fitted::at(markers, with, centre, reach, self.extent));
                     }
                 }
             }
@@ -278,16 +281,14 @@ impl Frame {
 }
 
 impl Fitted {
-    /// Least squares with the centre and the reach held.
-    fn at(markers: &[Moved], with: &[bool; 4], centre: [f64; 2], reach: f64) -> Self {
-        let scale = if reach.is_finite() { reach } else { 1.0 };
+    /// Least squares with the centre and the reach held; the equations are kept in one scale by a length of the markers' extent.
+    fn at(markers: &[Moved], with: &[bool; 4], centre: [f64; 2], reach: f64, scale: f64) -> Self {
         let mut gram = Matrix4::zeros();
         let mut right = Vector4::zeros();
         let mut square = 0.0;
         for m in markers {
             let [along, across] = basis(m.home, centre, reach);
             for (row, d) in [(along, m.by[0]), (across, m.by[1])] {
-                // Lengths in units of the reach keep the equations in one scale.
                 let row = Vector4::new(row[0], row[1], row[2] / scale, row[3] / scale);
                 gram += row * row.transpose();
                 right += row * d;
@@ -301,7 +302,7 @@ impl Fitted {
                 gram.fill_column(k, 0.0);
                 right[k] = 0.0;
             }
-            // A bump with no marker under it has nothing to say: its part is zero.
+            // A part that was left out is zero.
             gram[(k, k)] += 1e-12 * trace + f64::MIN_POSITIVE;
         }
         let solved = gram.cholesky().map_or_else(Vector4::zeros, |c| c.solve(&right));
@@ -312,6 +313,21 @@ impl Fitted {
 
     fn or(self, other: Self) -> Self {
         if other.misfit < self.misfit { other } else { self }
+    }
+
+    /// The parts as they are on average over the markers within the reach.
+    fn over_contact(&self, markers: &[Moved]) -> Vector4<f64> {
+        let (mut n, mut sums) = (0.0, [0.0; 2]);
+        for m in markers {
+            let (x, y) = (m.home[0] - self.centre[0], m.home[1] - self.centre[1]);
+            if x.hypot(y) <= self.reach {
+                let w = weight(x, y, self.reach);
+                (n, sums) = (n + 1.0, [sums[0] + w, sums[1] + w.powi(3)]);
+            }
+        }
+        // No marker so near: the middle's values.
+        let [w, turn] = if n > 0.0 { sums.map(|s| s / n) } else { [1.0; 2] };
+        self.linear.component_mul(&Vector4::new(w, w, w, turn))
     }
 
     /// Square of what some rows of the fit move, over all markers.
@@ -328,6 +344,12 @@ impl Fitted {
 /// What t, a and b move along columns and along rows at a place.
 fn basis(home: [f64; 2], centre: [f64; 2], reach: f64) -> [Vector4<f64>; 2] {
     let (x, y) = (home[0] - centre[0], home[1] - centre[1]);
-    let w = (-0.5 * (x * x + y * y) / (reach * reach)).exp();
-    [Vector4::new(w, 0.0, w * x, -w * y), Vector4::new(0.0, w, w * y, w * x)]
+    let w = weight(x, y, reach);
+    let turn = w * w * w;
+    [Vector4::new(w, 0.0, w * x, -turn * y), Vector4::new(0.0, w, w * y, turn * x)]
+}
+
+fn weight(x: f64, y: f64, reach: f64) -> f64 {
+    let square = (x * x + y * y) / (reach * reach);
+    (1.0 + square * square).sqrt().sqrt().recip()
 }

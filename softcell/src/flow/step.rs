@@ -39,7 +39,13 @@ impl LucasKanade {
 
     /// Where the patch of `before` at `from` (column, row) is in `after`, looked for from `guess` on; none where it leaves the
     /// picture, has no corner, or does not settle.
-    pub fn follow(&mut self, before: &Pyramid, after: &Pyramid, from: [f64; 2], guess: [f64; 2]) -> Option<Flow> {
+    pub fn follow(
+        &mut self,
+        before: &Pyramid,
+        after: &Pyramid,
+        from: [f64; 2],
+        guess: [f64; 2],
+    ) -> Option<Flow> {
         let levels = before.levels().len().min(after.levels().len());
         let mut by = [guess[0] - from[0], guess[1] - from[1]];
         let mut found = None;

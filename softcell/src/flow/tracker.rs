@@ -192,9 +192,9 @@ impl Tracker {
         let at = track.at_px;
         let guess = [at[0] + track.speed_px[0], at[1] + track.speed_px[1]];
         let there = self.step.follow(&self.before, &self.after, at, guess).map(|f| f.at_px);
-        let returns = there.and_then(|p| self.step.follow(&self.after, &self.before, p, at)).is_some_and(|b| {
-            (b.at_px[0] - at[0]).hypot(b.at_px[1] - at[1]) <= self.settings.back_px
-        });
+        let returns = there
+            .and_then(|p| self.step.follow(&self.after, &self.before, p, at))
+            .is_some_and(|b| (b.at_px[0] - at[0]).hypot(b.at_px[1] - at[1]) <= self.settings.back_px);
         let centre = there.filter(|_| returns).and_then(|p| centre(picture, p, self.radius_px));
         let track = &mut self.tracks[i];
         match centre.filter(|c| c.contrast >= self.settings.contrast * track.contrast) {
@@ -209,12 +209,12 @@ impl Tracker {
     /// One marker that was not seen: where its neighbours would have it, if something bright is there and nobody else's.
     fn recover(&mut self, picture: &Picture<u8>, i: usize) {
         let track = self.tracks[i];
-        let Some(by) = self.neighbours_motion(i) else { return };
+        // Where nobody is seen, it is looked for where it was.
+        let by = self.neighbours_motion(i).unwrap_or_else(|| track.by_px());
         let likely = [track.home_px[0] + by[0], track.home_px[1] + by[1]];
         let free = |p: [f64; 2]| {
             let apart = |(k, t): (usize, &Track)| {
-                k == i
-                    || t.at_px[0].mul_add(-1.0, p[0]).hypot(t.at_px[1] - p[1]) > 1.5 * self.radius_px
+                k == i || t.at_px[0].mul_add(-1.0, p[0]).hypot(t.at_px[1] - p[1]) > 1.5 * self.radius_px
             };
             self.tracks.iter().enumerate().all(apart)
         };
@@ -338,14 +338,15 @@ fn range(picture: &Picture<u8>, p: [f64; 2], reach: f64) -> (f64, f64) {
         n += 1;
     });
     let tenth = n / 10;
-    let reached = |order: &mut dyn Iterator<Item = usize>| {
-        let mut sum = 0;
-        order.find(|&g| {
-            sum += counts[g];
-            sum > tenth
-        })
-    };
-    let low = reached(&mut (0..256)).unwrap_or(0);
-    let high = reached(&mut (0..256).rev()).unwrap_or(255);
-    (low as f64, high as f64)
+    (quantile(&counts, 0..256, tenth), quantile(&counts, (0..256).rev(), tenth))
+}
+
+/// The first grey level, in the given order, by which more than `skip` pixels have come.
+fn quantile(counts: &[u32; 256], mut order: impl Iterator<Item = usize>, skip: u32) -> f64 {
+    let mut sum = 0;
+    let reached = order.find(|&grey| {
+        sum += counts[grey];
+        sum > skip
+    });
+    reached.unwrap_or(0) as f64
 }
