@@ -1,0 +1,114 @@
+//! Shaping a cookie: when to stop rolling, and how round it is (section 6.6).
+
+/// Why there is no answer.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// Too few heights to judge by, or no threshold.
+    #[error("a window of {window} heights and a spread of {spread_m} m; expected 3 or more, and a finite spread above 0")]
+    Settings {
+        /// Heights.
+        window: usize,
+        /// Spread.
+        spread_m: f64,
+    },
+    /// A picture of labels that is none.
+    #[error("{pixels} pixels do not make rows of {width}")]
+    NotRows {
+        /// Pixels that came.
+        pixels: usize,
+        /// Columns.
+        width: usize,
+    },
+    /// Nothing to measure.
+    #[error("{pixels} pixels of the object; expected {expected} or more")]
+    TooSmall {
+        /// Pixels of it.
+        pixels: usize,
+        /// Least number.
+        expected: usize,
+    },
+    /// The object is cut off.
+    #[error("the object reaches the picture's border")]
+    CutOff,
+}
+
+/// Watches the height while dough is rolled: done when the last heights' standard deviation is below a threshold.
+#[derive(Debug, Clone)]
+pub struct Settling {
+    heights: Vec<f64>,
+    next: usize,
+    window: usize,
+    spread_m: f64,
+}
+
+impl Settling {
+    /// The thesis's rule: ten heights at 1 Hz, 1 mm.
+    pub fn thesis() -> Self {
+        Self { heights: Vec::new(), next: 0, window: 10, spread_m: 1e-3 }
+    }
+
+    /// A rule of one's own.
+    ///
+    /// # Errors
+    /// [`ShapeError::Settings`].
+    pub fn new(window: usize, spread_m: f64) -> Result<Self, ShapeError> {
+        if window >= 3 && spread_m > 0.0 && spread_m.is_finite() {
+            return Ok(Self { window, spread_m, ..Self::thesis() });
+        }
+        Err(ShapeError::Settings { window, spread_m })
+    }
+
+    /// Takes in a height (m); whether it has settled. A height that is no number is passed over.
+    pub fn push(&mut self, height_m: f64) -> bool {
+        if height_m.is_finite() {
+            if self.heights.len() < self.window {
+                self.heights.push(height_m);
+            } else {
+                self.heights[self.next] = height_m;
+            }
+            self.next = (self.next + 1) % self.window;
+        }
+        self.heights.len() == self.window && self.spread() < self.spread_m
+    }
+
+    fn spread(&self) -> f64 {
+        let n = self.heights.len() as f64;
+        let mean = self.heights.iter().sum::<f64>() / n;
+        (self.heights.iter().map(|h| (h - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt()
+    }
+}
+
+/// Circularity `4 pi area / perimeter^2` of an object in a picture of labels: 1 for a disc, pi/4 for a square.
+///
+/// The perimeter is Cauchy and Crofton's, from the crossings of lines in four directions: following pixels' edges would give a
+/// disc that of its square. Pixels are square.
+///
+/// # Errors
+/// [`ShapeError`].
+pub fn circularity(inside: &[bool], width: usize) -> Result<f64, ShapeError> {
+    if width == 0 || !inside.len().is_multiple_of(width) {
+        return Err(ShapeError::NotRows { pixels: inside.len(), width });
+    }
+    let height = inside.len() / width;
+    let area = inside.iter().filter(|i| **i).count();
+    if area < 100 {
+        return Err(ShapeError::TooSmall { pixels: area, expected: 100 });
+    }
+    let at = |row: usize, column: usize| inside[row * width + column];
+    let edge = |i: usize| i < width || i >= width * (height - 1) || i.is_multiple_of(width) || (i + 1).is_multiple_of(width);
+    if inside.iter().enumerate().any(|(i, x)| *x && edge(i)) {
+        return Err(ShapeError::CutOff);
+    }
+    let mut crossings = [0usize; 4];
+    for row in 0..height - 1 {
+        for column in 1..width - 1 {
+            let here = at(row, column);
+            let others = [at(row, column + 1), at(row + 1, column), at(row + 1, column + 1), at(row + 1, column - 1)];
+            crossings.iter_mut().zip(others).for_each(|(n, other)| *n += usize::from(here != other));
+        }
+    }
+    // Lines along the diagonals are 1/sqrt(2) apart.
+    let [a, b, c, d] = crossings.map(|n| n as f64);
+    let perimeter = std::f64::consts::PI / 8.0 * (a + b + (c + d) * std::f64::consts::FRAC_1_SQRT_2);
+    Ok(4.0 * std::f64::consts::PI * area as f64 / (perimeter * perimeter))
+}
