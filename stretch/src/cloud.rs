@@ -199,6 +199,7 @@ impl Default for CloudSettings {
 #[derive(Debug, Clone, Default)]
 pub struct Cloud {
     pub(crate) window: Option<Window>,
+    geometry: Option<(Intrinsics, Rest)>,
     pub(crate) step: usize,
     /// Height over the plane at rest towards the lens, m; NaN where nothing or something flying was seen.
     pub heights: Vec<f32>,
@@ -217,6 +218,16 @@ impl Cloud {
     /// Columns of the window; 0 before the first picture.
     pub fn columns(&self) -> usize {
         self.window.map_or(0, |w| w.columns)
+    }
+
+    /// The point that an entry shows, not averaged, m, in the camera's frame; none where nothing was seen.
+    pub fn raw_point(&self, index: usize) -> Option<[f64; 3]> {
+        let (window, (intrinsics, rest)) = (self.window?, self.geometry?);
+        let height = f64::from(*self.heights.get(index)?);
+        let (u, v) = ((window.column + index % window.columns) as f64, (window.row + index / window.columns) as f64);
+        let [a, b, c] = rest.inverse_depth;
+        let z = (1.0 - height / rest.distance_m) / (a + b * u + c * v);
+        z.is_finite().then(|| intrinsics.point(u, v, z))
     }
 
     /// Takes a picture in.
@@ -242,6 +253,7 @@ impl Cloud {
             return Err(CloudError::Setting { what: "jump_m", expected: "above 0", got: settings.jump_m });
         }
         self.window = Some(window);
+        self.geometry = Some((*intrinsics, *rest));
         self.step = settings.step_px;
         self.lift(picture, rest, window);
         self.clean(window, settings.jump_m as f32);

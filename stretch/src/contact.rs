@@ -101,7 +101,8 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
         }
     }
     let (radius_m, sigma_m) = (radius * scale, result.1 * scale);
-    if !(radius_m > 3.0 * sigma_m) {
+    // A cap thirty times flatter than wide is within any camera's noise.
+    if !(radius_m > 3.0 * sigma_m && radius < 30.0) {
         return Err(ContactError::Flat { radius_m, sigma_m });
     }
     let centre = centre * scale + middle;
@@ -151,10 +152,10 @@ fn spread(off: &[f64]) -> f64 {
     1.4826 * *off.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Points of a cloud that touch, m, in the camera's frame.
+/// Points of a cloud that touch, m, in the camera's frame; not averaged, which would round off what they show.
 pub fn points(cloud: &Cloud, states: &[State]) -> Vec<[f64; 3]> {
-    let touching = cloud.points.iter().zip(states).filter(|(p, s)| **s == State::Contact && p[2].is_finite());
-    touching.map(|(p, _)| p.map(f64::from)).collect()
+    let touching = states.iter().enumerate().filter(|(_, s)| **s == State::Contact);
+    touching.filter_map(|(i, _)| cloud.raw_point(i)).collect()
 }
 
 /// Diameters of a flat round face.
@@ -176,7 +177,8 @@ const INSIDE: f64 = 0.6;
 /// Diameters of a flat face that is pressed into the membrane (figure 6.4).
 ///
 /// The edge is where the free membrane's profile meets the face's height. Smoothed points round it off by the width of the smoothing; so
-/// the profile outside is fitted on raw heights (a parabola, over the first part of the flank) and met with the face's.
+/// the profile outside is fitted on raw heights, over the first part of the flank, and met with the face's. Around a round contact a
+/// membrane falls like the logarithm of the distance: the profile is a parabola in that.
 ///
 /// # Errors
 /// [`ContactError`].
@@ -288,9 +290,9 @@ impl Edge<'_> {
         profile
     }
 
-    /// Where a parabola through the flank reaches the face's height, nearest to where the edge was thought.
+    /// Where a parabola in the logarithm of the distance reaches the face's height, nearest to where the edge was thought.
     fn meet(&self, flank: &[(f64, f64, f64)], edge: f64) -> Option<(f64, f64)> {
-        let rows = DMatrix::from_fn(flank.len(), 3, |r, c| (flank[r].0 - edge).powi(c as i32) * flank[r].2.sqrt());
+        let rows = DMatrix::from_fn(flank.len(), 3, |r, c| (flank[r].0 / edge).ln().powi(c as i32) * flank[r].2.sqrt());
         let values = DVector::from_fn(flank.len(), |r, _| (flank[r].1 - self.height_m) * flank[r].2.sqrt());
         let gram = (rows.transpose() * &rows).try_inverse()?;
         let x = &gram * rows.transpose() * values;
@@ -304,6 +306,7 @@ impl Edge<'_> {
         let slope = (b + 2.0 * a * s).abs().max(1e-12);
         let row = DVector::from_column_slice(&[1.0, s, s * s]);
         let sigma = self.noise * (&gram * &row).dot(&row).max(0.0).sqrt() / slope;
-        s.is_finite().then_some((edge + s, sigma))
+        let found = edge * s.exp();
+        found.is_finite().then_some((found, sigma * found))
     }
 }

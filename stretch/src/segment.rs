@@ -37,6 +37,15 @@ pub enum Rule {
     EitherAxis,
 }
 
+impl Rule {
+    fn signal(self, i: f32, j: f32) -> f32 {
+        match self {
+            Self::Load { ratio } => j + ratio * i,
+            Self::EitherAxis => i.max(j),
+        }
+    }
+}
+
 /// How a cloud is segmented.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SegmentSettings {
@@ -62,6 +71,7 @@ pub struct Segmenter {
     /// One state a pixel of the cloud's window.
     pub states: Vec<State>,
     curvature: Curvature,
+    signals: Vec<f32>,
     stack: Vec<usize>,
     patch: Vec<usize>,
     seen: Vec<bool>,
@@ -72,13 +82,9 @@ impl Segmenter {
     pub fn segment(&mut self, cloud: &Cloud, settings: &SegmentSettings) -> &[State] {
         self.curvature.fill(cloud);
         self.states.clear();
-        let threshold = settings.curvature_per_m;
         let signals = self.curvature.i.iter().zip(&self.curvature.j);
         self.states.extend(cloud.smooth.iter().zip(signals).map(|(&h, (&i, &j))| {
-            let curved = match settings.rule {
-                Rule::Load { ratio } => j + ratio * i > threshold,
-                Rule::EitherAxis => i > threshold || j > threshold,
-            };
+            let curved = settings.rule.signal(i, j) > settings.curvature_per_m;
             if h.is_nan() {
                 State::Unseen
             } else if !(h > settings.height_m) {
@@ -90,6 +96,7 @@ impl Segmenter {
             }
         }));
         self.keep_largest(cloud, settings);
+        self.trim(settings);
         self.fill_faces(cloud);
         &self.states
     }
@@ -97,6 +104,23 @@ impl Segmenter {
     /// Curvatures of the last cloud.
     pub fn curvature(&self) -> &Curvature {
         &self.curvature
+    }
+
+    /// Smoothing widens a contact; where the signal is half of the contact's median, its edge was.
+    fn trim(&mut self, settings: &SegmentSettings) {
+        let at = |k: usize| settings.rule.signal(self.curvature.i[k], self.curvature.j[k]);
+        self.signals.clear();
+        self.signals.extend((0..self.states.len()).filter(|k| self.states[*k] == State::Contact).map(at));
+        if self.signals.is_empty() {
+            return;
+        }
+        let middle = self.signals.len() / 2;
+        let half = 0.5 * *self.signals.select_nth_unstable_by(middle, f32::total_cmp).1;
+        for (state, (i, j)) in self.states.iter_mut().zip(self.curvature.i.iter().zip(&self.curvature.j)) {
+            if *state == State::Contact && settings.rule.signal(*i, *j) < half {
+                *state = State::Deformed;
+            }
+        }
     }
 
     /// Of the patches of contact the largest, and those at least a quarter of it; the rest is noise.

@@ -75,7 +75,10 @@ impl Membrane {
             let y = dy * row as f64 - 0.5 * self.sheet.breadth_m - at_m[1];
             for column in 0..self.columns {
                 let x = dx * column as f64 - 0.5 * self.length_m() - at_m[0];
-                let top = shape.height_m(x, y).map_or(f64::NEG_INFINITY, |h| h + indentation_m);
+                // An edge between two nodes belongs to the nearer one.
+                let pull = 1.0 - 0.5 * dx.max(dy) / x.hypot(y).max(dx);
+                let top = shape.height_m(x, y).or_else(|| shape.height_m(pull * x, pull * y));
+                let top = top.map_or(f64::NEG_INFINITY, |h| h + indentation_m);
                 self.obstacle[row * self.columns + column] = top;
             }
         }
