@@ -17,7 +17,9 @@ pub enum CloudError {
         got: f64,
     },
     /// The membrane lies outside the picture.
-    #[error("the membrane covers {columns} x {rows} pixels of the picture; expected {expected} or more either way")]
+    #[error(
+        "the membrane covers {columns} x {rows} pixels of the picture; expected {expected} or more either way"
+    )]
     OutOfView {
         /// Columns of it in the picture.
         columns: usize,
@@ -75,7 +77,10 @@ impl Window {
     ) -> Result<Self, CloudError> {
         check(intrinsics)?;
         let half = [0.5 * length_m - margin_m, 0.5 * breadth_m - margin_m];
-        for (what, got) in [("half the membrane's length less the margin", half[0]), ("half its breadth less the margin", half[1])] {
+        for (what, got) in [
+            ("half the membrane's length less the margin", half[0]),
+            ("half its breadth less the margin", half[1]),
+        ] {
             if !(got > 0.0 && got.is_finite()) {
                 return Err(CloudError::Setting { what, expected: "a finite number above 0", got });
             }
@@ -100,7 +105,8 @@ impl Window {
     }
 
     fn fits(&self, picture: &Picture<f32>) -> Result<(), CloudError> {
-        let inside = self.row + self.rows <= picture.height() && self.column + self.columns <= picture.width();
+        let inside =
+            self.row + self.rows <= picture.height() && self.column + self.columns <= picture.width();
         if inside && self.rows >= LEAST && self.columns >= LEAST {
             return Ok(());
         }
@@ -126,7 +132,11 @@ impl Rest {
         if distance_m > 0.0 && distance_m.is_finite() {
             return Ok(Self { inverse_depth: [distance_m.recip(), 0.0, 0.0], distance_m });
         }
-        Err(CloudError::Setting { what: "the distance", expected: "a finite number above 0", got: distance_m })
+        Err(CloudError::Setting {
+            what: "the distance",
+            expected: "a finite number above 0",
+            got: distance_m,
+        })
     }
 
     /// The plane that a picture of the membrane at rest shows in a window; pixels far from it (Tukey's weights) do not count.
@@ -224,7 +234,8 @@ impl Cloud {
     pub fn raw_point(&self, index: usize) -> Option<[f64; 3]> {
         let (window, (intrinsics, rest)) = (self.window?, self.geometry?);
         let height = f64::from(*self.heights.get(index)?);
-        let (u, v) = ((window.column + index % window.columns) as f64, (window.row + index / window.columns) as f64);
+        let (u, v) =
+            ((window.column + index % window.columns) as f64, (window.row + index / window.columns) as f64);
         let [a, b, c] = rest.inverse_depth;
         let z = (1.0 - height / rest.distance_m) / (a + b * u + c * v);
         z.is_finite().then(|| intrinsics.point(u, v, z))
@@ -257,7 +268,8 @@ impl Cloud {
         self.step = settings.step_px;
         self.lift(picture, rest, window);
         self.clean(window, settings.jump_m as f32);
-        let (seen, total) = (self.heights.iter().filter(|h| !h.is_nan()).count(), window.rows * window.columns);
+        let (seen, total) =
+            (self.heights.iter().filter(|h| !h.is_nan()).count(), window.rows * window.columns);
         if 2 * seen < total {
             return Err(CloudError::Blind { seen, total });
         }
@@ -325,12 +337,14 @@ impl Cloud {
         let least = 0.25 * side.powi(4);
         let [values, weights] = &self.sums;
         self.smooth.clear();
-        self.smooth.extend(values.iter().zip(weights).map(|(v, w)| if *w >= least { v / w } else { f32::NAN }));
+        self.smooth
+            .extend(values.iter().zip(weights).map(|(v, w)| if *w >= least { v / w } else { f32::NAN }));
         // At the border the squares are cut off: there less is enough.
         let edge = 2 * half;
         for (i, s) in self.smooth.iter_mut().enumerate() {
             let (row, column) = (i / window.columns, i % window.columns);
-            let inner = row >= edge && column >= edge && row + edge < window.rows && column + edge < window.columns;
+            let inner =
+                row >= edge && column >= edge && row + edge < window.rows && column + edge < window.columns;
             if !inner && weights[i] >= 0.25 * least {
                 *s = values[i] / weights[i];
             }
@@ -413,8 +427,12 @@ fn along_columns(from: &[f32], to: &mut [f32], columns: usize, half: usize) {
                     out[k] = before[k] + add[k] - drop[k];
                 }
             }
-            (true, false) => out.iter_mut().zip(before.iter().zip(line(r + half))).for_each(|(o, (b, a))| *o = b + a),
-            (false, true) => out.iter_mut().zip(before.iter().zip(line(r - half - 1))).for_each(|(o, (b, d))| *o = b - d),
+            (true, false) => {
+                out.iter_mut().zip(before.iter().zip(line(r + half))).for_each(|(o, (b, a))| *o = b + a)
+            }
+            (false, true) => {
+                out.iter_mut().zip(before.iter().zip(line(r - half - 1))).for_each(|(o, (b, d))| *o = b - d)
+            }
             (false, false) => out.copy_from_slice(before),
         }
         before = out;

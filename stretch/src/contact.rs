@@ -127,7 +127,8 @@ pub struct Face {
 pub fn face(points: &[[f64; 3]]) -> Result<Face, ContactError> {
     let all = finite(points, 4)?;
     let middle = all.iter().sum::<Vector3<f64>>() / all.len() as f64;
-    let spread_of = all.iter().map(|p| (p - middle) * (p - middle).transpose()).sum::<nalgebra::Matrix3<f64>>();
+    let spread_of =
+        all.iter().map(|p| (p - middle) * (p - middle).transpose()).sum::<nalgebra::Matrix3<f64>>();
     let eigen = spread_of.symmetric_eigen();
     let least = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     let normal = if least[2] > 0.0 { -least } else { least };
@@ -170,7 +171,7 @@ pub struct Diameters {
 }
 
 /// Half the width of the strip along an axis through the middle that a profile is averaged over, of the rough radius.
-const STRIP: f64 = 0.25;
+const STRIP: f64 = 0.35;
 /// Part of the rough radius that is surely inside.
 const INSIDE: f64 = 0.6;
 
@@ -196,7 +197,9 @@ pub fn diameters(cloud: &Cloud, states: &[State]) -> Result<Diameters, ContactEr
     let rough = (n / std::f64::consts::PI).sqrt();
     let mut core: Vec<f64> = touching
         .iter()
-        .filter(|i| ((*i % columns) as f64 - middle[0]).hypot((*i / columns) as f64 - middle[1]) < INSIDE * rough)
+        .filter(|i| {
+            ((*i % columns) as f64 - middle[0]).hypot((*i / columns) as f64 - middle[1]) < INSIDE * rough
+        })
         .map(|&i| f64::from(cloud.heights[i]))
         .filter(|h| h.is_finite())
         .collect();
@@ -241,12 +244,17 @@ impl Edge<'_> {
             let flank: Vec<(f64, f64, f64)> = profile
                 .iter()
                 .copied()
-                .filter(|p| p.0 > edge + 1.5 && p.0 < edge + 1.5 + (0.9 * self.rough).clamp(14.0, 40.0))
+                .filter(|p| p.0 > edge + 1.5 && p.0 < edge + 1.5 + (2.0 * self.rough).clamp(30.0, 70.0))
                 .collect();
             if flank.len() < 8 {
-                return Err(ContactError::NoEdge { axis, reason: "too little of the flank is in the window" });
+                return Err(ContactError::NoEdge {
+                    axis,
+                    reason: "too little of the flank is in the window",
+                });
             }
-            found = self.meet(&flank, edge).ok_or(ContactError::NoEdge { axis, reason: "the flank does not fall" })?;
+            found = self
+                .meet(&flank, edge)
+                .ok_or(ContactError::NoEdge { axis, reason: "the flank does not fall" })?;
             let next = 0.5 * (edge + found.0);
             if (next - edge).abs() < 1e-3 {
                 break;
@@ -292,7 +300,9 @@ impl Edge<'_> {
 
     /// Where a parabola in the logarithm of the distance reaches the face's height, nearest to where the edge was thought.
     fn meet(&self, flank: &[(f64, f64, f64)], edge: f64) -> Option<(f64, f64)> {
-        let rows = DMatrix::from_fn(flank.len(), 3, |r, c| (flank[r].0 / edge).ln().powi(c as i32) * flank[r].2.sqrt());
+        let rows = DMatrix::from_fn(flank.len(), 3, |r, c| {
+            (flank[r].0 / edge).ln().powi(c as i32) * flank[r].2.sqrt()
+        });
         let values = DVector::from_fn(flank.len(), |r, _| (flank[r].1 - self.height_m) * flank[r].2.sqrt());
         let gram = (rows.transpose() * &rows).try_inverse()?;
         let x = &gram * rows.transpose() * values;

@@ -34,7 +34,9 @@ impl Curvature {
                 *o = between(p, q, m, n);
             }
             if row >= step && row + step < window.rows {
-                let line = |r: usize| (&cloud.points[r * columns..][..columns], &cloud.normals[r * columns..][..columns]);
+                let line = |r: usize| {
+                    (&cloud.points[r * columns..][..columns], &cloud.normals[r * columns..][..columns])
+                };
                 let ((p, m), (q, n)) = (line(row - step), line(row + step));
                 let out = &mut self.i[row * columns..][..columns];
                 for (k, o) in out.iter_mut().enumerate() {

@@ -78,7 +78,12 @@ pub fn load(surface: &Surface, seen: &Seen) -> Result<Load, ForceError> {
 ///
 /// # Errors
 /// [`ForceError`].
-pub fn curve(surface: &Surface, radius_m: f64, stretch_m: f64, indentations_m: &[f64]) -> Result<Vec<f64>, ForceError> {
+pub fn curve(
+    surface: &Surface,
+    radius_m: f64,
+    stretch_m: f64,
+    indentations_m: &[f64],
+) -> Result<Vec<f64>, ForceError> {
     let modulus = surface.modulus_pa(radius_m, stretch_m)?;
     Ok(indentations_m.iter().map(|d| modulus * per_modulus(radius_m, *d)).collect())
 }
@@ -87,7 +92,12 @@ pub fn curve(surface: &Surface, radius_m: f64, stretch_m: f64, indentations_m: &
 ///
 /// # Errors
 /// [`ForceError`].
-pub fn indentation_m(surface: &Surface, radius_m: f64, stretch_m: f64, force_n: f64) -> Result<f64, ForceError> {
+pub fn indentation_m(
+    surface: &Surface,
+    radius_m: f64,
+    stretch_m: f64,
+    force_n: f64,
+) -> Result<f64, ForceError> {
     if !(force_n >= 0.0 && force_n.is_finite()) {
         return Err(ForceError::Value { what: "the force", got: force_n });
     }

@@ -91,7 +91,11 @@ pub fn effective_pa(indenter: &Indenter, presses: &[(f64, f64)]) -> Result<(f64,
     let basis = |depth: f64| factor * depth.powf(indenter.exponent());
     let square: f64 = presses.iter().map(|p| basis(p.0).powi(2)).sum();
     if presses.len() < 2 || !(square > 0.0) {
-        return Err(ModulusError::TooFew { what: "presses with an indentation", expected: 2, got: presses.len() });
+        return Err(ModulusError::TooFew {
+            what: "presses with an indentation",
+            expected: 2,
+            got: presses.len(),
+        });
     }
     let modulus = presses.iter().map(|p| basis(p.0) * p.1).sum::<f64>() / square;
     let misfit: f64 = presses.iter().map(|p| (p.1 - modulus * basis(p.0)).powi(2)).sum();
@@ -195,7 +199,8 @@ impl Surface {
             for &left_out in &radii[1..radii.len() - 1] {
                 let others = Self::without(presses, Some(left_out))?;
                 for p in presses.iter().filter(|p| p.radius_m == left_out && p.indentation_m > 0.0) {
-                    let force = others.modulus(p.radius_m, p.stretch_m) * per_modulus(p.radius_m, p.indentation_m);
+                    let force =
+                        others.modulus(p.radius_m, p.stretch_m) * per_modulus(p.radius_m, p.indentation_m);
                     errors.push((force - p.force_n).abs());
                     relative.push(((force - p.force_n) / force).powi(2));
                 }
@@ -239,7 +244,11 @@ impl Surface {
                 }
             }
             if points.len() < 3 {
-                return Err(ModulusError::TooFew { what: "radii at one stretch", expected: 3, got: points.len() });
+                return Err(ModulusError::TooFew {
+                    what: "radii at one stretch",
+                    expected: 3,
+                    got: points.len(),
+                });
             }
             falling.push(Falling::fit(&points));
         }
@@ -259,7 +268,9 @@ impl Surface {
     /// [`ModulusError::Beyond`].
     pub fn modulus_pa(&self, radius_m: f64, stretch_m: f64) -> Result<f64, ModulusError> {
         let stretch = (self.stretches_m[0], self.stretches_m[self.stretches_m.len() - 1]);
-        for (what, got, (low, high)) in [("the radius", radius_m, self.radius_m), ("the stretch", stretch_m, stretch)] {
+        for (what, got, (low, high)) in
+            [("the radius", radius_m, self.radius_m), ("the stretch", stretch_m, stretch)]
+        {
             let slack = 0.05 * (high - low);
             if !(got >= low - slack && got <= high + slack) {
                 return Err(ModulusError::Beyond { what, got, low, high });

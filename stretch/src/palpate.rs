@@ -2,7 +2,8 @@
 //!
 //! The hand first touches lightly to learn the object's height and radius, unstretched and most sensitive. Then it presses
 //! deeper and, stretch by stretch, harder: at each new stretch it begins where the model's force is that of the stretch before, so
-//! that the force only ever rises, until the object's top has sunk. Force over sinking is its stiffness.
+//! that the force only ever rises, until the object's top has sunk. What the force rose by since the first touch over the sinking is its
+//! stiffness: the first touch itself has pressed it in a little, which nobody saw.
 
 use hw_traits::arm::{Arm, Pose};
 use hw_traits::camera::DepthCamera;
@@ -100,7 +101,11 @@ impl Programme {
         let rising = self.stretches_m.windows(2).all(|w| w[0] < w[1]);
         let first = self.stretches_m.first().copied().unwrap_or(f64::NAN);
         if !(rising && first >= 0.0) {
-            return Err(PalpateError::Setting { what: "the first stretch", expected: "0 or more, then rising", got: first });
+            return Err(PalpateError::Setting {
+                what: "the first stretch",
+                expected: "0 or more, then rising",
+                got: first,
+            });
         }
         for (what, got) in [
             ("the first touch", self.touch_m),
@@ -126,7 +131,9 @@ pub struct Step {
     pub indentation_m: f64,
     /// Force by the model.
     pub load: Load,
-    /// How far the object's top has sunk, m.
+    /// What the force rose by since the first touch, N.
+    pub rise_n: f64,
+    /// How far the object's top has sunk since, m.
     pub sunk_m: f64,
     /// Standard deviation of that, m.
     pub sunk_sigma_m: f64,
@@ -159,7 +166,11 @@ struct Look {
 ///
 /// # Errors
 /// [`PalpateError`].
-pub fn palpate<R>(rig: &mut R, programme: &Programme, surface: &Surface) -> Result<Palpation, PalpateError<R::Error>>
+pub fn palpate<R>(
+    rig: &mut R,
+    programme: &Programme,
+    surface: &Surface,
+) -> Result<Palpation, PalpateError<R::Error>>
 where
     R: DepthCamera + Gripper + Arm,
 {
@@ -181,7 +192,16 @@ where
         stiffness_n_m: None,
         interval_n_m: (0.0, f64::INFINITY),
     };
-    let mut force = 0.0;
+    let force_of = |stretch_m: f64, look: &Look| {
+        let seen = Seen {
+            stretch_m,
+            radius_m: (shape.radius_m, shape.radius_sigma_m),
+            indentation_m: (look.apex_m.max(0.0), look.apex_sigma_m),
+        };
+        load(surface, &seen).map_err(PalpateError::Force)
+    };
+    let first_n = force_of(stretch_m, &first)?.force_n;
+    let mut force = first_n;
     for &stretch_m in &programme.stretches_m {
         lower(rig, programme, programme.above.position_m[2])?;
         open(rig, programme, stretch_m)?;
@@ -192,19 +212,15 @@ where
             let tool_m = top_m - depth;
             lower(rig, programme, tool_m)?;
             let now = eyes.look(rig, programme)?;
-            let seen = Seen {
-                stretch_m,
-                radius_m: (shape.radius_m, shape.radius_sigma_m),
-                indentation_m: (now.apex_m.max(0.0), now.apex_sigma_m),
-            };
-            let load = load(surface, &seen).map_err(PalpateError::Force)?;
+            let load = force_of(stretch_m, &now)?;
             let sunk_m = top_m - (tool_m + now.apex_m);
             let sunk_sigma_m = now.apex_sigma_m.hypot(first.apex_sigma_m);
-            let step = Step { stretch_m, indentation_m: now.apex_m, load, sunk_m, sunk_sigma_m };
+            let rise_n = load.force_n - first_n;
+            let step = Step { stretch_m, indentation_m: now.apex_m, load, rise_n, sunk_m, sunk_sigma_m };
             out.steps.push(step);
             out.interval_n_m.0 = out.interval_n_m.0.max(at_least(&step));
             if sunk_m >= programme.yield_m && sunk_m > 3.0 * sunk_sigma_m {
-                (out.stiffness_n_m, out.interval_n_m) = (Some(load.force_n / sunk_m), between(&step));
+                (out.stiffness_n_m, out.interval_n_m) = (Some(rise_n / sunk_m), between(&step));
                 return Ok(out);
             }
             force = load.force_n.max(force);
@@ -216,11 +232,12 @@ where
 
 /// Least stiffness that a step without yield leaves.
 fn at_least(step: &Step) -> f64 {
-    step.load.interval_n.0 / (step.sunk_m + 1.96 * step.sunk_sigma_m).max(1e-6)
+    let least = step.load.interval_n.0 / step.load.force_n;
+    (step.rise_n * least).max(0.0) / (step.sunk_m + 1.96 * step.sunk_sigma_m).max(1e-6)
 }
 
 fn between(step: &Step) -> (f64, f64) {
-    let k = step.load.force_n / step.sunk_m;
+    let k = step.rise_n / step.sunk_m;
     let of_force = 0.5 * (step.load.interval_n.1 - step.load.interval_n.0) / step.load.force_n;
     let part = of_force.hypot(1.96 * step.sunk_sigma_m / step.sunk_m);
     ((k * (1.0 - part)).max(0.0), k * (1.0 + part))
@@ -272,7 +289,12 @@ struct Eyes {
 
 impl Eyes {
     /// The plane of the free membrane.
-    fn learn_rest<R>(&mut self, rig: &mut R, programme: &Programme, stretch_m: f64) -> Result<(), PalpateError<R::Error>>
+    fn learn_rest<R>(
+        &mut self,
+        rig: &mut R,
+        programme: &Programme,
+        stretch_m: f64,
+    ) -> Result<(), PalpateError<R::Error>>
     where
         R: DepthCamera,
     {
@@ -288,8 +310,8 @@ impl Eyes {
         let rough = Rest::fit(&picture, &intrinsics, &middle).map_err(PalpateError::Cloud)?;
         let size = (picture.width(), picture.height());
         let sheet = (programme.sheet_m.0 + stretch_m, programme.sheet_m.1);
-        let window =
-            Window::of_membrane(size, &intrinsics, &rough, sheet, programme.margin_m).map_err(PalpateError::Cloud)?;
+        let window = Window::of_membrane(size, &intrinsics, &rough, sheet, programme.margin_m)
+            .map_err(PalpateError::Cloud)?;
         let rest = Rest::fit(&picture, &intrinsics, &window).map_err(PalpateError::Cloud)?;
         self.rest = Some((rest, window));
         Ok(())

@@ -12,7 +12,9 @@ pub enum ReconstructError {
     #[error("a cell's side is {0} m; expected a finite number above 0")]
     Cell(f64),
     /// A pose that is none.
-    #[error("the pose's quaternion has the norm {norm}, or its position is no number; expected norm 1 to 1e-6")]
+    #[error(
+        "the pose's quaternion has the norm {norm}, or its position is no number; expected norm 1 to 1e-6"
+    )]
     Pose {
         /// Norm of the quaternion.
         norm: f64,
@@ -54,7 +56,11 @@ impl Merged {
             let w = world_from_camera.transform_point(&(*p).into());
             let cell = [w.x, w.y, w.z].map(|x| (x / self.side_m).floor());
             let fits = cell.iter().all(|c| c.abs() < f64::from(i32::MAX));
-            if fits { Ok((cell.map(|c| c as i32), [w.x, w.y, w.z])) } else { Err(ReconstructError::Point { index }) }
+            if fits {
+                Ok((cell.map(|c| c as i32), [w.x, w.y, w.z]))
+            } else {
+                Err(ReconstructError::Point { index })
+            }
         };
         let placed: Vec<_> = points_m.iter().enumerate().map(place).collect::<Result<_, _>>()?;
         for (cell, w) in placed {

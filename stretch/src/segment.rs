@@ -192,7 +192,10 @@ impl Segmenter {
         for (i, state) in self.states.iter_mut().enumerate() {
             let (u, v) = at(i);
             let within = u >= reach[0] && u <= reach[1] && v >= reach[2] && v <= reach[3];
-            if *state == State::Deformed && within && f64::from(cloud.smooth[i]) > plane.dot(&Vector3::new(1.0, u, v)) {
+            if *state == State::Deformed
+                && within
+                && f64::from(cloud.smooth[i]) > plane.dot(&Vector3::new(1.0, u, v))
+            {
                 *state = State::Contact;
             }
         }

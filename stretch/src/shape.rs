@@ -4,7 +4,9 @@
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     /// Too few heights to judge by, or no threshold.
-    #[error("a window of {window} heights and a spread of {spread_m} m; expected 3 or more, and a finite spread above 0")]
+    #[error(
+        "a window of {window} heights and a spread of {spread_m} m; expected 3 or more, and a finite spread above 0"
+    )]
     Settings {
         /// Heights.
         window: usize,
@@ -80,8 +82,8 @@ impl Settling {
 
 /// Circularity `4 pi area / perimeter^2` of an object in a picture of labels: 1 for a disc, pi/4 for a square.
 ///
-/// The perimeter is Cauchy and Crofton's, from the crossings of lines in four directions: following pixels' edges would give a
-/// disc that of its square. Pixels are square.
+/// The perimeter is that of the line at one half in the picture averaged over 3 x 3 pixels twice: following pixels' edges would
+/// give a disc that of its square. Corners lose a pixel or so. Pixels are square.
 ///
 /// # Errors
 /// [`ShapeError`].
@@ -95,20 +97,54 @@ pub fn circularity(inside: &[bool], width: usize) -> Result<f64, ShapeError> {
         return Err(ShapeError::TooSmall { pixels: area, expected: 100 });
     }
     let at = |row: usize, column: usize| inside[row * width + column];
-    let edge = |i: usize| i < width || i >= width * (height - 1) || i.is_multiple_of(width) || (i + 1).is_multiple_of(width);
+    let edge = |i: usize| {
+        i < width || i >= width * (height - 1) || i.is_multiple_of(width) || (i + 1).is_multiple_of(width)
+    };
     if inside.iter().enumerate().any(|(i, x)| *x && edge(i)) {
         return Err(ShapeError::CutOff);
     }
-    let mut crossings = [0usize; 4];
+    let flat: Vec<f64> = inside.iter().map(|i| f64::from(u8::from(*i))).collect();
+    let smooth = blurred(&blurred(&flat, width), width);
+    let mut perimeter = 0.0;
     for row in 0..height - 1 {
-        for column in 1..width - 1 {
-            let here = at(row, column);
-            let others = [at(row, column + 1), at(row + 1, column), at(row + 1, column + 1), at(row + 1, column - 1)];
-            crossings.iter_mut().zip(others).for_each(|(n, other)| *n += usize::from(here != other));
+        for column in 0..width - 1 {
+            let i = row * width + column;
+            let corners =
+                [([0.0, 0.0], i), ([1.0, 0.0], i + 1), ([1.0, 1.0], i + width + 1), ([0.0, 1.0], i + width)];
+            let corner = |k: usize| (corners[k].0, smooth[corners[k].1]);
+            perimeter +=
+                within([corner(0), corner(1), corner(2)]) + within([corner(0), corner(2), corner(3)]);
         }
     }
-    // Lines along the diagonals are 1/sqrt(2) apart.
-    let [a, b, c, d] = crossings.map(|n| n as f64);
-    let perimeter = std::f64::consts::PI / 8.0 * (a + b + (c + d) * std::f64::consts::FRAC_1_SQRT_2);
     Ok(4.0 * std::f64::consts::PI * area as f64 / (perimeter * perimeter))
+}
+
+/// Means over 3 x 3 pixels; zero at the border.
+fn blurred(values: &[f64], width: usize) -> Vec<f64> {
+    let height = values.len() / width;
+    let mut out = vec![0.0; values.len()];
+    for row in 1..height.saturating_sub(1) {
+        for column in 1..width - 1 {
+            let line = |r: usize| values[r * width + column - 1..=r * width + column + 1].iter().sum::<f64>();
+            out[row * width + column] = (line(row - 1) + line(row) + line(row + 1)) / 9.0;
+        }
+    }
+    out
+}
+
+/// Length of the line at one half within a triangle of places and values.
+fn within(corners: [([f64; 2], f64); 3]) -> f64 {
+    let crossing = |a: usize, b: usize| {
+        let ((p, x), (q, y)) = (corners[a], corners[b]);
+        ((x >= 0.5) != (y >= 0.5)).then(|| {
+            let s = (0.5 - x) / (y - x);
+            [p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])]
+        })
+    };
+    match [crossing(0, 1), crossing(1, 2), crossing(0, 2)] {
+        [Some(p), Some(q), None] | [Some(p), None, Some(q)] | [None, Some(p), Some(q)] => {
+            (p[0] - q[0]).hypot(p[1] - q[1])
+        }
+        _ => 0.0,
+    }
 }

@@ -20,7 +20,8 @@ fn seen(shape: Shape, stretch_m: f64, indentation_m: f64, seed: u64) -> (Cloud, 
     rig.open_to(0.1 + stretch_m, 0.1).unwrap();
     let free = rig.depth_m().unwrap().value;
     let level = Rest::level(0.25).unwrap();
-    let window = Window::of_membrane((640, 480), &rig.intrinsics(), &level, (0.1 + stretch_m, 0.09), 4e-3).unwrap();
+    let window =
+        Window::of_membrane((640, 480), &rig.intrinsics(), &level, (0.1 + stretch_m, 0.09), 4e-3).unwrap();
     let rest = Rest::fit(&free, &rig.intrinsics(), &window).unwrap();
     assert!((rest.distance_m - 0.25).abs() < 5e-5, "{}", rest.distance_m);
     rig.move_to(at(-indentation_m), 1.0).unwrap();
@@ -38,7 +39,13 @@ fn a_ball_s_radius_and_height_are_right() {
         let (cloud, segmenter) = seen(Shape::Ball { radius_m }, stretch_m, 0.010, 1);
         let b = ball(&points(&cloud, &segmenter.states)).unwrap();
         let apex = 0.25 - (b.centre_m[2] - b.radius_m);
-        println!("R {:.1} mm: {:.2} +- {:.2} mm, apex {:.2} mm", 1e3 * radius_m, 1e3 * b.radius_m, 1e3 * b.radius_sigma_m, 1e3 * apex);
+        println!(
+            "R {:.1} mm: {:.2} +- {:.2} mm, apex {:.2} mm",
+            1e3 * radius_m,
+            1e3 * b.radius_m,
+            1e3 * b.radius_sigma_m,
+            1e3 * apex
+        );
         assert!((b.radius_m - radius_m).abs() < 0.12 * radius_m + 0.5e-3, "{b:?}");
         assert!((apex - 0.010).abs() < 0.5e-3);
     }
@@ -52,7 +59,13 @@ fn a_face_s_diameters_are_right_to_a_millimetre_in_the_good_region() {
         for (stretch_m, depth) in [(0.0, 0.006), (0.0, 0.012), (0.02, 0.012)] {
             let (cloud, segmenter) = seen(Shape::Cylinder { radius_m: 0.5 * diameter }, stretch_m, depth, 2);
             let d = diameters(&cloud, &segmenter.states).unwrap();
-            println!("D {diameter} x {stretch_m} depth {depth}: i {:.2} +- {:.2}, j {:.2} +- {:.2} mm", 1e3 * (d.i_m.0 - diameter), 1e3 * d.i_m.1, 1e3 * (d.j_m.0 - diameter), 1e3 * d.j_m.1);
+            println!(
+                "D {diameter} x {stretch_m} depth {depth}: i {:.2} +- {:.2}, j {:.2} +- {:.2} mm",
+                1e3 * (d.i_m.0 - diameter),
+                1e3 * d.i_m.1,
+                1e3 * (d.j_m.0 - diameter),
+                1e3 * d.j_m.1
+            );
             assert!((d.height_m - depth).abs() < 0.2e-3);
             worst = worst.max((d.i_m.0 - diameter).abs()).max((d.j_m.0 - diameter).abs());
         }
@@ -66,8 +79,13 @@ fn segments_are_where_they_should_be() {
     let radius = 0.012;
     let (cloud, mut segmenter) = seen(Shape::Cylinder { radius_m: radius }, 0.0, 0.01, 3);
     let share = |segmenter: &Segmenter, inside: &dyn Fn(f64) -> bool| {
-        let here = cloud.points.iter().zip(&segmenter.states).filter(|(p, s)| **s != State::Unseen && inside(f64::from(p[0].hypot(p[1]))));
-        let (touching, all) = here.fold((0, 0), |n, (_, s)| (n.0 + usize::from(*s == State::Contact), n.1 + 1usize));
+        let here = cloud
+            .points
+            .iter()
+            .zip(&segmenter.states)
+            .filter(|(p, s)| **s != State::Unseen && inside(f64::from(p[0].hypot(p[1]))));
+        let (touching, all) =
+            here.fold((0, 0), |n, (_, s)| (n.0 + usize::from(*s == State::Contact), n.1 + 1usize));
         touching as f64 / all as f64
     };
     let (core, far) = (share(&segmenter, &|r| r < 0.9 * radius), share(&segmenter, &|r| r > 1.6 * radius));
@@ -107,7 +125,8 @@ fn balls_faces_and_what_is_neither() {
         wild[k][2] += 0.01;
     }
     assert!((ball(&wild).unwrap().radius_m - 0.02).abs() < 5e-5);
-    let flat: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k % 10), f64::from(k / 10), 0.1 * f64::from((k * 7) % 3)]).collect();
+    let flat: Vec<[f64; 3]> =
+        (0..100).map(|k| [f64::from(k % 10), f64::from(k / 10), 0.1 * f64::from((k * 7) % 3)]).collect();
     assert!(matches!(ball(&flat), Err(ContactError::Flat { .. })) || ball(&flat).unwrap().radius_m > 10.0);
     let plane: Vec<[f64; 3]> = flat.iter().map(|p| [p[0], p[1], 2.0 - 0.1 * p[0]]).collect();
     assert!(matches!(ball(&plane), Err(ContactError::Flat { .. })));
@@ -125,13 +144,22 @@ fn pictures_that_show_no_membrane_are_refused() {
     let window = Window::of_membrane((640, 480), &k, &rest, (0.1, 0.09), 4e-3).unwrap();
     let mut cloud = Cloud::default();
     let settings = CloudSettings::default();
-    assert!(matches!(cloud.fill(&blank, &k, &rest, window, &settings), Err(CloudError::Blind { seen: 0, .. })));
+    assert!(matches!(
+        cloud.fill(&blank, &k, &rest, window, &settings),
+        Err(CloudError::Blind { seen: 0, .. })
+    ));
     assert!(matches!(Rest::fit(&blank, &k, &window), Err(CloudError::Blind { .. })));
     let small = Picture::new(64, vec![0.25; 64 * 48]).unwrap();
     assert!(matches!(cloud.fill(&small, &k, &rest, window, &settings), Err(CloudError::OutOfView { .. })));
-    assert!(matches!(Window::of_membrane((640, 480), &k, &rest, (0.001, 0.09), 4e-3), Err(CloudError::Setting { .. })));
+    assert!(matches!(
+        Window::of_membrane((640, 480), &k, &rest, (0.001, 0.09), 4e-3),
+        Err(CloudError::Setting { .. })
+    ));
     let aside = Intrinsics { cx: 5000.0, ..k };
-    assert!(matches!(Window::of_membrane((640, 480), &aside, &rest, (0.1, 0.09), 4e-3), Err(CloudError::OutOfView { .. })));
+    assert!(matches!(
+        Window::of_membrane((640, 480), &aside, &rest, (0.1, 0.09), 4e-3),
+        Err(CloudError::OutOfView { .. })
+    ));
     let none = Intrinsics { fx: 0.0, ..k };
     assert!(matches!(cloud.fill(&blank, &none, &rest, window, &settings), Err(CloudError::Setting { .. })));
     let step = CloudSettings { step_px: 0, ..settings };
@@ -185,10 +213,12 @@ fn curvature_of_a_ball_is_one_over_its_radius() {
     let depth = |u: f64, v: f64| {
         // The nearer crossing of the ray with a ball whose top is 0.24 m away.
         let (x, y, _) = ((u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0);
-        let (a, b, c) = (x * x + y * y + 1.0, 0.24 + radius, (0.24 + radius) * (0.24 + radius) - radius * radius);
+        let (a, b, c) =
+            (x * x + y * y + 1.0, 0.24 + radius, (0.24 + radius) * (0.24 + radius) - radius * radius);
         (b - (b * b - a * c).sqrt()) / a
     };
-    let data: Vec<f32> = (0..160 * 160).map(|i| depth(f64::from(i % 160), f64::from(i / 160)) as f32).collect();
+    let data: Vec<f32> =
+        (0..160 * 160).map(|i| depth(f64::from(i % 160), f64::from(i / 160)) as f32).collect();
     let picture = Picture::new(160, data).unwrap();
     for step_px in [6, 10] {
         let settings = CloudSettings { half_px: 1, step_px, ..CloudSettings::default() };

@@ -65,7 +65,8 @@ impl DepthEye {
                     seen + self.noise_m * (seen / 0.25).powi(2) * noise
                 };
                 let hole = steep || chance > 1.0 - 0.5 * self.holes;
-                let stepped = if self.step_m > 0.0 { (noisy / self.step_m).round() * self.step_m } else { noisy };
+                let stepped =
+                    if self.step_m > 0.0 { (noisy / self.step_m).round() * self.step_m } else { noisy };
                 depths.push(if hole { f32::NAN } else { stepped as f32 });
             }
         }

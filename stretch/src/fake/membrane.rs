@@ -82,7 +82,6 @@ impl Membrane {
                 self.obstacle[row * self.columns + column] = top;
             }
         }
-        self.deflection.fill(0.0);
         for _ in 0..5 {
             self.stretch();
             self.relax();
@@ -108,7 +107,10 @@ impl Membrane {
         // The fingers hold the breadth; what they hold it with is the other tension of pure shear.
         let y = 1.0 + 0.5 * across / n;
         let thin = (x * y).powi(-2);
-        self.tension_n_m = [shear * (x / y - thin * y / x), shear * (y / x - thin * x / y).max(0.0) + 0.45 * shear * (x - 1.0)];
+        self.tension_n_m = [
+            shear * (x / y - thin * y / x),
+            shear * (y / x - thin * x / y).max(0.0) + 0.45 * shear * (x - 1.0),
+        ];
     }
 
     /// Projected over-relaxation. The ends are held, the sides are free.
@@ -125,7 +127,8 @@ impl Membrane {
                 let here = row * columns;
                 for k in 1..columns - 1 {
                     let w = &mut self.deflection;
-                    let mean = over * (tx * (w[here + k - 1] + w[here + k + 1]) + ty * (w[above + k] + w[below + k]));
+                    let mean = over
+                        * (tx * (w[here + k - 1] + w[here + k + 1]) + ty * (w[above + k] + w[below + k]));
                     let old = w[here + k];
                     let new = (old + 1.93 * (mean - old)).max(self.obstacle[here + k]);
                     w[here + k] = new;

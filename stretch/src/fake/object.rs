@@ -30,7 +30,9 @@ impl Shape {
     pub fn height_m(&self, x: f64, y: f64) -> Option<f64> {
         let r = x.hypot(y);
         match *self {
-            Self::Ball { radius_m } => (r < radius_m).then(|| (radius_m * radius_m - r * r).sqrt() - radius_m),
+            Self::Ball { radius_m } => {
+                (r < radius_m).then(|| (radius_m * radius_m - r * r).sqrt() - radius_m)
+            }
             Self::Cylinder { radius_m } => (r <= radius_m).then_some(0.0),
             Self::Cone { angle_rad } => Some(-r * angle_rad.tan()),
             Self::Box { half_m } => (x.abs() <= half_m[0] && y.abs() <= half_m[1]).then_some(0.0),
