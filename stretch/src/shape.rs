@@ -1,5 +1,8 @@
 //! Shaping a cookie: when to stop rolling, and how round it is (section 6.6).
 
+use hw_traits::arm::{Arm, Pose};
+use hw_traits::{Error, ErrorKind};
+
 /// Why there is no answer.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ShapeError {
@@ -80,6 +83,89 @@ impl Settling {
     }
 }
 
+/// Circles that are rolled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rolling {
+    /// The tool over the middle of the dough, pressed in as deep as wanted.
+    pub middle: Pose,
+    /// Radius of the circles, m.
+    pub circle_m: f64,
+    /// Moves a circle (3 or more), and the time for each, s.
+    pub moves: (usize, f64),
+    /// Circles after which rolling ends in any case.
+    pub most: usize,
+}
+
+/// How rolling ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rolled {
+    /// Height after each circle, m.
+    pub heights_m: Vec<f64>,
+    /// Whether it settled, or the circles were used up.
+    pub settled: bool,
+}
+
+/// Why rolling stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum RollError<E: std::fmt::Debug> {
+    /// A device failed.
+    #[error("{1}: {0:?}")]
+    Device(E, ErrorKind),
+    /// A setting out of range.
+    #[error("{what} is {got}; expected {expected}")]
+    Setting {
+        /// Which.
+        what: &'static str,
+        /// What it has to be.
+        expected: &'static str,
+        /// What it is.
+        got: f64,
+    },
+}
+
+/// Rolls in circles until the height settles. `height_m` looks at the dough, waits as long as it likes, and is asked once a circle; a
+/// height that is no number counts as none.
+///
+/// # Errors
+/// [`RollError`]; the tool stays where it was.
+pub fn roll<R: Arm>(
+    rig: &mut R,
+    rolling: &Rolling,
+    mut settling: Settling,
+    mut height_m: impl FnMut(&mut R) -> Result<f64, R::Error>,
+) -> Result<Rolled, RollError<R::Error>> {
+    let (moves, time_s) = rolling.moves;
+    for (what, expected, got, least) in [
+        ("the circle's radius", "a finite number above 0", rolling.circle_m, f64::MIN_POSITIVE),
+        ("the time for a move", "a finite number above 0", time_s, f64::MIN_POSITIVE),
+        ("the number of moves", "3 or more", moves as f64, 3.0),
+    ] {
+        if !(got >= least && got.is_finite()) {
+            return Err(RollError::Setting { what, expected, got });
+        }
+    }
+    let device = |e: R::Error| {
+        let kind = e.kind();
+        RollError::Device(e, kind)
+    };
+    let mut heights_m = Vec::new();
+    for _ in 0..rolling.most {
+        for k in 0..moves {
+            let around = std::f64::consts::TAU * k as f64 / moves as f64;
+            let mut pose = rolling.middle;
+            pose.position_m[0] += rolling.circle_m * around.cos();
+            pose.position_m[1] += rolling.circle_m * around.sin();
+            rig.move_to(pose, time_s).map_err(device)?;
+        }
+        let height = height_m(rig).map_err(device)?;
+        heights_m.push(height);
+        if settling.push(height) {
+            return Ok(Rolled { heights_m, settled: true });
+        }
+    }
+    Ok(Rolled { heights_m, settled: false })
+}
+
 /// Circularity `4 pi area / perimeter^2` of an object in a picture of labels: 1 for a disc, pi/4 for a square.
 ///
 /// The perimeter is that of the line at one half in the picture averaged over 3 x 3 pixels twice: following pixels' edges would
@@ -96,7 +182,6 @@ pub fn circularity(inside: &[bool], width: usize) -> Result<f64, ShapeError> {
     if area < 100 {
         return Err(ShapeError::TooSmall { pixels: area, expected: 100 });
     }
-    let at = |row: usize, column: usize| inside[row * width + column];
     let edge = |i: usize| {
         i < width || i >= width * (height - 1) || i.is_multiple_of(width) || (i + 1).is_multiple_of(width)
     };

@@ -9,7 +9,7 @@ use stretch::force::{ForceError, Seen, curve, indentation_m, load};
 use stretch::modulus::{ModulusError, Press, Surface, effective_pa};
 use stretch::palpate::{PalpateError, Programme, palpate};
 use stretch::reconstruct::{Merged, ReconstructError};
-use stretch::shape::{Settling, ShapeError, circularity};
+use stretch::shape::{RollError, Rolling, Settling, ShapeError, circularity, roll};
 
 fn pressed(radius_m: f64, stretch_m: f64, indentation_m: f64) -> Press {
     let mut membrane = Membrane::new(Sheet::thesis(), stretch_m);
@@ -267,6 +267,31 @@ fn rolling_ends_when_the_height_settles() {
     let mut blind = Settling::thesis();
     assert!((0..50).all(|_| !blind.push(f64::NAN)));
     assert!(Settling::new(2, 1e-3).is_err() && Settling::new(10, 0.0).is_err());
+}
+
+#[test]
+fn dough_is_rolled_until_it_is_a_ball_or_the_circles_are_used_up() {
+    let mut rig = Rig::new(Shape::Ball { radius_m: 0.02 }, Filling::Rigid, 1);
+    let rolling = Rolling { middle: above(), circle_m: 0.01, moves: (8, 0.1), most: 60 };
+    // A cube that becomes a ball, a twentieth of the way each circle.
+    let mut height = 0.03;
+    let done = roll(&mut rig, &rolling, Settling::thesis(), |_| {
+        height += 0.05 * (0.037 - height);
+        Ok(height)
+    });
+    let done = done.unwrap();
+    assert!(done.settled && (10..40).contains(&done.heights_m.len()), "{done:?}");
+    let mut side = 1.0;
+    let never = roll(&mut rig, &rolling, Settling::thesis(), |_| {
+        side = -side;
+        Ok(0.03 + 0.003 * side)
+    });
+    assert!(never.is_ok_and(|r| !r.settled && r.heights_m.len() == 60));
+    let two = Rolling { moves: (2, 0.1), ..rolling };
+    assert!(matches!(roll(&mut rig, &two, Settling::thesis(), |_| Ok(0.0)), Err(RollError::Setting { .. })));
+    let far = Rolling { circle_m: 5.0, ..rolling };
+    let refused = roll(&mut rig, &far, Settling::thesis(), |_| Ok(0.0));
+    assert!(matches!(refused, Err(RollError::Device(_, hw_traits::ErrorKind::OutOfRange))));
 }
 
 proptest! {
