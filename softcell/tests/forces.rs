@@ -1,4 +1,9 @@
 //! Field, loads, moduli: known answers, recovery from the fake, and what is refused.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use approx::assert_relative_eq;
 use proptest::prelude::*;

@@ -1,4 +1,9 @@
 //! The reactive grasp on the fake, and the box at slip.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use hw_traits::camera::Camera;
 use hw_traits::clock::Stamped;

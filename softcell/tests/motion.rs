@@ -1,4 +1,9 @@
 //! Shear, indentation and torsion told apart; slip noticed.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;

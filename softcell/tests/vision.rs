@@ -1,4 +1,9 @@
 //! Markers found and followed in pictures whose truth is known.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use hw_traits::camera::Camera;
 use hw_traits::picture::Picture;

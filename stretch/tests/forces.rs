@@ -1,4 +1,9 @@
 //! Moduli, loads, palpation, shape.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use approx::assert_relative_eq;
 use hertz_contact::indenter::Indenter;

@@ -1,4 +1,9 @@
 //! What the camera sees of a contact, against the fake's truth.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
 
 use hw_traits::arm::{Arm, Pose};
 use hw_traits::camera::DepthCamera;
