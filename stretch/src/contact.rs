@@ -1,0 +1,322 @@
+//! What touches: a ball's radius, a face's plane, a flat face's diameters along both axes.
+
+use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+
+use crate::cloud::Cloud;
+use crate::segment::State;
+
+/// Why there is no geometry.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ContactError {
+    /// Too few points touch.
+    #[error("{got} points in contact; expected {expected} or more")]
+    TooFew {
+        /// Least number.
+        expected: usize,
+        /// Points in contact.
+        got: usize,
+    },
+    /// A point that is no number.
+    #[error("point {index} is no number")]
+    NotFinite {
+        /// Its index.
+        index: usize,
+    },
+    /// The points do not bend enough to tell a radius.
+    #[error("a radius of {radius_m:.3} +- {sigma_m:.3} m: the points are as good as flat")]
+    Flat {
+        /// Best radius.
+        radius_m: f64,
+        /// Its standard deviation.
+        sigma_m: f64,
+    },
+    /// The face's edge is not seen in a direction: too shallow, or outside the window.
+    #[error("no edge of the face along {axis}: {reason}")]
+    NoEdge {
+        /// `i` or `j`.
+        axis: &'static str,
+        /// Why.
+        reason: &'static str,
+    },
+}
+
+/// A ball.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball {
+    /// Centre, in the points' frame, m.
+    pub centre_m: [f64; 3],
+    /// Radius, m.
+    pub radius_m: f64,
+    /// Standard deviation of the radius, m, from the points' own scatter, neighbours taken for independent.
+    pub radius_sigma_m: f64,
+    /// Robust standard deviation of the points about it, m.
+    pub scatter_m: f64,
+}
+
+/// Fits a ball: algebraic start, then Gauss-Newton on distances with Tukey's weights.
+///
+/// # Errors
+/// [`ContactError::TooFew`], [`ContactError::NotFinite`], [`ContactError::Flat`] (the radius is known to less than a third).
+pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
+    let all = finite(points, 8)?;
+    let n = all.len() as f64;
+    let middle = all.iter().sum::<Vector3<f64>>() / n;
+    let scale = (all.iter().map(|p| (p - middle).norm_squared()).sum::<f64>() / n).sqrt().max(1e-12);
+    let own: Vec<Vector3<f64>> = all.iter().map(|p| (p - middle) / scale).collect();
+    let (mut gram, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    for p in &own {
+        let x = Vector4::new(2.0 * p[0], 2.0 * p[1], 2.0 * p[2], 1.0);
+        gram += x * x.transpose();
+        right += x * p.norm_squared();
+    }
+    let flat = ContactError::Flat { radius_m: f64::INFINITY, sigma_m: f64::INFINITY };
+    let x = gram.lu().solve(&right).ok_or(flat)?;
+    let mut centre = Vector3::new(x[0], x[1], x[2]);
+    let mut radius = (x[3] + centre.norm_squared()).max(1e-12).sqrt();
+    let mut result = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..30 {
+        let off: Vec<f64> = own.iter().map(|p| (p - centre).norm() - radius).collect();
+        let scatter = spread(&off);
+        let cut = 4.685 * scatter.max(1e-9);
+        let (mut gram, mut right, mut weight, mut square) = (Matrix4::zeros(), Vector4::zeros(), 0.0, 0.0);
+        for (p, r) in own.iter().zip(&off) {
+            let w = (1.0 - (r / cut).powi(2)).max(0.0).powi(2);
+            let d = (p - centre) / (p - centre).norm().max(1e-12);
+            let row = Vector4::new(-d[0], -d[1], -d[2], -1.0);
+            gram += w * row * row.transpose();
+            right -= w * r * row;
+            weight += w;
+            square += w * r * r;
+        }
+        let Some(inverse) = gram.try_inverse() else { return Err(flat) };
+        let step = inverse * right;
+        centre += step.fixed_rows::<3>(0);
+        radius += step[3];
+        result = (scatter, (inverse[(3, 3)] * square / (weight - 4.0).max(1.0)).max(0.0).sqrt());
+        if !(radius.is_finite() && radius.abs() < 1e6) {
+            return Err(flat);
+        }
+        if step.norm() < 1e-10 * radius.abs().max(1.0) {
+            break;
+        }
+    }
+    let (radius_m, sigma_m) = (radius * scale, result.1 * scale);
+    // A cap thirty times flatter than wide is within any camera's noise.
+    if !(radius_m > 3.0 * sigma_m && radius < 30.0) {
+        return Err(ContactError::Flat { radius_m, sigma_m });
+    }
+    let centre = centre * scale + middle;
+    Ok(Ball { centre_m: centre.into(), radius_m, radius_sigma_m: sigma_m, scatter_m: result.0 * scale })
+}
+
+/// A face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Face {
+    /// A point on it, m: the points' mean.
+    pub middle_m: [f64; 3],
+    /// Unit normal, its third component not positive (towards a camera that looks along z).
+    pub normal: [f64; 3],
+    /// Robust standard deviation of the points about it, m.
+    pub scatter_m: f64,
+}
+
+/// The plane nearest to points.
+///
+/// # Errors
+/// [`ContactError::TooFew`], [`ContactError::NotFinite`].
+pub fn face(points: &[[f64; 3]]) -> Result<Face, ContactError> {
+    let all = finite(points, 4)?;
+    let middle = all.iter().sum::<Vector3<f64>>() / all.len() as f64;
+    let spread_of =
+        all.iter().map(|p| (p - middle) * (p - middle).transpose()).sum::<nalgebra::Matrix3<f64>>();
+    let eigen = spread_of.symmetric_eigen();
+    let least = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let normal = if least[2] > 0.0 { -least } else { least };
+    let off: Vec<f64> = all.iter().map(|p| (p - middle).dot(&normal)).collect();
+    Ok(Face { middle_m: middle.into(), normal: normal.into(), scatter_m: spread(&off) })
+}
+
+fn finite(points: &[[f64; 3]], expected: usize) -> Result<Vec<Vector3<f64>>, ContactError> {
+    if points.len() < expected {
+        return Err(ContactError::TooFew { expected, got: points.len() });
+    }
+    if let Some(index) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        return Err(ContactError::NotFinite { index });
+    }
+    Ok(points.iter().map(|p| Vector3::from(*p)).collect())
+}
+
+/// Median of the absolute values, as a standard deviation.
+fn spread(off: &[f64]) -> f64 {
+    let mut off: Vec<f64> = off.iter().map(|x| x.abs()).collect();
+    let middle = off.len() / 2;
+    1.4826 * *off.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Points of a cloud that touch, m, in the camera's frame; not averaged, which would round off what they show.
+pub fn points(cloud: &Cloud, states: &[State]) -> Vec<[f64; 3]> {
+    let touching = states.iter().enumerate().filter(|(_, s)| **s == State::Contact);
+    touching.filter_map(|(i, _)| cloud.raw_point(i)).collect()
+}
+
+/// Diameters of a flat round face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Diameters {
+    /// Along i, from row to row, m, and its standard deviation.
+    pub i_m: (f64, f64),
+    /// Along j, along the stretch, m, and its standard deviation.
+    pub j_m: (f64, f64),
+    /// Height of the face over the plane at rest, m.
+    pub height_m: f64,
+}
+
+/// Half the width of the strip along an axis through the middle that a profile is averaged over, of the rough radius.
+const STRIP: f64 = 0.35;
+/// Part of the rough radius that is surely inside.
+const INSIDE: f64 = 0.6;
+
+/// Diameters of a flat face that is pressed into the membrane (figure 6.4).
+///
+/// The edge is where the free membrane's profile meets the face's height. Smoothed points round it off by the width of the smoothing; so
+/// the profile outside is fitted on raw heights, over the first part of the flank, and met with the face's. Around a round contact a
+/// membrane falls like the logarithm of the distance: the profile is a parabola in that.
+///
+/// # Errors
+/// [`ContactError`].
+pub fn diameters(cloud: &Cloud, states: &[State]) -> Result<Diameters, ContactError> {
+    let columns = cloud.columns().max(1);
+    let touching: Vec<usize> = (0..states.len()).filter(|&i| states[i] == State::Contact).collect();
+    if touching.len() < 30 {
+        return Err(ContactError::TooFew { expected: 30, got: touching.len() });
+    }
+    let n = touching.len() as f64;
+    let middle = [
+        touching.iter().map(|i| (i % columns) as f64).sum::<f64>() / n,
+        touching.iter().map(|i| (i / columns) as f64).sum::<f64>() / n,
+    ];
+    let rough = (n / std::f64::consts::PI).sqrt();
+    let mut core: Vec<f64> = touching
+        .iter()
+        .filter(|i| {
+            ((*i % columns) as f64 - middle[0]).hypot((*i / columns) as f64 - middle[1]) < INSIDE * rough
+        })
+        .map(|&i| f64::from(cloud.heights[i]))
+        .filter(|h| h.is_finite())
+        .collect();
+    if core.len() < 10 {
+        return Err(ContactError::TooFew { expected: 10, got: core.len() });
+    }
+    let half = core.len() / 2;
+    let height_m = *core.select_nth_unstable_by(half, f64::total_cmp).1;
+    let off: Vec<f64> = core.iter().map(|h| h - height_m).collect();
+    let noise = spread(&off).max(1e-6);
+    // Metres a pixel on the face.
+    let near = touching[touching.len() / 2];
+    let pitch = |by: usize, axis: usize| {
+        let other = if near + by < cloud.points.len() { near + by } else { near - by };
+        f64::from(cloud.points[other][axis] - cloud.points[near][axis]).abs()
+    };
+    let pitches = [pitch(columns, 1), pitch(1, 0)];
+    let face = Edge { cloud, middle, rough, height_m, noise };
+    let along = |axis: &'static str, rows: bool, pitch: f64| -> Result<(f64, f64), ContactError> {
+        let (a, b) = (face.find(axis, rows, 1.0)?, face.find(axis, rows, -1.0)?);
+        Ok(((a.0 + b.0) * pitch, a.1.hypot(b.1) * pitch))
+    };
+    Ok(Diameters { i_m: along("i", true, pitches[0])?, j_m: along("j", false, pitches[1])?, height_m })
+}
+
+struct Edge<'a> {
+    cloud: &'a Cloud,
+    middle: [f64; 2],
+    rough: f64,
+    height_m: f64,
+    noise: f64,
+}
+
+impl Edge<'_> {
+    /// Distance of the edge from the middle in pixels, and its standard deviation.
+    fn find(&self, axis: &'static str, rows: bool, sign: f64) -> Result<(f64, f64), ContactError> {
+        let profile = self.profile(rows, sign);
+        let mut edge = self.rough;
+        let mut found = (f64::NAN, f64::INFINITY);
+        for _ in 0..25 {
+            // The first pixels outside hold the edge's own uncertainty.
+            let flank: Vec<(f64, f64, f64)> = profile
+                .iter()
+                .copied()
+                .filter(|p| p.0 > edge + 1.5 && p.0 < edge + 1.5 + (2.0 * self.rough).clamp(30.0, 70.0))
+                .collect();
+            if flank.len() < 8 {
+                return Err(ContactError::NoEdge {
+                    axis,
+                    reason: "too little of the flank is in the window",
+                });
+            }
+            found = self
+                .meet(&flank, edge)
+                .ok_or(ContactError::NoEdge { axis, reason: "the flank does not fall" })?;
+            let next = 0.5 * (edge + found.0);
+            if (next - edge).abs() < 1e-3 {
+                break;
+            }
+            edge = next.clamp(0.3 * self.rough, 2.0 * self.rough);
+        }
+        if !(found.1 < 0.5 * self.rough) {
+            return Err(ContactError::NoEdge { axis, reason: "the flank is lost in the noise" });
+        }
+        Ok(found)
+    }
+
+    /// Distance, mean height and number of pixels across a strip.
+    fn profile(&self, rows: bool, sign: f64) -> Vec<(f64, f64, f64)> {
+        let columns = self.cloud.columns().max(1);
+        let height = self.cloud.heights.len() / columns;
+        let [u, v] = self.middle;
+        let (start, across, end, side) = if rows { (v, u, height, columns) } else { (u, v, columns, height) };
+        let half = (STRIP * self.rough).max(2.0);
+        let (low, high) = ((across - half).max(0.0) as usize, ((across + half) as usize + 1).min(side));
+        let mut profile = Vec::new();
+        for k in 0..end {
+            let out = sign * (k as f64 - start);
+            if out < 0.0 {
+                continue;
+            }
+            let (mut sum, mut n) = (0.0, 0.0);
+            for s in low..high {
+                let i = if rows { k * columns + s } else { s * columns + k };
+                let h = f64::from(self.cloud.heights[i]);
+                if h.is_finite() {
+                    (sum, n) = (sum + h, n + 1.0);
+                }
+            }
+            if n > 0.0 {
+                // The strip crosses a circle: its mean chord is shorter than the diameter by about half^2/6 of the radius.
+                profile.push((out + half * half / (6.0 * self.rough), sum / n, n));
+            }
+        }
+        profile.sort_by(|a, b| a.0.total_cmp(&b.0));
+        profile
+    }
+
+    /// Where a parabola in the logarithm of the distance reaches the face's height, nearest to where the edge was thought.
+    fn meet(&self, flank: &[(f64, f64, f64)], edge: f64) -> Option<(f64, f64)> {
+        let rows = DMatrix::from_fn(flank.len(), 3, |r, c| {
+            (flank[r].0 / edge).ln().powi(c as i32) * flank[r].2.sqrt()
+        });
+        let values = DVector::from_fn(flank.len(), |r, _| (flank[r].1 - self.height_m) * flank[r].2.sqrt());
+        let gram = (rows.transpose() * &rows).try_inverse()?;
+        let x = &gram * rows.transpose() * values;
+        let (c, b, a) = (x[0], x[1], x[2]);
+        // c + b s + a s^2 = 0 with b < 0: the root near zero, in the form that does not cancel.
+        if !(b < 0.0) {
+            return None;
+        }
+        let root = (b * b - 4.0 * a * c).max(0.0).sqrt();
+        let s = 2.0 * c / (-b + root);
+        let slope = (b + 2.0 * a * s).abs().max(1e-12);
+        let row = DVector::from_column_slice(&[1.0, s, s * s]);
+        let sigma = self.noise * (&gram * &row).dot(&row).max(0.0).sqrt() / slope;
+        let found = edge * s.exp();
+        found.is_finite().then_some((found, sigma * found))
+    }
+}

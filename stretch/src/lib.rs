@@ -1,0 +1,13 @@
+#![doc = include_str!("../README.md")]
+
+pub mod cloud;
+pub mod contact;
+pub mod curvature;
+#[cfg(feature = "fake")]
+pub mod fake;
+pub mod force;
+pub mod modulus;
+pub mod palpate;
+pub mod reconstruct;
+pub mod segment;
+pub mod shape;

@@ -1,0 +1,349 @@
+//! Stiffness by active palpation (section 6.6), on any hand with a depth camera, a gripper and an arm.
+//!
+//! The hand first touches lightly to learn the object's height and radius, unstretched and most sensitive. Then it presses
+//! deeper and, stretch by stretch, harder: at each new stretch it begins where the model's force is that of the stretch before, so
+//! that the force only ever rises, until the object's top has sunk. What the force rose by since the first touch over the sinking is its
+//! stiffness: the first touch itself has pressed it in a little, which nobody saw.
+
+use hw_traits::arm::{Arm, Pose};
+use hw_traits::camera::DepthCamera;
+use hw_traits::gripper::Gripper;
+use hw_traits::{Error, ErrorKind};
+
+use crate::cloud::{Cloud, CloudError, CloudSettings, Rest, Window};
+use crate::contact::{Ball, ContactError, ball, points};
+use crate::force::{ForceError, Load, Seen, indentation_m, load};
+use crate::modulus::Surface;
+use crate::segment::{SegmentSettings, Segmenter};
+
+/// Why palpation stopped. The hand stays where it was.
+#[derive(Debug, thiserror::Error)]
+pub enum PalpateError<E: std::fmt::Debug> {
+    /// A device failed.
+    #[error("{1}: {0:?}")]
+    Device(E, ErrorKind),
+    /// Arm or gripper did not come to rest.
+    #[error("no rest after {pictures} pictures")]
+    Restless {
+        /// Pictures waited for.
+        pictures: usize,
+    },
+    /// The membrane is not seen.
+    #[error(transparent)]
+    Cloud(CloudError),
+    /// No ball is seen in it.
+    #[error(transparent)]
+    Contact(ContactError),
+    /// The model does not know the force.
+    #[error(transparent)]
+    Force(ForceError),
+    /// A setting out of range.
+    #[error("{what} is {got}; expected {expected}")]
+    Setting {
+        /// Which.
+        what: &'static str,
+        /// What it has to be.
+        expected: &'static str,
+        /// What it is.
+        got: f64,
+    },
+}
+
+/// How to palpate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Programme {
+    /// The tool above the object: the palpation moves along the base frame's z from here, the rest stays.
+    pub above: Pose,
+    /// Height of the object's top in the base frame, roughly (from a camera, within a few millimetres), m.
+    pub top_m: f64,
+    /// Gripper's width without stretch and the membrane's breadth, m.
+    pub sheet_m: (f64, f64),
+    /// Border of the membrane that is not looked at, m.
+    pub margin_m: f64,
+    /// Stretches, rising, m.
+    pub stretches_m: Vec<f64>,
+    /// Indentation of the first touch, m.
+    pub touch_m: f64,
+    /// Step of the indentation and its end, m.
+    pub depth_m: (f64, f64),
+    /// Sinking at which the object has yielded, m.
+    pub yield_m: f64,
+    /// Pictures that are looked at at each step.
+    pub pictures: usize,
+    /// Speed of the gripper, m/s; time for each of the arm's moves, s; pictures to wait for rest at most.
+    pub motion: (f64, f64, usize),
+    /// How clouds are smoothed and segmented.
+    pub cloud: CloudSettings,
+    /// How they are segmented.
+    pub segment: SegmentSettings,
+}
+
+impl Programme {
+    /// The thesis's hand: 100 x 90 mm, stretches to 60 mm, depths of 1 mm to 15 mm, yielded at 1.5 mm.
+    pub fn thesis(above: Pose, top_m: f64) -> Self {
+        Self {
+            above,
+            top_m,
+            sheet_m: (0.1, 0.09),
+            margin_m: 6e-3,
+            stretches_m: (0..=6).map(|k| 0.01 * f64::from(k)).collect(),
+            touch_m: 6e-3,
+            depth_m: (1e-3, 15e-3),
+            yield_m: 1.5e-3,
+            pictures: 3,
+            motion: (0.05, 1.0, 300),
+            cloud: CloudSettings::default(),
+            segment: SegmentSettings::default(),
+        }
+    }
+
+    fn check<E: std::fmt::Debug>(&self) -> Result<(), PalpateError<E>> {
+        let rising = self.stretches_m.windows(2).all(|w| w[0] < w[1]);
+        let first = self.stretches_m.first().copied().unwrap_or(f64::NAN);
+        if !(rising && first >= 0.0) {
+            return Err(PalpateError::Setting {
+                what: "the first stretch",
+                expected: "0 or more, then rising",
+                got: first,
+            });
+        }
+        for (what, got) in [
+            ("the first touch", self.touch_m),
+            ("the step", self.depth_m.0),
+            ("the greatest depth less the first touch", self.depth_m.1 - self.touch_m),
+            ("the sinking", self.yield_m),
+            ("the number of pictures", self.pictures as f64),
+        ] {
+            if !(got > 0.0 && got.is_finite()) {
+                return Err(PalpateError::Setting { what, expected: "a finite number above 0", got });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One step of the palpation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Stretch, m.
+    pub stretch_m: f64,
+    /// How deep the object is in the membrane, seen, m.
+    pub indentation_m: f64,
+    /// Force by the model.
+    pub load: Load,
+    /// What the force rose by since the first touch, N.
+    pub rise_n: f64,
+    /// How far the object's top has sunk since, m.
+    pub sunk_m: f64,
+    /// Standard deviation of that, m.
+    pub sunk_sigma_m: f64,
+}
+
+/// What was felt.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Palpation {
+    /// Radius of the object where it was touched, m, and its standard deviation.
+    pub radius_m: (f64, f64),
+    /// All steps, in order.
+    pub steps: Vec<Step>,
+    /// Stiffness, N/m; none where the object did not yield: it is at least as stiff as the last step says.
+    pub stiffness_n_m: Option<f64>,
+    /// Its 95 % interval, N/m; up to infinity where the object did not yield.
+    pub interval_n_m: (f64, f64),
+}
+
+/// What one look gave: means over the pictures.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    /// Highest point of the ball over the membrane at rest, m.
+    apex_m: f64,
+    apex_sigma_m: f64,
+    radius_m: f64,
+    radius_sigma_m: f64,
+}
+
+/// Palpates an object.
+///
+/// # Errors
+/// [`PalpateError`].
+pub fn palpate<R>(
+    rig: &mut R,
+    programme: &Programme,
+    surface: &Surface,
+) -> Result<Palpation, PalpateError<R::Error>>
+where
+    R: DepthCamera + Gripper + Arm,
+{
+    programme.check()?;
+    let mut eyes = Eyes::default();
+    let stretch_m = programme.stretches_m[0];
+    open(rig, programme, stretch_m)?;
+    eyes.learn_rest(rig, programme, stretch_m)?;
+    lower(rig, programme, programme.top_m - programme.touch_m)?;
+    let first = eyes.look(rig, programme)?;
+    // The light touch tells where the top is when nothing presses.
+    let top_m = programme.top_m - programme.touch_m + first.apex_m;
+    let deeper = first.apex_m + 0.5 * (programme.depth_m.1 - first.apex_m).max(0.0);
+    lower(rig, programme, top_m - deeper)?;
+    let shape = eyes.look(rig, programme)?;
+    let mut out = Palpation {
+        radius_m: (shape.radius_m, shape.radius_sigma_m),
+        steps: Vec::new(),
+        stiffness_n_m: None,
+        interval_n_m: (0.0, f64::INFINITY),
+    };
+    let force_of = |stretch_m: f64, look: &Look| {
+        let seen = Seen {
+            stretch_m,
+            radius_m: (shape.radius_m, shape.radius_sigma_m),
+            indentation_m: (look.apex_m.max(0.0), look.apex_sigma_m),
+        };
+        load(surface, &seen).map_err(PalpateError::Force)
+    };
+    let first_n = force_of(stretch_m, &first)?.force_n;
+    let mut force = first_n;
+    for &stretch_m in &programme.stretches_m {
+        lower(rig, programme, programme.above.position_m[2])?;
+        open(rig, programme, stretch_m)?;
+        eyes.learn_rest(rig, programme, stretch_m)?;
+        let start = indentation_m(surface, shape.radius_m, stretch_m, force).map_err(PalpateError::Force)?;
+        let mut depth = start.max(programme.touch_m) + programme.depth_m.0;
+        while depth <= programme.depth_m.1 {
+            let tool_m = top_m - depth;
+            lower(rig, programme, tool_m)?;
+            let now = eyes.look(rig, programme)?;
+            let load = force_of(stretch_m, &now)?;
+            let sunk_m = top_m - (tool_m + now.apex_m);
+            let sunk_sigma_m = now.apex_sigma_m.hypot(first.apex_sigma_m);
+            let rise_n = load.force_n - first_n;
+            let step = Step { stretch_m, indentation_m: now.apex_m, load, rise_n, sunk_m, sunk_sigma_m };
+            out.steps.push(step);
+            out.interval_n_m.0 = out.interval_n_m.0.max(at_least(&step));
+            if sunk_m >= programme.yield_m && sunk_m > 3.0 * sunk_sigma_m {
+                (out.stiffness_n_m, out.interval_n_m) = (Some(rise_n / sunk_m), between(&step));
+                return Ok(out);
+            }
+            force = load.force_n.max(force);
+            depth += programme.depth_m.0;
+        }
+    }
+    Ok(out)
+}
+
+/// Least stiffness that a step without yield leaves.
+fn at_least(step: &Step) -> f64 {
+    let least = step.load.interval_n.0 / step.load.force_n;
+    (step.rise_n * least).max(0.0) / (step.sunk_m + 1.96 * step.sunk_sigma_m).max(1e-6)
+}
+
+fn between(step: &Step) -> (f64, f64) {
+    let k = step.rise_n / step.sunk_m;
+    let of_force = 0.5 * (step.load.interval_n.1 - step.load.interval_n.0) / step.load.force_n;
+    let part = of_force.hypot(1.96 * step.sunk_sigma_m / step.sunk_m);
+    ((k * (1.0 - part)).max(0.0), k * (1.0 + part))
+}
+
+fn device<E: Error>(error: E) -> PalpateError<E> {
+    let kind = error.kind();
+    PalpateError::Device(error, kind)
+}
+
+fn open<R>(rig: &mut R, programme: &Programme, stretch_m: f64) -> Result<(), PalpateError<R::Error>>
+where
+    R: DepthCamera + Gripper + Arm,
+{
+    rig.open_to(programme.sheet_m.0 + stretch_m, programme.motion.0).map_err(device)?;
+    rest(rig, programme)
+}
+
+fn lower<R>(rig: &mut R, programme: &Programme, z_m: f64) -> Result<(), PalpateError<R::Error>>
+where
+    R: DepthCamera + Gripper + Arm,
+{
+    let [x, y, _] = programme.above.position_m;
+    rig.move_to(Pose { position_m: [x, y, z_m], ..programme.above }, programme.motion.1).map_err(device)?;
+    rest(rig, programme)
+}
+
+/// Waits until arm and gripper stand still; the camera's pictures are the clock.
+fn rest<R>(rig: &mut R, programme: &Programme) -> Result<(), PalpateError<R::Error>>
+where
+    R: DepthCamera + Gripper + Arm,
+{
+    for _ in 0..programme.motion.2.max(1) {
+        if Arm::settled(rig).map_err(device)? && Gripper::settled(rig).map_err(device)? {
+            return Ok(());
+        }
+        rig.depth_m().map_err(device)?;
+    }
+    Err(PalpateError::Restless { pictures: programme.motion.2 })
+}
+
+/// The camera's side: the membrane's plane, and room that is used again.
+#[derive(Default)]
+struct Eyes {
+    rest: Option<(Rest, Window)>,
+    cloud: Cloud,
+    segmenter: Segmenter,
+}
+
+impl Eyes {
+    /// The plane of the free membrane.
+    fn learn_rest<R>(
+        &mut self,
+        rig: &mut R,
+        programme: &Programme,
+        stretch_m: f64,
+    ) -> Result<(), PalpateError<R::Error>>
+    where
+        R: DepthCamera,
+    {
+        let picture = rig.depth_m().map_err(device)?.value;
+        let intrinsics = rig.intrinsics();
+        // Roughly first: the middle of the picture shows the membrane.
+        let middle = Window {
+            row: picture.height() * 3 / 8,
+            column: picture.width() * 3 / 8,
+            rows: picture.height() / 4,
+            columns: picture.width() / 4,
+        };
+        let rough = Rest::fit(&picture, &intrinsics, &middle).map_err(PalpateError::Cloud)?;
+        let size = (picture.width(), picture.height());
+        let sheet = (programme.sheet_m.0 + stretch_m, programme.sheet_m.1);
+        let window = Window::of_membrane(size, &intrinsics, &rough, sheet, programme.margin_m)
+            .map_err(PalpateError::Cloud)?;
+        let rest = Rest::fit(&picture, &intrinsics, &window).map_err(PalpateError::Cloud)?;
+        self.rest = Some((rest, window));
+        Ok(())
+    }
+
+    fn look<R>(&mut self, rig: &mut R, programme: &Programme) -> Result<Look, PalpateError<R::Error>>
+    where
+        R: DepthCamera,
+    {
+        let (mut apexes, mut balls) = (Vec::new(), Vec::new());
+        for _ in 0..programme.pictures {
+            let picture = rig.depth_m().map_err(device)?.value;
+            let Some((rest, window)) = self.rest else { continue };
+            self.cloud
+                .fill(&picture, &rig.intrinsics(), &rest, window, &programme.cloud)
+                .map_err(PalpateError::Cloud)?;
+            let states = self.segmenter.segment(&self.cloud, &programme.segment);
+            let touching = ball(&points(&self.cloud, states)).map_err(PalpateError::Contact)?;
+            apexes.push(rest.distance_m - (touching.centre_m[2] - touching.radius_m));
+            balls.push(touching);
+        }
+        let n = apexes.len() as f64;
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / n;
+        let apex_m = mean(&mut apexes.iter().copied());
+        let radius_m = mean(&mut balls.iter().map(|b: &Ball| b.radius_m));
+        let about = |values: &mut dyn Iterator<Item = f64>, middle: f64| {
+            (values.map(|v| (v - middle).powi(2)).sum::<f64>() / (n - 1.0).max(1.0) / n).sqrt()
+        };
+        // Smoothing ties neighbours together, which one picture's own scatter does not show; a twentieth of a millimetre is the floor.
+        let apex_sigma_m = about(&mut apexes.iter().copied(), apex_m).max(5e-5);
+        let scatter = about(&mut balls.iter().map(|b| b.radius_m), radius_m);
+        let own = balls.iter().map(|b| b.radius_sigma_m).fold(0.0, f64::max);
+        Ok(Look { apex_m, apex_sigma_m, radius_m, radius_sigma_m: scatter.max(own) })
+    }
+}
