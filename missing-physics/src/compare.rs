@@ -59,7 +59,7 @@ pub(crate) fn candidate(
     let mut starts: Vec<Vec<f64>> = Vec::new();
     for guess in guesses {
         let mut start = near.shared.clone();
-        let mine = |slot: &usize| added.contains(slot) || places.contains(slot);
+        let mine = |slot: &usize| selection.shared.contains(slot) || places.contains(slot);
         guess.iter().filter(|(slot, _)| mine(slot)).for_each(|&(slot, value)| start[slot] = value);
         starts.push(start);
     }

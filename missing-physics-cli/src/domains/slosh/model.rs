@@ -86,9 +86,10 @@ pub struct SloshModel {
     places: Places,
     cylinders: Vec<UprightCylinder>,
     largest: f64,
-    /// Indices of the mechanisms `arm-compliance` and `second-mode`.
+    /// Indices of the mechanisms `arm-compliance`, `second-mode` and `contact-line-friction`.
     arm: usize,
     second: usize,
+    friction: usize,
     /// Index of each shared and each own parameter.
     shared: Vec<usize>,
     own: Vec<usize>,
@@ -111,16 +112,19 @@ impl SloshModel {
             .iter()
             .map(|share| cylinder(&setup, if fits(&share) { *share } else { 1.0 }))
             .collect::<Result<Vec<_>, _>>()?;
-        let readings = runs.iter().flat_map(|r| &r.outputs[0]).filter(|v| v.is_finite());
-        let largest = readings.fold(0.0, |m: f64, v| m.max(v.abs()));
-        let largest = if largest > 0.0 { largest } else { 1.0 };
         let viscosity = viscosity_guess(&cylinders[0], runs);
+        let amplitudes = runs.iter().filter_map(|run| first_wave(&cylinders[0], viscosity, run));
+        let largest = amplitudes.map(|[a, b]| a.hypot(b)).fold(0.0, f64::max);
+        let readings = runs.iter().flat_map(|r| &r.outputs[0]).filter(|v| v.is_finite());
+        let largest = if largest > 0.0 { largest } else { readings.fold(0.0, |m: f64, v| m.max(v.abs())) };
+        let largest = if largest > 0.0 { largest } else { 1.0 };
         let (spec, places) = build(&setup, &cylinders[0], largest, viscosity);
         let find = |id: &str| spec.mechanisms.iter().position(|m| m.id == id).unwrap_or(usize::MAX);
         let (arm, second) = (find("arm-compliance"), find("second-mode"));
+        let friction = find("contact-line-friction");
         let of = |scope| (0..spec.parameters.len()).filter(|&i| spec.parameters[i].scope == scope).collect();
         let (shared, own) = (of(Scope::Shared), of(Scope::PerRun));
-        Ok(Self { setup, spec, places, cylinders, largest, arm, second, shared, own })
+        Ok(Self { setup, spec, places, cylinders, largest, arm, second, friction, shared, own })
     }
 
     /// Whether a run of this kind fits into the container.
@@ -138,7 +142,7 @@ impl SloshModel {
         own
     }
 
-    /// The largest reading of the recording.
+    /// The largest amplitude with which a run begins.
     pub fn largest(&self) -> f64 {
         self.largest
     }
@@ -254,23 +258,26 @@ impl Model for SloshModel {
     }
 
     fn start(&self, run: &Run, own: &mut [f64]) {
-        let (Some(times), Some(values)) = (run.inputs.first(), run.outputs.first()) else { return };
-        let w = self.cylinders[0].angular_frequency_rad_s(0, 0.0);
-        // Least squares of a sine over the first two cycles.
-        let (mut cc, mut cs, mut ss, mut cy, mut sy) = (1e-300, 0.0, 1e-300, 0.0, 0.0);
-        for (t, y) in times.iter().zip(values).filter(|(t, y)| **t < 2.0 * TAU / w && y.is_finite()) {
-            let (s, c) = (w * t).sin_cos();
-            (cc, cs, ss, cy, sy) = (cc + c * c, cs + c * s, ss + s * s, cy + c * y, sy + s * y);
-        }
-        let determinant = cc * ss - cs * cs;
-        if determinant > 1e-9 * cc * ss {
-            own[self.places.cos.slot] = (cy * ss - sy * cs) / determinant;
-            own[self.places.sin.slot] = (sy * cc - cy * cs) / determinant;
+        let viscosity = self.spec.parameters[self.places.viscosity.index].start;
+        if let Some([a, b]) = first_wave(&self.cylinders[0], viscosity, run) {
+            own[self.places.cos.slot] = a;
+            own[self.places.sin.slot] = b;
         }
     }
 
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let p = &self.places;
+        if mechanism == self.friction {
+            // Faint friction beside the viscosity that was found; or much of it, and then of what the baseline took for viscosity
+            // a part is friction.
+            let viscosity = self.spec.parameters[p.viscosity.index].start;
+            let faint = [0.0, 0.006, 0.02].map(|share| vec![(p.friction.index, share * self.largest)]);
+            let much = [0.015, 0.03, 0.06, 0.1, 0.15].into_iter().flat_map(|share| {
+                let friction = (p.friction.index, share * self.largest);
+                [0.05, 0.3, 1.0].map(|factor| vec![friction, (p.viscosity.index, factor * viscosity)])
+            });
+            return faint.into_iter().chain(much).collect();
+        }
         let (omega, damping, band) = if mechanism == self.arm {
             (p.arm_omega.index, p.arm_damping.index, ARM_RAD_S)
         } else if mechanism == self.second {
@@ -356,6 +363,24 @@ fn peaks(runs: &[Run], residual: &[Vec<Vec<f64>>], [lowest, highest]: [f64; 2]) 
     tops.into_iter().map(|i| frequencies[i]).collect()
 }
 
+/// Amplitudes at t = 0 of the cosine and the sine of a run's wave: least squares of a decaying sine over its first cycles.
+fn first_wave(cylinder: &UprightCylinder, viscosity: f64, run: &Run) -> Option<[f64; 2]> {
+    /// So many that noise averages out, so few that what bends the decay has not begun to.
+    const CYCLES: f64 = 3.0;
+    let (times, values) = (run.inputs.first()?, run.outputs.first()?);
+    let (w, ratio) = (cylinder.angular_frequency_rad_s(0, 0.0), cylinder.damping_ratio(viscosity).min(0.5));
+    let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (t, y) in times.iter().zip(values).filter(|(t, y)| **t < CYCLES * TAU / w && y.is_finite()) {
+        let fade = (-ratio * w * t).exp();
+        let (s, c) = (w * (1.0 - ratio * ratio).sqrt() * t).sin_cos();
+        let (s, c) = (fade * s, fade * c);
+        (cc, cs, ss, cy, sy) = (cc + c * c, cs + c * s, ss + s * s, cy + c * y, sy + s * y);
+    }
+    let determinant = cc * ss - cs * cs;
+    (determinant > 1e-9 * cc * ss)
+        .then(|| [(cy * ss - sy * cs) / determinant, (sy * cc - cy * cs) / determinant])
+}
+
 /// A viscosity to begin with: from how much of the wave is left in the later half of the runs.
 fn viscosity_guess(cylinder: &UprightCylinder, runs: &[Run]) -> f64 {
     let w = cylinder.angular_frequency_rad_s(0, 0.0);
@@ -417,7 +442,7 @@ fn build(setup: &Setup, cylinder: &UprightCylinder, largest: f64, viscosity: f64
         [
             "frequency that depends on the amplitude",
             "High waves are slower or faster than low ones.",
-            "omega (1 + c A^2 / A_max^2), A_max the largest reading of the recording",
+            "omega (1 + c A^2 / A_max^2), A_max the largest amplitude of a run",
             "Miles 1984, doi:10.1017/S0022112084002834",
         ],
         &["surface-tension"],
