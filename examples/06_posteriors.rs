@@ -2,10 +2,11 @@
 //! posteriors, beside what its authors published for neural posterior estimation (NPE), and expected coverage.
 //!
 //! ```text
-//! cargo run --release -p examples --example 06_posteriors -- --small   1,000 and 10,000 simulations, two observations
-//! cargo run --release -p examples --example 06_posteriors              100,000 as well, all ten observations: hours
+//! cargo run --release -p examples --example 06_posteriors -- --small   1,000 simulations of two_moons, one observation: seconds
+//! cargo run --release -p examples --example 06_posteriors              1e3, 1e4 and 1e5, all tasks, ten observations: hours
+//! cargo run --release -p examples --example 06_posteriors -- slcp autoregressive 100000 --observations=3 --points=3000
 //! ```
-//! One argument that names a task or a density keeps to it: `slcp`, `autoregressive`.
+//! Tasks, densities and numbers of simulations among the arguments keep to those named.
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 #![allow(clippy::unwrap_used, reason = "what the tests share stops where data are damaged")]
 
@@ -41,22 +42,41 @@ fn train(name: &str, task: &Task, count: usize) -> Result<Box<dyn ConditionalDen
     })
 }
 
+/// The number behind an option, or a default.
+fn number(arguments: &[String], option: &str, default: usize) -> Result<usize, Box<dyn Error>> {
+    let given = arguments.iter().find_map(|a| a.strip_prefix(option));
+    given.map_or(Ok(default), |v| {
+        v.parse().map_err(|_| format!("{option}{v}: a whole number is wanted").into())
+    })
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let small = examples::small();
-    let only: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let counts: &[usize] = if small { &[1_000, 10_000] } else { &[1_000, 10_000, 100_000] };
-    let (observations, points) = if small { (2, 2_000) } else { (10, 10_000) };
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let named = |name: &str| arguments.iter().any(|a| a == name);
     let tasks = [
-        common::gaussian_linear(),
         common::two_moons(),
+        common::gaussian_linear(),
         common::slcp(),
         common::gaussian_mixture(),
         common::gaussian_linear_uniform(),
     ];
     let densities = ["mdn", "mdrff", "autoregressive"];
-    let names = |list: &[&str]| only.iter().any(|o| list.contains(&o.as_str()));
-    let by_task = names(&tasks.iter().map(|t| t.name).collect::<Vec<_>>());
-    let by_density = names(&densities);
+    let counts = [1_000, 10_000, 100_000];
+    let any_task = tasks.iter().any(|t| named(t.name));
+    let any_density = densities.iter().any(|d| named(d));
+    let any_count = counts.iter().any(|c| named(&c.to_string()));
+    let tasks: Vec<&Task> = tasks
+        .iter()
+        .filter(|t| if any_task { named(t.name) } else { !small || t.name == "two_moons" })
+        .collect();
+    let counts = || {
+        (0..)
+            .zip(counts)
+            .filter(|(_, c)| if any_count { named(&c.to_string()) } else { !small || *c == 1_000 })
+    };
+    let observations = number(&arguments, "--observations=", if small { 1 } else { 10 })?.clamp(1, 10);
+    let points = number(&arguments, "--points=", if small { 1_000 } else { 10_000 })?.clamp(50, 10_000);
     println!(
         "C2ST: 0.5 for a posterior that cannot be told from the reference. Coverage: mean of coverage less level."
     );
@@ -64,10 +84,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{:24} {:>7} {:15} {:>7} {:>7} {:>9} {:>9}",
         "task", "sims", "density", "C2ST", "NPE", "coverage", "train s"
     );
-    for task in tasks.iter().filter(|t| !by_task || only.iter().any(|o| o == t.name)) {
+    for task in tasks {
         let published = PUBLISHED.iter().find(|p| p.0 == task.name).map_or([f64::NAN; 3], |p| p.1);
-        for (&count, npe) in counts.iter().zip(published) {
-            for name in densities.iter().filter(|d| !by_density || only.iter().any(|o| o == *d)) {
+        for (i, count) in counts() {
+            let npe = published[i];
+            for name in densities.iter().filter(|d| !any_density || named(d)) {
                 let start = Instant::now();
                 let density = train(name, task, count)?;
                 let seconds = start.elapsed().as_secs_f64();

@@ -22,32 +22,43 @@ fn changed(points: &Points, change: &str) -> Points {
         "scaled" => means[j] + 1.15 * (columns[j][i] - means[j]),
         "shifted" => columns[j][i] + 0.15 * sd(j),
         "unpaired" => columns[j][(i + n - 7 * j) % n],
+        "third" if i % 3 == 0 => columns[j][i] + 0.15 * sd(j),
         _ => columns[j][i],
     };
     let values = (0..n).flat_map(|i| (0..d).map(move |j| (i, j))).map(|(i, j)| value(i, j)).collect();
     Points::from_values(d, values).unwrap()
 }
 
-/// Means over two seeds within 0.01 where scikit-learn's own seeds agree as well; where they do not (the classifier settles in one of
-/// several minima: 0.76 to 0.84), within their range. Ten dimensions take minutes and are left to the script.
+/// Mean and its standard error.
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
+}
+
+/// Another seed moves scikit-learn's own number by up to 0.03, so means over seeds are compared: six of scikit-learn's, three of ours.
 #[test]
 fn agrees_with_scikit_learn() {
+    const SEEDS: u64 = 3;
     let table = include_str!("data/c2st_sklearn.csv");
-    for task in [common::two_moons(), common::slcp()] {
-        let Some((_, points)) = common::reference(&task, 1, 10_000) else { return };
-        let halves = [0..5000, 5000..10_000].map(|r| points.select(&r.collect::<Vec<_>>()));
-        for change in ["same", "scaled", "shifted", "unpaired"] {
+    for (task, changes) in [
+        (common::two_moons(), ["same", "third", "unpaired"].as_slice()),
+        (common::slcp(), ["same", "shifted", "third"].as_slice()),
+    ] {
+        let Some((_, points)) = common::reference(&task, 1, 4000) else { return };
+        let halves = [0..2000, 2000..4000].map(|r| points.select(&r.collect::<Vec<_>>()));
+        for change in changes {
             let key = format!("{},{change},", task.name);
             let rows = table.lines().filter(|l| l.starts_with(&key));
             let theirs: Vec<f64> = rows.map(|l| l.rsplit(',').next().unwrap().parse().unwrap()).collect();
-            let mean = theirs.iter().sum::<f64>() / theirs.len() as f64;
-            let (low, high) = theirs.iter().fold((mean, mean), |(l, h), v| (l.min(*v), h.max(*v)));
-            let agree = high - low < 0.015;
             let other = changed(&halves[1], change);
-            let ours = (1..=2).map(|s| c2st(&halves[0], &other, s).unwrap()).sum::<f64>() / 2.0;
-            println!("{} {change}: {ours:.4}, scikit-learn {mean:.4} ({low:.4} to {high:.4})", task.name);
-            let (low, high) = if agree { (mean, mean) } else { (low, high) };
-            assert!(ours > low - 0.01 && ours < high + 0.01, "{} {change}: {ours} {mean}", task.name);
+            let ours: Vec<f64> = (1..=SEEDS).map(|s| c2st(&halves[0], &other, s).unwrap()).collect();
+            let ((theirs, their_error), (ours, our_error)) = (mean_and_error(&theirs), mean_and_error(&ours));
+            println!(
+                "{} {change}: {ours:.4} +- {our_error:.4}, scikit-learn {theirs:.4} +- {their_error:.4}",
+                task.name
+            );
+            assert!((ours - theirs).abs() < 0.01, "{} {change}: {ours} {theirs}", task.name);
         }
     }
 }
