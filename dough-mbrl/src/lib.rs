@@ -17,6 +17,7 @@ pub mod policy;
 pub mod powell;
 pub mod predictor;
 pub mod process;
+pub mod repair;
 pub mod ridge;
 pub mod roll;
 pub mod rollout;
