@@ -192,13 +192,13 @@ mod tests {
                 let target: Vec<f64> = (0..dim).map(|_| rng.random_range(-1.5..1.5)).collect();
                 let mut by_hand = vec![0.0; out.len()];
                 let loss = head.loss(&out, &target, Some(&mut by_hand), &mut HeadScratch::default());
-                for i in 0..out.len() {
+                for (i, a) in by_hand.iter().enumerate() {
                     let seeded = out.iter().enumerate();
                     let dual: Vec<Dual64> =
                         seeded.map(|(j, &o)| Dual64::new(o, if i == j { 1.0 } else { 0.0 })).collect();
                     let value = plain(&head, &dual, &target);
                     assert!((loss - value.re).abs() < 1e-12 * value.re.abs().max(1.0));
-                    let (a, b) = (by_hand[i], value.eps);
+                    let b = value.eps;
                     assert!((a - b).abs() < 1e-10 * b.abs().max(1.0), "{a} {b}");
                 }
             }

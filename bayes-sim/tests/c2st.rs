@@ -22,7 +22,7 @@ fn changed(points: &Points, change: &str) -> Points {
         "scaled" => means[j] + 1.15 * (columns[j][i] - means[j]),
         "shifted" => columns[j][i] + 0.15 * sd(j),
         "unpaired" => columns[j][(i + n - 7 * j) % n],
-        "third" if i % 3 == 0 => columns[j][i] + 0.15 * sd(j),
+        "third" if i.is_multiple_of(3) => columns[j][i] + 0.15 * sd(j),
         _ => columns[j][i],
     };
     let values = (0..n).flat_map(|i| (0..d).map(move |j| (i, j))).map(|(i, j)| value(i, j)).collect();
