@@ -11,7 +11,7 @@ use worlds::flight::{FlightWorld, Seen};
 use worlds::noise::Noise;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let count = if examples::small() { 10 } else { 286 };
+    let count = if examples::small() { 4 } else { 286 };
     let space = FlightWorld::thrown(Seen::Space);
     let height = FlightWorld::thrown(Seen::Height);
     let with = |world: FlightWorld, noise: Noise| FlightWorld { noise, ..world };
