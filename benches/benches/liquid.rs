@@ -13,7 +13,7 @@ use liquid_haptics::fake::{Cavity, Round};
 use liquid_haptics::pour::{Bead, Mouth, Pour};
 use liquid_haptics::slosh::UprightCylinder;
 use liquid_haptics::viscosity::{Bottle, Drain, Verdict, ViscosityFit};
-use liquid_haptics::volume::{Liquid, Pose, VolumeFit};
+use liquid_haptics::volume::{Liquid, Pose, Ties, VolumeFit};
 use liquid_haptics::wrench::{Departures, Grasp};
 use nalgebra::Point3;
 
@@ -106,8 +106,15 @@ fn volume(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
         poses.push(Pose { tilt_rad, wrench });
     }
     let liquid = Liquid::Mass { mass_kg: 0.3, error_kg: 2e-4 };
-    let fit =
-        VolumeFit { container: &bottle, grasp, departures: none, liquid, sigma_nm: None, widest_share: 0.5 };
+    let fit = VolumeFit {
+        container: &bottle,
+        grasp,
+        departures: none,
+        liquid,
+        sigma_nm: None,
+        ties: Ties::NONE,
+        widest_share: 0.5,
+    };
     let estimate = fit.estimate(&poses)?;
     println!(
         "volume/19 poses: {:+.2} mL, interval {:.2} mL wide",
