@@ -1,8 +1,12 @@
 #![doc = include_str!("../README.md")]
+pub mod drop;
+pub mod exact;
+pub mod features;
 pub mod flight;
 pub mod hear;
 pub mod impact;
 pub mod localise;
 pub mod missed;
 pub mod onset;
+pub mod posterior;
 pub mod wav;
