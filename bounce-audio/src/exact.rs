@@ -52,9 +52,7 @@ impl ExactModel {
     /// # Errors
     /// [`DropError::Value`]. A sigma of 0 has no density over the features: three numbers then determine the fourth.
     pub fn new(height_m: f64, sigma_m_s: f64, gravity_m_s2: f64) -> Result<Self, DropError> {
-        for (what, v) in
-            [("height_m", height_m), ("sigma_m_s", sigma_m_s), ("gravity_m_s2", gravity_m_s2)]
-        {
+        for (what, v) in [("height_m", height_m), ("sigma_m_s", sigma_m_s), ("gravity_m_s2", gravity_m_s2)] {
             value(what, v, "a finite number above 0", v > 0.0 && v.is_finite())?;
         }
         Ok(Self { energy_m2_s2: 2.0 * gravity_m_s2 * height_m, sigma_m_s, gravity_m_s2 })

@@ -1,10 +1,13 @@
 #![doc = include_str!("../README.md")]
 pub mod drop;
 pub mod exact;
+#[cfg(feature = "fake")]
+pub mod fake;
 pub mod features;
 pub mod flight;
 pub mod hear;
 pub mod impact;
+pub mod listen;
 pub mod localise;
 pub mod missed;
 pub mod onset;

@@ -77,7 +77,11 @@ impl DropSimulator {
     ///
     /// # Errors
     /// [`SimulationFailure`] for parameters out of range, a ball that comes to rest, or noise that swaps two impacts.
-    pub fn features<R: Rng + ?Sized>(&self, theta: &[f64], rng: &mut R) -> Result<Features, SimulationFailure> {
+    pub fn features<R: Rng + ?Sized>(
+        &self,
+        theta: &[f64],
+        rng: &mut R,
+    ) -> Result<Features, SimulationFailure> {
         let failed = |reason: String| SimulationFailure { reason };
         let &[e, log10_kappa] = theta else {
             return Err(failed(format!("{} parameters, expected 2", theta.len())));

@@ -106,9 +106,8 @@ fn a_learned_posterior_comes_near_the_exact_one() {
 
     let ball = [0.8, 2.5];
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let posteriors: Vec<_> = (0..40)
-        .map(|_| density.posterior(&simulator.simulate(&ball, &mut rng).unwrap()).unwrap())
-        .collect();
+    let posteriors: Vec<_> =
+        (0..40).map(|_| density.posterior(&simulator.simulate(&ball, &mut rng).unwrap()).unwrap()).collect();
     let spread = |n: usize| projected_product(&posteriors[..n]).unwrap().mixture().covariance();
     let (few, many) = (spread(10), spread(40));
     for k in [0, 3] {

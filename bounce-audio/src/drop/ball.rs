@@ -65,7 +65,8 @@ impl Ball {
             Grip::Rough { friction, recoil, radius_m, inertia } => {
                 positive_or_zero("friction", friction)?;
                 value("recoil", recoil, "a number from -1 to 1", (-1.0..=1.0).contains(&recoil))?;
-                let above = |what, v: f64| value(what, v, "a finite number above 0", v > 0.0 && v.is_finite());
+                let above =
+                    |what, v: f64| value(what, v, "a finite number above 0", v > 0.0 && v.is_finite());
                 above("radius_m", radius_m)?;
                 above("inertia", inertia)
             }

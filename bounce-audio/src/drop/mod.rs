@@ -43,7 +43,12 @@ pub enum DropError {
     },
 }
 
-pub(crate) fn value(what: &'static str, got: f64, expected: &'static str, ok: bool) -> Result<f64, DropError> {
+pub(crate) fn value(
+    what: &'static str,
+    got: f64,
+    expected: &'static str,
+    ok: bool,
+) -> Result<f64, DropError> {
     if ok { Ok(got) } else { Err(DropError::Value { what, expected, got }) }
 }
 

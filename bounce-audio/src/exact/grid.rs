@@ -24,7 +24,11 @@ pub struct ExactPosterior {
 
 /// The exact posterior of drops of one ball in a box of (e, log10 kappa); `None` where no ball in the box can have made them.
 ///
-pub fn exact_posterior(model: &ExactModel, drops: &[Features], bounds: [[f64; 2]; 2]) -> Option<ExactPosterior> {
+pub fn exact_posterior(
+    model: &ExactModel,
+    drops: &[Features],
+    bounds: [[f64; 2]; 2],
+) -> Option<ExactPosterior> {
     let mut at = bounds;
     let mut scores = vec![0.0; POINTS[0] * POINTS[1]];
     for round in 0..ROUNDS {
@@ -89,7 +93,8 @@ fn around(scores: &[f64], top: f64, at: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
 
 impl ExactPosterior {
     fn new(bounds: [[f64; 2]; 2], scores: &[f64], top: f64) -> Self {
-        let mut mass: Vec<f64> = scores.iter().map(|s| if *s > IMPOSSIBLE { (s - top).exp() } else { 0.0 }).collect();
+        let mut mass: Vec<f64> =
+            scores.iter().map(|s| if *s > IMPOSSIBLE { (s - top).exp() } else { 0.0 }).collect();
         let total: f64 = mass.iter().sum();
         mass.iter_mut().for_each(|m| *m /= total);
         let cell = [0, 1].map(|k| (bounds[k][1] - bounds[k][0]) / POINTS[k] as f64);

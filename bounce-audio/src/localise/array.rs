@@ -1,5 +1,6 @@
 //! Microphones around a table, and the place on it that fits times of arrival.
 
+use super::Location;
 use thiserror::Error;
 
 /// Points of the lattice of first guesses along each edge.
@@ -140,6 +141,28 @@ impl Array {
     pub(crate) fn longest_lag_s(&self) -> f64 {
         let n = self.microphones_m.len();
         (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| self.lag_s(i, j)).fold(0.0, f64::max)
+    }
+
+    /// The place that fits arrivals (s, one a microphone) best, with what is known of how they were measured.
+    pub(crate) fn location(
+        &self,
+        arrivals_s: &[f64],
+        arrival_sigma_s: f64,
+        closure_s: f64,
+        coherence: f64,
+    ) -> Location {
+        let place = self.solve(arrivals_s);
+        let dof = arrivals_s.len().saturating_sub(3);
+        let variance = arrival_sigma_s * arrival_sigma_s;
+        Location {
+            x_m: place.x_m,
+            y_m: place.y_m,
+            covariance_m2: place.cofactor.map(|row| row.map(|c| c * variance)),
+            arrival_sigma_s,
+            residual_s: (dof > 0).then(|| (place.sum_squares / dof as f64).sqrt()),
+            closure_s,
+            coherence,
+        }
     }
 
     /// The place on the table that fits arrivals (s, one a microphone, any common offset) best, by Gauss-Newton.
