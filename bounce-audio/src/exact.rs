@@ -13,7 +13,8 @@
 //!
 //! `r = t2/t1`, `T = tan theta`. One integral is left, over the direction in which the ball was let go.
 //!
-//! Without noise in the measurement the features all but determine e: `s` has to be just above `sqrt(2 g h)`.
+//! Without noise in the measurement the features all but determine e: `s` has to be just above `sqrt(2 g h)`, which two restitutions at
+//! most can make it.
 
 mod bessel;
 mod grid;

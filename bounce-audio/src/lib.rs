@@ -12,4 +12,5 @@ pub mod localise;
 pub mod missed;
 pub mod onset;
 pub mod posterior;
+pub mod track;
 pub mod wav;

@@ -66,7 +66,12 @@ fn a_stream_hears_what_a_recording_does() {
         let off = |x: f64, y: f64| (x - truth.1[0]).hypot(y - truth.1[1]);
         let there = offline.location.unwrap();
         let (a, b) = (off(stream.location.x_m, stream.location.y_m), off(there.x_m, there.y_m));
-        println!("{:.2} mm in the stream, {:.2} mm offline; {:.0} us late", 1e3 * a, 1e3 * b, 1e6 * (stream.t_s - 100.0 - truth.0));
+        println!(
+            "{:.2} mm in the stream, {:.2} mm offline; {:.0} us late",
+            1e3 * a,
+            1e3 * b,
+            1e6 * (stream.t_s - 100.0 - truth.0)
+        );
         assert!(a < 4e-3 && b < 4e-3, "{a} m and {b} m off");
         assert!((stream.t_s - 100.0 - truth.0).abs() < 2e-4 && (offline.t_s - truth.0).abs() < 2e-4);
     }
@@ -137,7 +142,8 @@ fn the_practice_taps_are_heard_in_a_stream() {
 fn a_gap_is_survived() {
     let (room, sound) = struck(0.2, &IMPACTS, 2e-3);
     let mut listener =
-        Listener::new(room.microphones_m(), 44_100.0, 343.0, &HearSettings::default(), Delays::Phase).unwrap();
+        Listener::new(room.microphones_m(), 44_100.0, 343.0, &HearSettings::default(), Delays::Phase)
+            .unwrap();
     let mut heard = Vec::new();
     for from in (0..59_000).step_by(500) {
         // 0.45 s to 0.57 s are lost.
@@ -157,9 +163,11 @@ fn a_gap_is_survived() {
 #[test]
 fn nonsense_is_an_error() {
     let room = Court::living_room(0.3).unwrap();
-    let new = |rate| Listener::new(room.microphones_m(), rate, 343.0, &HearSettings::default(), Delays::Phase);
+    let new =
+        |rate| Listener::new(room.microphones_m(), rate, 343.0, &HearSettings::default(), Delays::Phase);
     assert!(matches!(new(f64::NAN), Err(HearError::Onset(OnsetError::Setting { .. }))));
-    let two = Listener::new(&room.microphones_m()[..2], 44_100.0, 343.0, &HearSettings::default(), Delays::Phase);
+    let two =
+        Listener::new(&room.microphones_m()[..2], 44_100.0, 343.0, &HearSettings::default(), Delays::Phase);
     assert!(matches!(two, Err(HearError::Localise(_))));
     let mut listener = new(44_100.0).unwrap();
     let ragged = listener.push(0.0, &[0.0; 4], |_| {});

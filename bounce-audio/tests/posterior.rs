@@ -62,15 +62,15 @@ fn a_hundred_drops_pin_the_ball_down() {
         let drops: Vec<Features> = each(100, k as u64, |_, rng| simulator.features(&theta, rng).unwrap());
         let posterior = exact_posterior(&model, &drops, BOUNDS).unwrap();
         let (mean, sigma) = (posterior.mean(), posterior.sigma());
-        println!("{theta:?}: {mean:.5?} +- {sigma:.5?}");
+        println!("{theta:?}: {mean:.6?} +- {sigma:.6?}");
         for i in 0..2 {
             assert!((mean[i] - theta[i]).abs() < 4.0 * sigma[i], "{mean:?} +- {sigma:?} of {theta:?}");
         }
         assert!(sigma[0] < 1e-3 && sigma[1] < 0.1, "{sigma:?}");
     }
     // No ball of the box drops so.
-    let odd = Features { time_ratio: 0.2, d1_m: 0.1, d2_m: 3.0, alpha_rad: 0.1 };
-    assert_eq!(exact_posterior(&model, &[odd], BOUNDS), None);
+    let odd = Features { time_ratio: 1.5, d1_m: 0.1, d2_m: 0.4, alpha_rad: 0.1 };
+    assert!(exact_posterior(&model, &[odd], BOUNDS).is_none());
 }
 
 /// Trained on few simulations, in logarithms: near the truth, never better than the exact posterior, and its product contracts.
