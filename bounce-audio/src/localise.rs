@@ -11,8 +11,14 @@
 mod array;
 mod correlate;
 mod peak;
+mod rival;
+mod space;
+mod survey;
 
 pub use array::{Array, ArrayError};
+pub use rival::speed_of_sound_m_s;
+pub use space::{SpaceLocation, locate_in_space};
+pub use survey::{Survey, SurveyError, SurveyPrior, Tap, survey};
 
 use correlate::Correlator;
 use thiserror::Error;
