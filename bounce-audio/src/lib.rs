@@ -12,6 +12,7 @@ pub mod listen;
 pub mod localise;
 pub mod missed;
 pub mod onset;
+pub mod playback;
 pub mod posterior;
 pub mod track;
 pub mod wav;

@@ -11,8 +11,10 @@ use bounce_audio::fake::{Burst, Court, Room, RoomError};
 use bounce_audio::hear::{HearError, HearSettings, hear};
 use bounce_audio::listen::{Delays, Listener, Placed, Sounded};
 use bounce_audio::onset::OnsetError;
+use bounce_audio::playback::Playback;
 use bounce_audio::wav::Sound;
 use common::{Dice, hiss, quantile, shared};
+use hw_traits::microphones::Microphones;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -135,6 +137,79 @@ fn the_practice_taps_are_heard_in_a_stream() {
     let (median, worst) = (quantile(&errors, 0.5), quantile(&errors, 1.0));
     println!("taps in a stream: median {median:.2} mm, worst {worst:.2} mm");
     assert!(errors.len() == 30 && median < 0.6 && worst < 3.0, "median {median} mm, worst {worst} mm");
+}
+
+/// After it was planned a stream allocates nothing, impacts or not.
+#[test]
+fn a_stream_allocates_nothing() {
+    let (room, sound) = struck(0.3, &IMPACTS, 2e-3);
+    let frames: Vec<f32> =
+        (0..60_000).flat_map(|i| sound.channels.iter().map(move |x| x[i] as f32)).collect();
+    for delays in [Delays::Phase, Delays::Peaks] {
+        let mut listener =
+            Listener::new(room.microphones_m(), 44_100.0, 343.0, &HearSettings::default(), delays).unwrap();
+        let mut impacts = 0;
+        let counted = allocation_counter::measure(|| {
+            for (k, buffer) in frames.chunks(3 * 485).enumerate() {
+                let t_s = k as f64 * 485.0 / 44_100.0;
+                listener
+                    .push(t_s, buffer, |s| impacts += usize::from(matches!(s, Sounded::Impact(_))))
+                    .unwrap();
+            }
+        });
+        assert!(impacts >= 4, "{impacts} impacts");
+        assert_eq!(counted.count_total, 0, "{counted:?}");
+    }
+}
+
+/// The practice drops (made by another package), played back behind the microphones' trait: what a recording shows, a stream hears.
+#[test]
+fn the_practice_drops_are_heard_in_a_stream() {
+    let Some(folder) = shared("practice/bounce-audio") else { return };
+    let (mut offline, mut stream, mut late) = (0, 0, Vec::new());
+    for case in ["c01", "c02", "c03", "c04"] {
+        let toml: toml::Table =
+            std::fs::read_to_string(folder.join(case).join("recording.toml")).unwrap().parse().unwrap();
+        let audio = toml["audio"].as_table().unwrap();
+        let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|i| i as f64)).unwrap();
+        let microphones: Vec<[f64; 3]> = audio["microphones_m"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|m| std::array::from_fn(|k| number(&m.as_array().unwrap()[k])))
+            .collect();
+        let speed = audio.get("speed_of_sound_m_s").map_or(343.0, number);
+        for file in audio["files"].as_array().unwrap().iter().take(2) {
+            let sound = Sound::read(folder.join(case).join(file.as_str().unwrap())).unwrap();
+            let settings = HearSettings::default();
+            let whole = hear(&sound, &microphones, speed, &settings).unwrap();
+            let mut listener =
+                Listener::new(&microphones, sound.rate_hz, speed, &settings, Delays::Phase).unwrap();
+            let mut playback = Playback::new(sound);
+            let mut buffer = vec![0.0f32; microphones.len() * 485];
+            let mut heard = Vec::new();
+            while let Ok(t_s) = playback.read(&mut buffer) {
+                listener.push(t_s, &buffer, |s| heard.push(s)).unwrap();
+            }
+            let heard = placed(&heard);
+            // A stream gets to know the noise for 50 ms first; these recordings begin with an impact.
+            for one in whole.impacts.iter().filter(|i| i.t_s > 0.06) {
+                offline += 1;
+                let Some(same) = heard.iter().find(|h| (h.t_s - one.t_s).abs() < 5e-4) else {
+                    println!("{case}: {:.3} s, {:.0} sigmas, not in the stream", one.t_s, one.amplitude_sigmas);
+                    continue;
+                };
+                stream += 1;
+                late.push(1e6 * (same.t_s - one.t_s).abs());
+                let there = one.location.unwrap();
+                let off = (same.location.x_m - there.x_m).hypot(same.location.y_m - there.y_m);
+                assert!(off < 2e-3, "{case}: {off} m between stream and recording");
+            }
+            assert!(heard.len() <= whole.impacts.len(), "{case}: the stream invents impacts");
+        }
+    }
+    println!("{stream} of {offline} heard in the stream, median {:.0} us apart", quantile(&late, 0.5));
+    assert!(offline > 20 && stream == offline, "{stream} of {offline}");
 }
 
 /// After lost samples it starts anew and goes on hearing.

@@ -4,8 +4,10 @@
 const FLOOR: (f64, f64, f64) = (2e-3, 0.2, 0.85);
 /// The noise is at least this part of a channel's root mean square, so that digital silence is a floor too.
 const LEAST_NOISE: f64 = 1e-4;
-/// Blocks that a stream remembers: half a second.
-const REMEMBERED: usize = 250;
+/// Blocks that a stream remembers: 3 s, so that a ball's last bounces and their echoes leave some quiet ones.
+const REMEMBERED: usize = 1500;
+/// Once this many are known the floor is looked at only every few blocks.
+const ENOUGH: (usize, usize) = (100, 5);
 /// Blocks before a stream's floor is believed: 50 ms.
 const FEWEST: usize = 25;
 
@@ -21,8 +23,8 @@ pub(super) fn sigma(blocks: &mut [f64], all: f64) -> f64 {
     (quiet / FLOOR.2).max(LEAST_NOISE.powi(2) * all).max(1e-24).sqrt()
 }
 
-/// The floor of a stream's last half second.
-#[derive(Debug, Clone)]
+/// The floor of a stream's last 3 s.
+#[derive(Debug)]
 pub(super) struct Floor {
     block: usize,
     powers: Vec<f64>,
@@ -61,6 +63,9 @@ impl Floor {
             self.powers[self.blocks % REMEMBERED] = power;
         }
         (self.blocks, self.samples, self.squares) = (self.blocks + 1, 0, 0.0);
+        if self.blocks > ENOUGH.0 && !self.blocks.is_multiple_of(ENOUGH.1) {
+            return;
+        }
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.powers);
         let all = self.powers.iter().sum::<f64>() / self.powers.len() as f64;

@@ -25,7 +25,7 @@ pub struct Started {
 
 /// Looks for onsets in a stream as [`Listened`](super::Listened) does in a recording; planned once, then nothing is allocated.
 ///
-/// The noise is that of the last half second, and nothing is heard in the first 50 ms. An onset is told once the samples that judging
+/// The noise is that of the last 3 s, and nothing is heard in the first 50 ms. An onset is told once the samples that judging
 /// needs are there: about 6 ms after it.
 pub struct OnsetStream {
     rate_hz: f64,
@@ -91,7 +91,8 @@ impl OnsetStream {
             stretches,
             channels,
             filters: vec![HighPass::new(settings.high_pass_hz / rate_hz); channels],
-            floors: vec![Floor::new(rate_hz); channels],
+            // Not cloned: a clone would have no room.
+            floors: (0..channels).map(|_| Floor::new(rate_hz)).collect(),
             raw: vec![0.0; room * channels],
             filtered: vec![0.0; room * channels],
             sums: vec![0.0; room],
