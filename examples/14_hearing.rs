@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! cargo run --release -p examples --example 14_hearing -- --small              20 places
-//! cargo run --release -p examples --example 14_hearing -- --picture FILE.svg   200 places, three rooms
+//! cargo run --release -p examples --example 14_hearing -- --picture FILE.svg   200 places, four rooms
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 
 use bounce_audio::drop::each;
-use bounce_audio::fake::{Burst, Court, Room};
+use bounce_audio::fake::{Burst, Room};
 use bounce_audio::hear::{HearSettings, hear};
 use bounce_audio::listen::{Delays, Listener, Sounded};
 use bounce_audio::wav::Sound;
@@ -21,6 +21,12 @@ type Failure = Box<dyn Error + Send + Sync>;
 const OUTLIER_M: f64 = 0.03;
 /// Silence before each impact, s.
 const LEAD_S: f64 = 0.12;
+
+/// The thesis's microphones, m.
+const MICROPHONES: [[f64; 3]; 3] = [[0.0, 0.0, 0.0762], [0.55, 0.0, 0.0762], [0.275, 0.55, 0.0762]];
+/// The table's origin in a room of 4 x 5 x 2.7 m: amidst it, and 30 cm from two walls, m.
+const MIDDLE: [f64; 3] = [1.7, 2.2, 0.75];
+const CORNER: [f64; 3] = [0.3, 0.3, 0.75];
 
 /// One impact, as each listener placed it; `None` where it was not heard, or taken for something else.
 struct Tap {
@@ -41,7 +47,7 @@ fn main() -> Result<(), Failure> {
         "{count} places, three microphones, white noise 20 dB below the sound of the first 20 ms; errors in mm"
     );
     println!(
-        "{:8} {:38} {:>7} {:>7} {:>7} {:>7} {:>9} {:>7} {:>9} {:>11}",
+        "{:10} {:38} {:>7} {:>7} {:>7} {:>7} {:>9} {:>7} {:>9} {:>11}",
         "RT60, s",
         "heard",
         "median",
@@ -53,10 +59,12 @@ fn main() -> Result<(), Failure> {
         "invented",
         "thesis mean"
     );
-    let rooms: &[f64] = if examples::small() { &[0.3] } else { &[0.0, 0.3, 0.5] };
+    let all =
+        [("none", 0.0, MIDDLE), ("0.3", 0.3, MIDDLE), ("0.5", 0.5, MIDDLE), ("0.5 corner", 0.5, CORNER)];
+    let rooms = if examples::small() { &all[3..] } else { &all[..] };
     let mut drawn = Vec::new();
-    for &rt60_s in rooms {
-        let taps = taps(rt60_s, count)?;
+    for &(room, rt60_s, table_m) in rooms {
+        let taps = taps(rt60_s, table_m, count)?;
         for (k, (name, thesis)) in LISTENERS.iter().enumerate() {
             let mut off: Vec<f64> = taps.iter().filter_map(|t| Some(error_m(t.place, t.heard[k]?))).collect();
             off.sort_by(f64::total_cmp);
@@ -68,14 +76,14 @@ fn main() -> Result<(), Failure> {
             let quantile =
                 |q: f64| off.get(((n - 1) as f64 * q).round() as usize).map_or(f64::NAN, |e| 1e3 * e);
             println!(
-                "{rt60_s:<8} {name:38} {:>7.2} {:>7.2} {:>7.2} {:>7.1} {outliers:>9} {missed:>7} {invented:>9} {thesis:>11}",
+                "{room:<10} {name:38} {:>7.2} {:>7.2} {:>7.2} {:>7.1} {outliers:>9} {missed:>7} {invented:>9} {thesis:>11}",
                 quantile(0.5),
                 1e3 * mean,
                 quantile(0.95),
                 quantile(1.0)
             );
         }
-        drawn.push((rt60_s, taps));
+        drawn.push((room, taps));
     }
     println!(
         "\nThe mean leaves the outliers out, as the thesis's figure does. Its room was a real one; ours are image sources."
@@ -91,8 +99,9 @@ fn error_m(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-fn taps(rt60_s: f64, count: usize) -> Result<Vec<Tap>, Failure> {
-    each(count, 14, |_, rng| tap(&Court::living_room(rt60_s)?, rng)).into_iter().collect()
+fn taps(rt60_s: f64, table_m: [f64; 3], count: usize) -> Result<Vec<Tap>, Failure> {
+    let room = || Room::new([4.0, 5.0, 2.7], table_m, rt60_s, 343.0, &MICROPHONES, 44_100.0);
+    each(count, 14, |_, rng| tap(&room()?, rng)).into_iter().collect()
 }
 
 fn tap<R: Rng>(room: &Room, rng: &mut R) -> Result<Tap, Failure> {
@@ -142,7 +151,7 @@ fn streamed(room: &Room, sound: &Sound, delays: Delays) -> Result<Vec<[f64; 2]>,
 }
 
 /// Each place with a line to where it was heard, a panel a room and listener.
-fn picture(rooms: &[(f64, Vec<Tap>)]) -> Result<String, Failure> {
+fn picture(rooms: &[(&str, Vec<Tap>)]) -> Result<String, Failure> {
     use std::fmt::Write;
     let (size, gap) = (280.0, 40.0);
     let (width, height) = (3.0 * (size + gap) + gap, rooms.len() as f64 * (size + gap) + gap);

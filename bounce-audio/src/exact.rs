@@ -26,7 +26,7 @@ use crate::features::Features;
 use std::f64::consts::PI;
 
 /// Nodes of the integral over the direction at release (midpoints; the integrand is smooth and even at both ends).
-const NODES: usize = 24;
+const NODES: usize = 16;
 
 /// What is known of the drops.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,6 +125,9 @@ impl ExactModel {
 
 /// Mean over the azimuth of `e^(kappa (cos angle - 1))` between directions at two angles from the vertical.
 fn around(kappa: f64, theta0: f64, theta: f64) -> f64 {
-    let off = 2.0 * (0.5 * (theta - theta0)).sin().powi(2);
-    (-kappa * off).exp() * bessel::i0_scaled(kappa * theta0.sin() * theta.sin())
+    let exponent = 2.0 * kappa * (0.5 * (theta - theta0)).sin().powi(2);
+    if exponent > 700.0 {
+        return 0.0;
+    }
+    (-exponent).exp() * bessel::i0_scaled(kappa * theta0.sin() * theta.sin())
 }

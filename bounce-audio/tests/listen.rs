@@ -196,7 +196,10 @@ fn the_practice_drops_are_heard_in_a_stream() {
             for one in whole.impacts.iter().filter(|i| i.t_s > 0.06) {
                 offline += 1;
                 let Some(same) = heard.iter().find(|h| (h.t_s - one.t_s).abs() < 5e-4) else {
-                    println!("{case}: {:.3} s, {:.0} sigmas, not in the stream", one.t_s, one.amplitude_sigmas);
+                    println!(
+                        "{case}: {:.3} s, {:.0} sigmas, not in the stream",
+                        one.t_s, one.amplitude_sigmas
+                    );
                     continue;
                 };
                 stream += 1;

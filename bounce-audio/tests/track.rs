@@ -174,6 +174,11 @@ fn a_ball_of_much_chance_moves_the_paddle_less() {
         (0.5 - goal.y_m).abs()
     };
     let (sure, unsure) = (step(4.0), step(2.0));
+    // With a paddle that is wide enough it stays where it is.
+    let wide = StochasticSettings { touch_m: 0.5, ..StochasticSettings::default() };
+    let mut tracker = Stochastic::new(learned(0.85, 4.0), SPACE, wide);
+    tracker.heard(&seen[0], [0.4, 0.1], &mut dice(1));
+    assert_eq!(tracker.heard(&seen[1], [0.4, 0.1], &mut dice(1)).unwrap().y_m, 0.4);
     println!("{sure:.3} m where the ball is sure, {unsure:.3} m where it is not");
     assert!(unsure < 0.6 * sure, "{sure} and {unsure}");
 }

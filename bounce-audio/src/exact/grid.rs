@@ -4,7 +4,7 @@ use super::ExactModel;
 use crate::features::Features;
 
 /// Points along e and along log10 kappa.
-const POINTS: [usize; 2] = [56, 49];
+const POINTS: [usize; 2] = [40, 40];
 /// Rounds of zooming at most.
 const ROUNDS: usize = 8;
 /// Points further below the peak than this, in nats, are left out of the next round.

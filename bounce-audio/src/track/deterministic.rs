@@ -1,10 +1,7 @@
 //! Algorithm 1: the ball goes straight on, each flight e as long and e^2 as far as the one before.
 
-use super::{Flight, Goal, Seen, Tracker, Workspace};
+use super::{FIRST_S, Flight, Goal, Seen, Tracker, Workspace};
 use rand::Rng;
-
-/// Time for the first goal, s: about a flight.
-const FIRST_S: f64 = 0.3;
 
 /// The baseline of appendix B.3 (equations B.11 to B.16), without chance.
 #[derive(Debug, Clone, PartialEq)]

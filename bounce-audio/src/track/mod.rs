@@ -15,6 +15,9 @@ pub use stochastic::{Stochastic, StochasticSettings};
 
 use rand::Rng;
 
+/// Time for the goal after the first impact, s: about a flight.
+const FIRST_S: f64 = 0.3;
+
 /// Where the paddle can be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Workspace {

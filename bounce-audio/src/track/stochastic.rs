@@ -2,7 +2,7 @@
 //! what may come lets it.
 
 use super::next::NextBounce;
-use super::{Flight, Goal, Seen, Tracker, Workspace};
+use super::{FIRST_S, Flight, Goal, Seen, Tracker, Workspace};
 use rand::Rng;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -20,6 +20,9 @@ pub struct StochasticSettings {
     pub ahead: usize,
     /// The paddle goes all the way where the crossing is known to this (standard deviation, m), and the less the less it is known.
     pub sure_m: f64,
+    /// How far from the paddle's middle a ball is still touched, m: the paddle goes no farther than to have the crossing within this, less
+    /// two standard deviations. 0 for the thesis's rule, which goes to the mean.
+    pub touch_m: f64,
     /// Probability that an honest place is taken for an outlier.
     pub false_outliers: f64,
     /// Standard deviation of a place beyond what the density says: hearing, and what it does not model, m.
@@ -28,7 +31,7 @@ pub struct StochasticSettings {
 
 impl Default for StochasticSettings {
     fn default() -> Self {
-        Self { samples: 10, ahead: 3, sure_m: 0.03, false_outliers: 1e-3, tolerance_m: 0.012 }
+        Self { samples: 10, ahead: 3, sure_m: 0.03, touch_m: 0.0, false_outliers: 1e-3, tolerance_m: 0.012 }
     }
 }
 
@@ -175,7 +178,7 @@ impl Tracker for Stochastic {
         let Some(last) = self.last else {
             self.last = Some(*impact);
             // As algorithm 1 does: there is nothing to be more careful by.
-            return Some(w.within(impact.place_m[1], w.rest_z_m, impact.t_s + 0.3));
+            return Some(w.within(impact.place_m[1], w.rest_z_m, impact.t_s + FIRST_S));
         };
         let (seen, flight) = match self.flight {
             None => (*impact, Flight::between(&last, impact)),
@@ -191,10 +194,13 @@ impl Tracker for Stochastic {
             return None;
         }
         let sigma = (ways.variance(1) + ways.variance(2)).sqrt();
-        let share = (self.settings.sure_m / sigma.max(1e-9)).min(1.0);
-        let toward = |k: usize, from: f64| from + share * (ways.mean(k) - from);
+        let off = [ways.mean(1) - paddle_m[0], ways.mean(2) - paddle_m[1]];
+        let far = off[0].hypot(off[1]);
+        let free = (self.settings.touch_m - 2.0 * sigma).max(0.0);
+        let needed = if far > 0.0 { (1.0 - free / far).max(0.0) } else { 0.0 };
+        let share = needed * (self.settings.sure_m / sigma.max(1e-9)).min(1.0);
         let (next, _) = self.next.moments(flight.duration_s, flight.length_m());
         let at_s = ways.mean(0).min(seen.t_s + next.duration_s);
-        Some(w.within(toward(1, paddle_m[0]), toward(2, paddle_m[1]), at_s))
+        Some(w.within(paddle_m[0] + share * off[0], paddle_m[1] + share * off[1], at_s))
     }
 }
