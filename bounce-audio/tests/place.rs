@@ -149,8 +149,8 @@ fn taps_put_microphones_right() {
             .collect();
         let found = survey(&stated, stated_speed, &taps, &prior).unwrap();
         for (i, m) in truth.iter().enumerate() {
-            for k in 0..3 {
-                z.push((found.microphones_m[i][k] - m[k]) / found.sigmas_m[i][k]);
+            for (k, coordinate) in m.iter().enumerate() {
+                z.push((found.microphones_m[i][k] - coordinate) / found.sigmas_m[i][k]);
                 // Along the table taps tell a millimetre.
                 assert!(k == 2 || found.sigmas_m[i][k] < 2e-3, "{:?}", found.sigmas_m);
             }
