@@ -211,7 +211,7 @@ fn joint(
         println!(
             "{:26} {:>22} {:>22} {:>26} {:>22}",
             format!("{name} ({}, {})", theta[0], theta[1]),
-            format!("{:.4} +- {:.4}", mean[0], c[0].sqrt()),
+            format!("{:.5} +- {:.5}", mean[0], c[0].sqrt()),
             format!("{:.3} +- {:.3}", mean[1], c[3].sqrt()),
             format!("{:.6} +- {:.6}", m[0], s[0]),
             format!("{:.3} +- {:.3}", m[1], s[1])
