@@ -55,8 +55,8 @@ fn score(density: &dyn MixtureDensity, simulator: &DropSimulator, tests: &[Drop]
         let begin = Instant::now();
         let posterior = density.posterior(&x)?;
         score.posterior_us += 1e6 * begin.elapsed().as_secs_f64() / n;
-        for k in 0..2 {
-            score.off[k] += (marginal_peak(&posterior, k)? - theta[k]).abs() / n;
+        for (k, (off, truth)) in score.off.iter_mut().zip(theta).enumerate() {
+            *off += (marginal_peak(&posterior, k)? - truth).abs() / n;
         }
         score.ln_density += posterior.ln_density(theta)? / n;
     }
@@ -152,14 +152,14 @@ fn exact_line(model: &ExactModel, tested: &[Drop]) -> Result<(), Failure> {
     });
     let scores: Vec<_> = scores.into_iter().flatten().collect();
     let n = scores.len() as f64;
-    let mean = |f: &dyn Fn(&([f64; 2], f64)) -> f64| scores.iter().map(f).sum::<f64>() / n;
+    let off = |k: usize| scores.iter().map(|s| s.0[k]).sum::<f64>() / n;
     let each_us = 1e6 * begin.elapsed().as_secs_f64() / n;
     println!(
         "{:34} {:>8.5} {:>12.3} {:>10.2} {:>9} {each_us:>9.0}",
         "both, exact",
-        mean(&|s| s.0[0]),
-        mean(&|s| s.0[1]),
-        mean(&|s| s.1),
+        off(0),
+        off(1),
+        scores.iter().map(|s| s.1).sum::<f64>() / n,
         "-"
     );
     if scores.len() < tested.len() {
