@@ -174,18 +174,7 @@ pub fn hear(
             }
             Err(error) => return Err(error.into()),
         };
-        let outside = array.outside_m(location.x_m, location.y_m);
-        let power = onset.amplitude_sigmas.powi(2);
-        let coherence = settings.coherence * power / (power + EXCUSED);
-        let reason = if !(location.coherence >= coherence) {
-            Some(StrayReason::Incoherent(location.coherence))
-        } else if !(location.closure_s <= settings.closure_s) {
-            Some(StrayReason::Scattered(location.closure_s))
-        } else if !(outside <= settings.reach * array.diagonal_m()) {
-            Some(StrayReason::Outside(outside))
-        } else {
-            None
-        };
+        let reason = doubt(&array, &location, onset.amplitude_sigmas, settings);
         if let Some(reason) = reason {
             heard.strays.push(Stray { t_s: first, reason });
             continue;
@@ -193,6 +182,27 @@ pub fn hear(
         heard.impacts.push(timed(&listened, &localiser, &onset, location, heard.impacts.len())?);
     }
     Ok(heard)
+}
+
+/// Why a sound that was localised is no impact on the table.
+pub(crate) fn doubt(
+    array: &Array,
+    location: &Location,
+    amplitude_sigmas: f64,
+    settings: &HearSettings,
+) -> Option<StrayReason> {
+    let outside = array.outside_m(location.x_m, location.y_m);
+    let power = amplitude_sigmas.powi(2);
+    let coherence = settings.coherence * power / (power + EXCUSED);
+    if !(location.coherence >= coherence) {
+        Some(StrayReason::Incoherent(location.coherence))
+    } else if !(location.closure_s <= settings.closure_s) {
+        Some(StrayReason::Scattered(location.closure_s))
+    } else if !(outside <= settings.reach * array.diagonal_m()) {
+        Some(StrayReason::Outside(outside))
+    } else {
+        None
+    }
 }
 
 /// The time of an impact whose place is known: all channels, aligned by their measured time differences, show one onset; the mean

@@ -11,8 +11,14 @@
 mod array;
 mod correlate;
 mod peak;
+mod rival;
+mod space;
+mod survey;
 
 pub use array::{Array, ArrayError};
+pub use rival::speed_of_sound_m_s;
+pub use space::{SpaceLocation, locate_in_space};
+pub use survey::{Survey, SurveyError, SurveyPrior, Tap, survey};
 
 use correlate::Correlator;
 use thiserror::Error;
@@ -151,8 +157,40 @@ impl Localiser {
 
     /// The place of the one impact in the buffer: one slice a microphone, each as long as the buffer, starting 1 to 2 ms before
     /// the sound reaches the first one (the first eighth is taken for noise).
+    ///
+    /// # Errors
+    /// [`LocaliseError::Channels`], [`LocaliseError::Length`], [`LocaliseError::Energy`].
     pub fn locate(&mut self, channels: &[&[f64]]) -> Result<Location, LocaliseError> {
-        self.correlator.listen(channels)?;
+        let (expected, got) = (self.arrivals_s.len(), channels.len());
+        if expected != got {
+            return Err(LocaliseError::Channels { expected, got });
+        }
+        let expected = self.buffer();
+        for (channel, x) in channels.iter().enumerate() {
+            if x.len() != expected {
+                return Err(LocaliseError::Length { channel, expected, got: x.len() });
+            }
+        }
+        self.correlator.listen(|channel| channels[channel])?;
+        Ok(self.place())
+    }
+
+    /// As [`Localiser::locate`], from channels that lie one after another.
+    ///
+    /// # Errors
+    /// [`LocaliseError::Length`], [`LocaliseError::Energy`].
+    pub fn locate_planar(&mut self, samples: &[f64]) -> Result<Location, LocaliseError> {
+        let buffer = self.buffer();
+        let expected = buffer * self.arrivals_s.len();
+        if samples.len() != expected {
+            return Err(LocaliseError::Length { channel: 0, expected, got: samples.len() });
+        }
+        self.correlator.listen(|channel| &samples[channel * buffer..][..buffer])?;
+        Ok(self.place())
+    }
+
+    /// The place that fits the correlations.
+    fn place(&mut self) -> Location {
         let n = self.arrivals_s.len();
         for i in 0..n {
             self.arrivals_s[i] = (0..n).map(|j| self.correlator.lag_s(i, j)).sum::<f64>() / n as f64;
@@ -165,18 +203,8 @@ impl Localiser {
             }
         }
         let closure_s = (open / (n * (n - 1) / 2) as f64).sqrt();
-        let sigma = self.correlator.arrival_sigma_s();
-        let place = self.array.solve(&self.arrivals_s);
-        let dof = n - 3;
-        Ok(Location {
-            x_m: place.x_m,
-            y_m: place.y_m,
-            covariance_m2: place.cofactor.map(|row| row.map(|c| c * sigma * sigma)),
-            arrival_sigma_s: sigma,
-            residual_s: (dof > 0).then(|| (place.sum_squares / dof as f64).sqrt()),
-            closure_s,
-            coherence: self.correlator.coherence(),
-        })
+        let (sigma, coherence) = (self.correlator.arrival_sigma_s(), self.correlator.coherence());
+        self.array.location(&self.arrivals_s, sigma, closure_s, coherence)
     }
 
     /// When the impact that was localised last reached each microphone, s from the mean of all of them.

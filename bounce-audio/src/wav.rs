@@ -1,4 +1,5 @@
-//! Sound files: RIFF WAVE with any number of channels, 16, 24 or 32-bit integers or 32-bit floats.
+//! Sound files: RIFF WAVE with any number of channels, 16, 24 or 32-bit integers, 32 or
+//! 64-bit floats.
 //!
 //! Chunks may come in any order after each other, with or without the pad byte that RIFF wants after an odd length; those that
 //! hold no sound are skipped. Format: IBM and Microsoft 1991, *Multimedia Programming Interface and Data Specifications 1.0*;
@@ -214,9 +215,9 @@ impl Format {
         }
         let bytes = usize::from(frame / channels);
         match (coding, bytes) {
-            (Coding::Int, 2..=4) | (Coding::Float, 4) if bits > 0 => {}
+            (Coding::Int, 2..=4) | (Coding::Float, 4 | 8) if bits > 0 => {}
             (Coding::Int, _) => return wrong("the integer sample", "2, 3 or 4 bytes", bytes.to_string()),
-            (Coding::Float, _) => return wrong("the float sample", "4 bytes", bytes.to_string()),
+            (Coding::Float, _) => return wrong("the float sample", "4 or 8 bytes", bytes.to_string()),
         }
         if usize::from(frame) != bytes * usize::from(channels) || usize::from(bits) > 8 * bytes {
             let expected = format!("at most {} bits in blocks of {channels} samples", 8 * bytes);
@@ -237,6 +238,7 @@ fn samples(data: &[u8], format: &Format) -> Result<Sound, Fault> {
         for (channel, b) in block.chunks_exact(format.bytes).enumerate() {
             let value = match (format.coding, b) {
                 (Coding::Float, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+                (Coding::Float, &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
                 (Coding::Int, &[a, b]) => f64::from(i16::from_le_bytes([a, b])) / 32_768.0,
                 (Coding::Int, &[a, b, c]) => f64::from(i32::from_le_bytes([0, a, b, c])) / 2_147_483_648.0,
                 (Coding::Int, &[a, b, c, d]) => f64::from(i32::from_le_bytes([a, b, c, d])) / 2_147_483_648.0,

@@ -111,7 +111,7 @@ fn what_is_broken_is_an_error() {
         (1, 1, u32::MAX, 16),
         (1, 1, 44_100, 8),
         (1, 1, 44_100, 0),
-        (3, 1, 44_100, 64),
+        (3, 1, 44_100, 24),
         (3, 1, 44_100, 16),
         (2, 1, 44_100, 16),
         (85, 2, 44_100, 16),
@@ -160,4 +160,15 @@ fn an_error_names_the_file() {
     std::fs::write(&missing, riff(&[format(1, 0, 44_100, 16)])).unwrap();
     let said = Sound::read(&missing).unwrap_err().to_string();
     assert!(said.ends_with("drop-00.wav: the number of channels is 0, expected 1 to 64"), "{said}");
+}
+
+/// Floats of 64 bits, which hound does not write.
+#[test]
+fn floats_of_64_bits_are_read() {
+    let values = [0.1, -0.25, 1.5, f64::MIN_POSITIVE];
+    let body: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let sound = Sound::from_bytes(&riff(&[format(3, 2, 44_100, 64), chunk(b"data", &body, true)])).unwrap();
+    assert_eq!(sound.channels, [[0.1, 1.5], [-0.25, f64::MIN_POSITIVE]]);
+    let short = riff(&[format(3, 2, 44_100, 64), chunk(b"data", &body[..24], true)]);
+    assert!(matches!(Sound::from_bytes(&short), Err(Fault::Ragged { frame: 16, got: 24 })));
 }

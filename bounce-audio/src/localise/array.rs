@@ -1,5 +1,6 @@
 //! Microphones around a table, and the place on it that fits times of arrival.
 
+use super::Location;
 use thiserror::Error;
 
 /// Points of the lattice of first guesses along each edge.
@@ -142,6 +143,28 @@ impl Array {
         (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| self.lag_s(i, j)).fold(0.0, f64::max)
     }
 
+    /// The place that fits arrivals (s, one a microphone) best, with what is known of how they were measured.
+    pub(crate) fn location(
+        &self,
+        arrivals_s: &[f64],
+        arrival_sigma_s: f64,
+        closure_s: f64,
+        coherence: f64,
+    ) -> Location {
+        let place = self.solve(arrivals_s);
+        let dof = arrivals_s.len().saturating_sub(3);
+        let variance = arrival_sigma_s * arrival_sigma_s;
+        Location {
+            x_m: place.x_m,
+            y_m: place.y_m,
+            covariance_m2: place.cofactor.map(|row| row.map(|c| c * variance)),
+            arrival_sigma_s,
+            residual_s: (dof > 0).then(|| (place.sum_squares / dof as f64).sqrt()),
+            closure_s,
+            coherence,
+        }
+    }
+
     /// The place on the table that fits arrivals (s, one a microphone, any common offset) best, by Gauss-Newton.
     ///
     /// Where two places fit alike, the one within the microphones' rectangle is taken.
@@ -157,17 +180,19 @@ impl Array {
         if around.sum_squares < within.sum_squares - 1e-6 * good { around } else { within }
     }
 
+    /// A point of the microphones' rectangle, widened by a length on all sides: parts of its edges.
+    pub(super) fn widened_m(&self, by_m: f64, parts: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| self.low[k] - by_m + parts[k] * (self.high[k] - self.low[k] + 2.0 * by_m))
+    }
+
     /// The lattice's best point, over the microphones' rectangle widened on all sides by a part of its diagonal.
     fn guess(&self, arrivals_s: &[f64], widened: f64) -> [f64; 2] {
         let by = widened * self.diagonal_m();
-        let at = |k: usize, i: usize| {
-            let t = i as f64 / (LATTICE - 1) as f64;
-            self.low[k] - by + t * (self.high[k] - self.low[k] + 2.0 * by)
-        };
+        let part = |i: usize| i as f64 / (LATTICE - 1) as f64;
         let mut best = (f64::INFINITY, [0.0; 2]);
         for i in 0..LATTICE {
             for j in 0..LATTICE {
-                let place = [at(0, i), at(1, j)];
+                let place = self.widened_m(by, [part(i), part(j)]);
                 let left = self.cost(arrivals_s, place);
                 if left < best.0 {
                     best = (left, place);
@@ -177,7 +202,7 @@ impl Array {
         best.1
     }
 
-    fn cost(&self, arrivals_s: &[f64], [x, y]: [f64; 2]) -> f64 {
+    pub(super) fn cost(&self, arrivals_s: &[f64], [x, y]: [f64; 2]) -> f64 {
         let n = arrivals_s.len() as f64;
         let (mut sum, mut squares) = (0.0, 0.0);
         for (i, t) in arrivals_s.iter().enumerate() {
@@ -214,7 +239,7 @@ impl Array {
         )
     }
 
-    fn descend(&self, arrivals_s: &[f64], start: [f64; 2]) -> Fit {
+    pub(super) fn descend(&self, arrivals_s: &[f64], start: [f64; 2]) -> Fit {
         let mut place = start;
         let mut cost = self.cost(arrivals_s, place);
         let mut damping = 1e-6;

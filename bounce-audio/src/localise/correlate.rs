@@ -133,17 +133,11 @@ impl Correlator {
         self.pairs.iter().map(|p| p.coherence).fold(1.0, f64::min)
     }
 
-    pub(super) fn listen(&mut self, channels: &[&[f64]]) -> Result<(), LocaliseError> {
-        if channels.len() != self.channels {
-            return Err(LocaliseError::Channels { expected: self.channels, got: channels.len() });
-        }
-        for (channel, x) in channels.iter().enumerate() {
-            if x.len() != self.buffer {
-                return Err(LocaliseError::Length { channel, expected: self.buffer, got: x.len() });
-            }
-        }
-        for (two, pair) in channels.chunks(2).enumerate() {
-            self.transform(2 * two, pair)?;
+    /// Correlates the channels, each a slice as long as the buffer.
+    pub(super) fn listen<'a>(&mut self, channel: impl Fn(usize) -> &'a [f64]) -> Result<(), LocaliseError> {
+        for first in (0..self.channels).step_by(2) {
+            let second = (first + 1 < self.channels).then(|| channel(first + 1));
+            self.transform(first, channel(first), second)?;
         }
         self.cross_spectra();
         let bins = self.band.1 - self.band.0;
@@ -174,16 +168,15 @@ impl Correlator {
     }
 
     /// Spectra in the band of one channel or two, which one complex transform takes together.
-    fn transform(&mut self, first: usize, two: &[&[f64]]) -> Result<(), LocaliseError> {
+    fn transform(&mut self, first: usize, one: &[f64], second: Option<&[f64]>) -> Result<(), LocaliseError> {
         let n = self.packed.len();
         let bins = self.band.1 - self.band.0;
         self.packed[self.buffer..].fill(Complex64::new(0.0, 0.0));
-        let second = two.get(1);
         for (k, (z, w)) in self.packed.iter_mut().zip(&self.window).enumerate() {
-            *z = Complex64::new(two[0][k] * w, second.map_or(0.0, |x| x[k] * w));
+            *z = Complex64::new(one[k] * w, second.map_or(0.0, |x| x[k] * w));
         }
         self.forward.process_with_scratch(&mut self.packed, &mut self.scratch);
-        for (which, x) in two.iter().enumerate() {
+        for (which, x) in std::iter::once(one).chain(second).enumerate() {
             let channel = first + which;
             let mut energy = 0.0;
             for b in 0..bins {

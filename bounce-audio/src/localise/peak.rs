@@ -74,10 +74,11 @@ impl Peak {
                 break;
             }
             let step = (slope / curvature).clamp(-bound, bound);
-            if step.abs() < 1e-11 {
+            peak.lag_s = t + step;
+            // What Newton's next step would add is the square of this.
+            if step.abs() < 2e-9 {
                 break;
             }
-            peak.lag_s = t + step;
         }
         peak
     }

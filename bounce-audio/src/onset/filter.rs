@@ -9,23 +9,49 @@ const TAPS: isize = 8;
 const QUALITIES: [f64; 2] = [0.541_196_100_146_197, 1.306_562_964_876_376_5];
 
 /// Fourth-order Butterworth high-pass with its corner at a part of the sample rate, by the bilinear transform.
-pub(super) fn high_pass(x: &[f64], corner: f64) -> Vec<f64> {
-    let mut y = x.to_vec();
-    for q in QUALITIES {
-        let (sin, cos) = (2.0 * PI * corner).sin_cos();
-        let alpha = sin / (2.0 * q);
-        let b = 0.5 * (1.0 + cos) / (1.0 + alpha);
-        let (a1, a2) = (-2.0 * cos / (1.0 + alpha), (1.0 - alpha) / (1.0 + alpha));
-        // The sound was constant before it began.
-        let first = y.first().copied().unwrap_or(0.0);
-        let (mut x1, mut x2, mut y1, mut y2) = (first, first, 0.0, 0.0);
-        for v in &mut y {
-            let out = b * (*v - 2.0 * x1 + x2) - a1 * y1 - a2 * y2;
-            (x2, x1, y2, y1) = (x1, *v, y1, out);
-            *v = out;
-        }
+#[derive(Debug, Clone)]
+pub(super) struct HighPass {
+    sections: [Section; 2],
+    /// The sound was constant before it began.
+    begun: bool,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Section {
+    b: f64,
+    a: [f64; 2],
+    x: [f64; 2],
+    y: [f64; 2],
+}
+
+impl HighPass {
+    pub(super) fn new(corner: f64) -> Self {
+        let section = |q: f64| {
+            let (sin, cos) = (2.0 * PI * corner).sin_cos();
+            let alpha = sin / (2.0 * q);
+            let a = [-2.0 * cos / (1.0 + alpha), (1.0 - alpha) / (1.0 + alpha)];
+            Section { b: 0.5 * (1.0 + cos) / (1.0 + alpha), a, ..Section::default() }
+        };
+        Self { sections: QUALITIES.map(section), begun: false }
     }
-    y
+
+    /// The filtered sample.
+    pub(super) fn step(&mut self, x: f64) -> f64 {
+        if !self.begun {
+            (self.sections[0].x, self.begun) = ([x; 2], true);
+        }
+        self.sections.iter_mut().fold(x, |v, s| {
+            let out = s.b * (v - 2.0 * s.x[0] + s.x[1]) - s.a[0] * s.y[0] - s.a[1] * s.y[1];
+            (s.x, s.y) = ([v, s.x[0]], [out, s.y[0]]);
+            out
+        })
+    }
+}
+
+/// A whole sound, filtered.
+pub(super) fn high_pass(x: &[f64], corner: f64) -> Vec<f64> {
+    let mut filter = HighPass::new(corner);
+    x.iter().map(|v| filter.step(*v)).collect()
 }
 
 /// The sound at a place between samples, by a sinc under a Hann window; silence beyond its ends.

@@ -32,6 +32,36 @@ impl Default for OnsetSettings {
     }
 }
 
+impl OnsetSettings {
+    /// Whether onsets can be looked for at a sample rate (Hz).
+    ///
+    /// # Errors
+    /// [`OnsetError::Setting`] names the first setting out of its range.
+    pub fn check(&self, rate_hz: f64) -> Result<(), OnsetError> {
+        let positive = "a finite number above 0";
+        for (what, got) in [
+            ("the sample rate", rate_hz),
+            ("the threshold", self.threshold_sigmas),
+            ("the rise", self.rise),
+            ("the refractory time", self.refractory_s),
+            ("the high-pass corner", self.high_pass_hz),
+        ] {
+            if !(got > 0.0 && got.is_finite()) {
+                return Err(OnsetError::Setting { what, expected: positive, got });
+            }
+        }
+        if !(self.high_pass_hz < 0.4 * rate_hz) {
+            let expected = "below 0.4 of the sample rate";
+            return Err(OnsetError::Setting {
+                what: "the high-pass corner",
+                expected,
+                got: self.high_pass_hz,
+            });
+        }
+        Ok(())
+    }
+}
+
 /// Why onsets cannot be looked for.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
