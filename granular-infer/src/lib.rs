@@ -4,6 +4,8 @@ pub mod camera;
 pub mod campaign;
 pub mod dem;
 pub mod emulator;
+pub mod scene;
 pub mod seeing;
 pub mod shard;
 pub mod statistics;
+pub mod summary;
