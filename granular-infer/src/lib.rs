@@ -2,10 +2,13 @@
 
 pub mod camera;
 pub mod campaign;
+pub mod columns;
 pub mod dem;
 pub mod emulator;
+pub mod posterior;
 pub mod scene;
 pub mod seeing;
 pub mod shard;
 pub mod statistics;
 pub mod summary;
+pub mod view;
