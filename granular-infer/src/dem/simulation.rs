@@ -4,6 +4,7 @@ use super::{
     energy::{Energy, energy, kinetic},
     error::{DemError, finite, positive, within},
     forces::Forces,
+    frame::WallMotion,
     grains::{Grains, Load},
     material::{Coefficients, Factors, Law, stable_step_s},
     neighbours::{Counters, Neighbours},
@@ -60,6 +61,7 @@ pub struct Simulation {
     gravity: V3,
     drag: f64,
     step: f64,
+    fastest: f64,
     steps: u64,
     factors: Factors,
     grains: Grains,
@@ -96,12 +98,13 @@ impl Simulation {
             return Err(DemError::Step { received_s: setup.step_s, stable_s });
         }
         let grains = Grains::new(radii_m, positions_m, setup.density_kg_m3, setup.step_s);
-        let shapes: Vec<Shape> = setup.walls.iter().map(|w| w.shape).collect();
+        let shapes: Vec<Shape> = setup.walls.iter().map(|w| w.shape.clone()).collect();
         let factors = setup.walls.iter().map(|w| setup.law.factors(&w.coefficients)).collect();
         Ok(Self {
             gravity: setup.gravity_m_s2,
             drag: setup.drag_per_m,
             step: setup.step_s,
+            fastest: setup.fastest_m_s,
             steps: 0,
             factors: setup.law.factors(&setup.grains),
             neighbours: Neighbours::new(&grains),
@@ -133,6 +136,20 @@ impl Simulation {
         self.walls.remove(wall)
     }
 
+    /// Lets a wall move from now on, as a funnel along a path or a bowl about a pivot; its index is that in [`Setup::walls`].
+    ///
+    /// # Errors
+    /// [`DemError::Index`]; [`DemError::OutOfRange`] for what is not finite, and for a wall faster than [`Setup::fastest_m_s`].
+    pub fn move_wall(&mut self, wall: usize, motion: WallMotion) -> Result<(), DemError> {
+        finite("velocity_m_s", motion.velocity_m_s)?;
+        finite("spin_rad_s", motion.spin_rad_s)?;
+        finite("about_m", motion.about_m)?;
+        let v = motion.velocity_m_s;
+        within("speed of a wall in m/s", dot(v, v).sqrt(), 0.0, self.fastest)?;
+        self.fresh = true;
+        self.walls.set_motion(wall, motion)
+    }
+
     /// One step of velocity Verlet; dashpots act on the velocities at half the step.
     pub fn step(&mut self) {
         if self.fresh {
@@ -140,7 +157,7 @@ impl Simulation {
             self.react();
             self.fresh = false;
         }
-        let mut left = false;
+        let mut left = self.walls.advance(self.step);
         let grains = &mut self.grains;
         for (i, (((place, motion), load), kick)) in
             grains.place.iter_mut().zip(&mut grains.motion).zip(&grains.load).zip(&grains.kick).enumerate()
