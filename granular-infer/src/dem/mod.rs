@@ -1,6 +1,7 @@
 //! Discrete elements: spheres that touch, roll, slide and come to rest.
 
 mod cells;
+mod clump;
 mod contact;
 mod energy;
 mod error;
@@ -18,6 +19,7 @@ mod simulation;
 mod vector;
 mod wall;
 
+pub use clump::{Clump, Placed};
 pub use energy::Energy;
 pub use error::DemError;
 pub use frame::WallMotion;
