@@ -87,9 +87,27 @@ impl View {
         coloured: &[bool],
         diameter_m: f64,
     ) -> Result<[f64; COUNT], SummaryError> {
+        Ok(summary(&self.chosen(map, coloured, diameter_m)?)?.values)
+    }
+
+    fn chosen(
+        &self,
+        map: &HeightMap,
+        coloured: &[bool],
+        diameter_m: f64,
+    ) -> Result<Vec<[f64; 3]>, SummaryError> {
         let mask =
             if self.by_colour { Mask::Marked(coloured) } else { Mask::Higher(self.least * diameter_m) };
-        Ok(summary(&points(map, self.block, mask)?)?.values)
+        points(map, self.block, mask)
+    }
+
+    /// The points (m) at which grains are seen, once.
+    ///
+    /// # Errors
+    /// [`LookError`].
+    pub fn points(&self, grains: &Grains, rig: &Rig, rng: &mut dyn Rng) -> Result<Vec<[f64; 3]>, LookError> {
+        let (map, coloured) = self.look(grains, rig, rng)?;
+        Ok(self.chosen(&map, &coloured, rig.diameter_m)?)
     }
 
     /// The 16 statistics of grains, seen once.

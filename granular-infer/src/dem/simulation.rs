@@ -294,6 +294,14 @@ impl Simulation {
         }
     }
 
+    /// The force in N of all grains on a wall in the last step: what a load cell under it would read.
+    ///
+    /// # Errors
+    /// [`DemError::Index`].
+    pub fn wall_load_n(&self, wall: usize) -> Result<[f64; 3], DemError> {
+        self.walls.load(wall)
+    }
+
     /// The step in s.
     pub fn step_s(&self) -> f64 {
         self.step

@@ -186,6 +186,8 @@ pub(crate) struct Walls {
     frames: Vec<Frame>,
     factors: Vec<Factors>,
     present: Vec<bool>,
+    /// Force of the grains on each wall in the last step, N.
+    loads: Vec<V3>,
     near: Vec<Near>,
     before: Vec<Near>,
 }
@@ -197,6 +199,7 @@ impl Walls {
             frames: vec![Frame::default(); shapes.len()],
             factors,
             present: vec![true; shapes.len()],
+            loads: vec![[0.0; 3]; shapes.len()],
             near: Vec::with_capacity(2 * grains + 16),
             before: Vec::with_capacity(2 * grains + 16),
         }
@@ -210,6 +213,12 @@ impl Walls {
         *present = false;
         self.near.retain(|n| n.wall as usize != wall);
         Ok(())
+    }
+
+    /// Force in N of the grains on a wall.
+    pub(crate) fn load(&self, wall: usize) -> Result<V3, DemError> {
+        let count = self.loads.len();
+        self.loads.get(wall).copied().ok_or(DemError::Index { name: "wall", received: wall, count })
     }
 
     /// Lets a wall move from now on.
@@ -263,6 +272,7 @@ impl Walls {
 
     /// Adds the walls' forces to the grains.
     pub(crate) fn react(&mut self, grains: &mut Grains, step: f64) {
+        self.loads.fill([0.0; 3]);
         for near in &mut self.near {
             let g = near.grain as usize;
             let [x, y, z, radius] = grains.place[g];
@@ -287,6 +297,8 @@ impl Walls {
                 rotation: sub(motion.spin, spin),
             };
             let r = react(factors, &near.pair, &touch, &mut near.history, step);
+            let on_wall = &mut self.loads[near.wall as usize];
+            *on_wall = sub(*on_wall, r.force);
             let load = &mut grains.load[g];
             load.force = along(load.force, 1.0, r.force);
             load.torque = sub(along(load.torque, -distance, r.turn), scale(r.couple, -1.0));
