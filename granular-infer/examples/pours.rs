@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p granular-infer --example pours -- grains 2000 SHARD OF FILE    prior over the grains, from 12 cm
-//! cargo run --release -p granular-infer --example pours -- heights 300 SHARD OF FILE     couscous from 1 to 13 cm
+//! cargo run --release -p granular-infer --example pours -- heights 200 SHARD OF FILE     couscous from 1 to 13 cm
 //! ```
 //! Run again with the same arguments it goes on where it was stopped. SHARD counts from 0.
 #![allow(clippy::print_stdout, reason = "says how far it is")]
@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 use bayes_sim::campaign::{Campaign, Shard, Simulator};
 use bayes_sim::prior::Prior;
-use granular_infer::scene::{FromHeight, Grain, OfGrain, Scene, prior};
+use granular_infer::scene::{COUSCOUS, FromHeight, OfGrain, Scene, prior};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -23,10 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = Scene::default();
     let (simulator, prior, seed): (Box<dyn Simulator>, Prior, u64) = match kind.as_str() {
         "grains" => (Box::new(FromHeight { scene, height_m: 0.12 }), prior()?, 1),
-        "heights" => {
-            let grain = Grain { sliding_friction: 0.6687, rolling_friction: 0.05, restitution: 0.5 };
-            (Box::new(OfGrain { scene, grain }), Prior::uniform(&[[0.01, 0.13]])?, 2)
-        }
+        "heights" => (Box::new(OfGrain { scene, grain: COUSCOUS }), Prior::uniform(&[[0.01, 0.13]])?, 2),
         other => return Err(format!("{other}: expected grains or heights").into()),
     };
     let campaign = Campaign { prior, x_dim: simulator.x_dim(), count: count.parse()?, seed };

@@ -11,6 +11,7 @@ pub mod posterior;
 pub mod scene;
 pub mod seeing;
 pub mod shard;
+pub mod shipped;
 pub mod statistics;
 pub mod summary;
 pub mod tasks;

@@ -8,9 +8,13 @@ use bayes_sim::points::Points;
 use bayes_sim::posterior::Posterior;
 use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::dem::{DemError, Mesh, Shape, Wall};
 use crate::scene::{Grain, Scene};
+use crate::shipped::{self, ShippedError};
 use crate::view::View;
 
 /// A ring, as the thesis measures one: the 5th and the 50th percentile of the distances at which grains are seen.
@@ -39,8 +43,11 @@ impl Ring {
     }
 }
 
+/// The shipped heights, as `granular-infer/examples/study.rs` writes them.
+const SHIPPED: &[u8] = include_bytes!("../heights.json.gz");
+
 /// Which height makes which ring, learned from pours of one kind of grain.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RingHeights {
     density: Mdrff,
 }
@@ -50,7 +57,6 @@ pub struct RingHeights {
 /// # Errors
 /// [`Error::Length`] for a campaign of another number of grains; [`Error::TooFew`] below 50 pictures.
 pub fn rings(results: &Results, scene: &Scene, view: &View, seed: u64) -> Result<Simulations, Error> {
-    use rand::SeedableRng;
     let (mut theta, mut x) = (Points::new(1), Points::new(2));
     for record in results.records.values() {
         let Ok(centres) = &record.outcome else { continue };
@@ -59,7 +65,7 @@ pub fn rings(results: &Results, scene: &Scene, view: &View, seed: u64) -> Result
             expected: 3 * scene.rig.count,
             got: centres.len(),
         })?;
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(record.index as u64);
         let points = view.points(&grains, &scene.rig, &mut rng).unwrap_or_default();
         if let Some(ring) = Ring::of(&points, [0.0; 2], f64::INFINITY) {
@@ -80,6 +86,22 @@ impl RingHeights {
         Ok(Self { density: Mdrff::train(prior, rings, &settings, seed)? })
     }
 
+    /// The heights that are shipped: pours of [`crate::scene::COUSCOUS`] from 1 to 13 cm, in the scene and the view of chapter 3.
+    ///
+    /// # Errors
+    /// [`ShippedError`], if the crate's file is damaged.
+    pub fn shipped() -> Result<Self, ShippedError> {
+        shipped::unpack(SHIPPED)
+    }
+
+    /// Compressed JSON, as it is shipped.
+    ///
+    /// # Errors
+    /// [`ShippedError`].
+    pub fn to_bytes(&self) -> Result<Vec<u8>, ShippedError> {
+        shipped::pack(self)
+    }
+
     /// The posterior over the height in m for a wanted ring.
     ///
     /// # Errors
@@ -93,8 +115,7 @@ impl RingHeights {
     /// # Errors
     /// As [`RingHeights::infer`].
     pub fn height_m(&self, wanted: Ring) -> Result<(f64, f64), Error> {
-        use rand::SeedableRng;
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0);
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
         let draws = self.infer(wanted)?.sample(2000, &mut rng).theta.column(0);
         let mean = draws.iter().sum::<f64>() / draws.len() as f64;
         let variance = draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / draws.len() as f64;
