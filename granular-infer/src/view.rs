@@ -90,7 +90,11 @@ impl View {
         Ok(summary(&self.chosen(map, coloured, diameter_m)?)?.values)
     }
 
-    fn chosen(
+    /// The points (m) of a picture that show grains; `coloured` as in [`View::statistics`].
+    ///
+    /// # Errors
+    /// [`SummaryError::Mask`], [`SummaryError::Block`].
+    pub fn chosen(
         &self,
         map: &HeightMap,
         coloured: &[bool],
