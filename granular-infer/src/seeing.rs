@@ -237,7 +237,8 @@ fn commonest(camera: &Camera, depths: &[f64]) -> f64 {
     }
     let most = bins.iter().enumerate().max_by_key(|(_, n)| **n).map_or(0, |(i, _)| i);
     let middle = (most as f64 + 0.5) * bin;
-    median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.5 * bin).collect())
+    // A little wider than the bin: a ground without noise may lie on its very edge.
+    median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.6 * bin).collect())
 }
 
 /// The median, NaN of nothing.
