@@ -112,7 +112,7 @@ fn one_picture(
 
 /// Section 3.6: errors over heaps of unseen grains, and the statistics of heaps poured again.
 fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error>> {
-    let heaps: u64 = if examples::small() { 4 } else { 50 };
+    let heaps: u64 = if examples::small() { 3 } else { 50 };
     let (scene, view, prior) = (Scene::default(), View::default(), prior()?);
     let one = |i: u64| -> Option<[f64; 4]> {
         let truth = Grain::from_theta(&prior.sample(&mut dice(9000 + i)))?;
@@ -193,7 +193,7 @@ fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error>
 
 /// Spilled grains, foretold from the posterior and poured with the hidden grain.
 fn bowl(hidden: Grain, inferred: &Inferred) -> Result<(), Box<dyn Error>> {
-    let (count, pours) = if examples::small() { (60, 2) } else { (250, 8) };
+    let (count, pours) = if examples::small() { (40, 2) } else { (250, 8) };
     let scene = Scene { rig: Rig { count, ..Scene::default().rig }, ..Scene::default() };
     let bowl = Bowl::round(0.03, 0.05, 0.025)?;
     let draws = inferred.posterior.sample(pours, &mut dice(3)).theta;
