@@ -98,7 +98,7 @@ comm_modify vel yes
 read_data grains.data
 neighbor 0.001 bin
 neigh_modify delay 0 binsize 0.005
-variable contact string "hertz/material 5e6 0.5 0.25 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 0.5 0.2 damping tsuji"
+variable contact string "hertz/material 5e6 0.5 0.25 tangential mindlin NULL 1.0 0.5 rolling sds 100 0.04 0.2 damping tsuji"
 pair_style granular
 pair_coeff * * ${{contact}}
 timestep {step}
