@@ -110,6 +110,8 @@ fix tube all wall/gran/region granular ${{contact}} region tube
 fix ground all wall/gran granular ${{contact}} zplane 0.0 NULL
 fix move all nve/sphere
 thermo 10000
+# A grain that rolls out of the box is no error.
+thermo_modify lost ignore
 run {round(DURATION / step)}
 write_dump all custom end.txt id x y z
 """
