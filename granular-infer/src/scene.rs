@@ -42,7 +42,7 @@ impl Grain {
     }
 }
 
-/// The prior under which a pour from 12 cm makes what couscous makes, a heap or a ring with half of its grains within 2 to 10 cm:
+/// The prior under which nine in ten pours from 12 cm have half of their grains within 10 cm, as couscous has, in a heap or a ring:
 /// `mu_s` flat in 0.1 to 1, `mu_r` flat in its logarithm in 1e-3 to 0.5, e flat in 0.05 to 0.8.
 ///
 /// # Errors
