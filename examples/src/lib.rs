@@ -1,6 +1,7 @@
 //! What the examples share: worlds put before the engine, many at a time, with a progress bar.
 
 pub mod dough;
+pub mod grains;
 
 use indicatif::{ParallelProgressIterator, ProgressStyle};
 use missing_physics::data::{Recording, Run};

@@ -145,9 +145,14 @@ pub struct Grains {
 }
 
 impl Rig {
+    /// Volume of a mean grain, m3.
+    pub fn grain_volume_m3(&self) -> f64 {
+        PI / 6.0 * self.diameter_m.powi(3)
+    }
+
     /// Density of the grains, kg/m3.
     pub fn density_kg_m3(&self) -> f64 {
-        self.mass_kg / (PI / 6.0 * self.diameter_m.powi(3))
+        self.mass_kg / self.grain_volume_m3()
     }
 
     /// Pours once; the same seed gives the same grains.

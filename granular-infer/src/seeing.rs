@@ -105,12 +105,8 @@ impl HeightMap {
         if counts.len() != width * height || counts.is_empty() {
             return Err(SeeError::Size { received: counts.len(), expected: width * height });
         }
-        let percent = |n: usize| 100.0 * n as f64 / counts.len() as f64;
-        let missing = percent(counts.iter().filter(|c| **c == 0).count());
-        if missing > MOST_MISSING {
-            return Err(SeeError::Missing { missing, most: MOST_MISSING });
-        }
-        let saturated = percent(counts.iter().filter(|c| **c == u16::MAX).count());
+        let limit = counts.iter().filter(|c| **c == u16::MAX).count();
+        let saturated = 100.0 * limit as f64 / counts.len() as f64;
         if saturated > MOST_SATURATED {
             return Err(SeeError::Saturated { saturated, limit: u16::MAX });
         }
@@ -118,14 +114,30 @@ impl HeightMap {
             .iter()
             .map(|&c| if c == 0 { f64::NAN } else { f64::from(c) * camera.depth_unit_m })
             .collect();
+        Self::from_depths(camera, &depths, volume_m3)
+    }
+
+    /// As [`HeightMap::new`], from depths in m (NaN: missing).
+    ///
+    /// # Errors
+    /// [`SeeError`], but for saturation.
+    pub fn from_depths(camera: &Camera, depths: &[f64], volume_m3: f64) -> Result<Self, SeeError> {
+        let [width, height] = camera.size_px;
+        if depths.len() != width * height || depths.is_empty() {
+            return Err(SeeError::Size { received: depths.len(), expected: width * height });
+        }
+        let missing = 100.0 * depths.iter().filter(|d| !d.is_finite()).count() as f64 / depths.len() as f64;
+        if missing > MOST_MISSING {
+            return Err(SeeError::Missing { missing, most: MOST_MISSING });
+        }
         let middle = median(depths.iter().copied().filter(|d| d.is_finite()).collect());
         if !(middle < UNIT_FACTOR * camera.height_m && middle > camera.height_m / UNIT_FACTOR) {
             let (height_m, unit_m) = (camera.height_m, camera.depth_unit_m);
             return Err(SeeError::Unit { depth_m: middle, height_m, unit_m });
         }
-        let plane = ground(camera, &depths)?;
-        let mut places_m = Vec::with_capacity(counts.len());
-        let mut heights_m = Vec::with_capacity(counts.len());
+        let plane = ground(camera, depths)?;
+        let mut places_m = Vec::with_capacity(depths.len());
+        let mut heights_m = Vec::with_capacity(depths.len());
         for v in 0..height {
             for u in 0..width {
                 let z = plane.depth(camera, u, v) - depths[v * width + u];
@@ -225,7 +237,8 @@ fn commonest(camera: &Camera, depths: &[f64]) -> f64 {
     }
     let most = bins.iter().enumerate().max_by_key(|(_, n)| **n).map_or(0, |(i, _)| i);
     let middle = (most as f64 + 0.5) * bin;
-    median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.5 * bin).collect())
+    // A little wider than the bin: a ground without noise may lie on its very edge.
+    median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.6 * bin).collect())
 }
 
 /// The median, NaN of nothing.

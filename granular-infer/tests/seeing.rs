@@ -165,3 +165,13 @@ fn pictures_without_sense_are_refused() {
     let wild: Vec<u16> = (0..n).map(|i| 2800 + ((i * 7919) % 1400) as u16).collect();
     assert!(matches!(read(&wild), SeeError::NoGround { .. }), "{:?}", read(&wild));
 }
+
+/// A ground at any whole number of counts is found, without any noise about it.
+#[test]
+fn a_picture_without_noise_has_its_ground() {
+    for height_m in [0.3, 0.35, 0.4, 0.4001, 0.5] {
+        let camera = Camera { height_m, ..CAMERA };
+        let map = seen(&camera, &heap(0.0), &Flaws::default());
+        assert!(map.ground_m.abs() < 1e-4 && map.noise_m < 1e-4, "{height_m}: {}", map.ground_m);
+    }
+}

@@ -27,6 +27,8 @@ pub(crate) struct Grains {
     pub(crate) load: Vec<Load>,
     /// kg.
     pub(crate) mass: Vec<f64>,
+    /// The body that each is part of; bodies do not touch themselves.
+    pub(crate) body: Vec<u32>,
     /// Half a step over the mass and over the moment of inertia.
     pub(crate) kick: Vec<[f64; 2]>,
 }
@@ -42,6 +44,7 @@ impl Grains {
             motion: vec![Motion::default(); radii.len()],
             load: vec![Load::default(); radii.len()],
             mass,
+            body: (0..radii.len() as u32).collect(),
             kick,
         }
     }

@@ -174,7 +174,8 @@ impl Neighbours {
                             // Distance first: it says no most of the time, which is guessed well.
                             if dot(d, d) < cut * cut {
                                 let other = self.margin[j as usize];
-                                if other < margin || (other == margin && j > i) {
+                                let apart = grains.body[i as usize] != grains.body[j as usize];
+                                if apart && (other < margin || (other == margin && j > i)) {
                                     self.found.push([i.min(j), i.max(j)]);
                                 }
                             }

@@ -2,8 +2,10 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::{
+    clump::{Clump, Placed},
     error::{DemError, finite, positive, within},
     fill::{fill, radii},
     funnel::Funnel,
@@ -73,6 +75,11 @@ impl Poured {
 }
 
 impl Pour {
+    /// Walls of the funnel, which move together: cone and tube.
+    pub const FUNNEL: [usize; 2] = [1, 2];
+    /// The wall that closes the outlet.
+    pub const GATE: usize = 3;
+
     /// Refuses numbers outside their ranges.
     pub fn check(&self) -> Result<(), DemError> {
         if self.count == 0 || self.count > MAX_GRAINS {
@@ -101,41 +108,96 @@ impl Pour {
         ]
     }
 
-    /// The filled funnel, its outlet (wall 3) still closed.
+    /// The filled funnel, its outlet ([`Pour::GATE`]) still closed.
     pub fn filled(&self, seed: u64) -> Result<Simulation, DemError> {
+        self.filled_among(&[], &[], &[], seed)
+    }
+
+    /// The filled funnel among further walls (their indices begin after the gate's), over grains that lie already: centres and
+    /// radii in m. Those that are poured come after them.
+    ///
+    /// # Errors
+    /// As [`Pour::filled`]; [`DemError::Length`] for lists of two lengths.
+    pub fn filled_among(
+        &self,
+        walls: &[Wall],
+        lying_m: &[[f64; 3]],
+        lying_radii_m: &[f64],
+        seed: u64,
+    ) -> Result<Simulation, DemError> {
         self.check()?;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let radii = radii(self.count, 0.5 * self.diameter_m, self.size_variation, &mut rng);
         let places = fill(&self.funnel, &radii, &mut rng)?;
-        let top = places.iter().fold(0.0, |a: f64, p| a.max(p[2]));
+        let (places, radii) = ([lying_m, &places].concat(), [lying_radii_m, &radii].concat());
         let smallest = radii.iter().fold(f64::INFINITY, |a, &r| a.min(r));
+        Simulation::new(&self.setup(walls, &places, smallest)?, &radii, &places)
+    }
+
+    /// The funnel filled with clumps of one shape, turned at random, over clumps that lie already; the diameter and its
+    /// variation do not count.
+    ///
+    /// # Errors
+    /// As [`Pour::filled`].
+    pub fn filled_with(&self, clump: &Clump, lying: &[Placed], seed: u64) -> Result<Simulation, DemError> {
+        self.check()?;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let places = fill(&self.funnel, &vec![clump.reach_m(); self.count], &mut rng)?;
+        let smallest = clump.radii().iter().fold(f64::INFINITY, |a, &r| a.min(r));
+        let mut placed = lying.to_vec();
+        for &position_m in &places {
+            // Four Gaussian numbers point anywhere on the sphere of rotations.
+            let q: [f64; 4] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+            let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let rotation_xyzw = q.map(|c| c / length);
+            placed.push(Placed { clump: clump.clone(), position_m, rotation_xyzw });
+        }
+        Simulation::of_clumps(&self.setup(&[], &places, smallest)?, &placed)
+    }
+
+    fn setup(&self, walls: &[Wall], places: &[[f64; 3]], smallest: f64) -> Result<Setup, DemError> {
+        let top = places.iter().fold(0.0, |a: f64, p| a.max(p[2]));
         let gravity = dot(self.gravity_m_s2, self.gravity_m_s2).sqrt();
         // No impact is faster than a fall from the top of the fill.
         let fastest_m_s = (2.0 * gravity * top).sqrt().max(1e-3);
         let stable = stable_step_s(&self.law, self.density_kg_m3, smallest, fastest_m_s)?;
-        let setup = Setup {
+        Ok(Setup {
             law: self.law,
             density_kg_m3: self.density_kg_m3,
             grains: self.grains,
-            walls: self.walls(),
+            walls: [&self.walls(), walls].concat(),
             gravity_m_s2: self.gravity_m_s2,
             drag_per_m: self.drag_per_m,
             step_s: self.step_s.unwrap_or(stable),
             fastest_m_s,
-        };
-        Simulation::new(&setup, &radii, &places)
+        })
     }
 
     /// Pours: the same seed gives the same bits.
     pub fn run(&self, seed: u64) -> Result<Poured, DemError> {
-        let mut simulation = self.filled(seed)?;
+        self.pour_out(self.filled(seed)?)
+    }
+
+    /// Pours clumps of one shape; what lies on the ground is told sphere by sphere.
+    ///
+    /// # Errors
+    /// As [`Pour::run`].
+    pub fn run_with(&self, clump: &Clump, seed: u64) -> Result<Poured, DemError> {
+        self.pour_out(self.filled_with(clump, &[], seed)?)
+    }
+
+    /// Opens the outlet of a filled funnel and waits for rest.
+    ///
+    /// # Errors
+    /// As [`Pour::run`].
+    pub fn pour_out(&self, mut simulation: Simulation) -> Result<Poured, DemError> {
         if self.closed_s > 0.0 {
             let steps = (self.closed_s / simulation.step_s()).round() as u64;
             simulation.run(steps)?;
         }
-        simulation.remove_wall(3)?;
+        simulation.remove_wall(Self::GATE)?;
         let opened_s = simulation.time_s();
-        let mass = simulation.masses_kg().iter().sum::<f64>() / self.count as f64;
+        let mass = simulation.masses_kg().iter().sum::<f64>() / simulation.masses_kg().len() as f64;
         let gravity = dot(self.gravity_m_s2, self.gravity_m_s2).sqrt();
         let rest = self.rest.unwrap_or_else(|| Rest::usual(mass, self.diameter_m, gravity));
         let at_rest = simulation.run_until_rest(&rest, self.most_s)?;

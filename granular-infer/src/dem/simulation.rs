@@ -1,9 +1,11 @@
 //! The simulation: a set-up, its state, the step.
 
 use super::{
+    clump::{Bodies, Placed},
     energy::{Energy, energy, kinetic},
     error::{DemError, finite, positive, within},
     forces::Forces,
+    frame::WallMotion,
     grains::{Grains, Load},
     material::{Coefficients, Factors, Law, stable_step_s},
     neighbours::{Counters, Neighbours},
@@ -60,9 +62,11 @@ pub struct Simulation {
     gravity: V3,
     drag: f64,
     step: f64,
+    fastest: f64,
     steps: u64,
     factors: Factors,
     grains: Grains,
+    bodies: Option<Bodies>,
     neighbours: Neighbours,
     forces: Forces,
     walls: Walls,
@@ -82,6 +86,25 @@ impl Simulation {
         }
         radii_m.iter().try_for_each(|&r| positive("radius_m", r))?;
         positions_m.iter().try_for_each(|&p| finite("position_m", p))?;
+        let grains = Grains::new(radii_m, positions_m, setup.density_kg_m3, setup.step_s);
+        Self::of(setup, grains, None)
+    }
+
+    /// Clumps at rest where they are placed. What the simulation tells of grains it then tells of the clumps' spheres, one
+    /// clump after another.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn of_clumps(setup: &Setup, placed: &[Placed]) -> Result<Self, DemError> {
+        let spheres: usize = placed.iter().map(|p| p.clump.radii().len()).sum();
+        if spheres == 0 || spheres > MAX_GRAINS {
+            return Err(DemError::Count { received: spheres, most: MAX_GRAINS });
+        }
+        let (bodies, grains) = Bodies::new(placed, setup.density_kg_m3)?;
+        Self::of(setup, grains, Some(bodies))
+    }
+
+    fn of(setup: &Setup, grains: Grains, bodies: Option<Bodies>) -> Result<Self, DemError> {
         finite("gravity_m_s2", setup.gravity_m_s2)?;
         within("drag_per_m", setup.drag_per_m, 0.0, 1e6)?;
         setup.grains.check()?;
@@ -90,33 +113,38 @@ impl Simulation {
             wall.coefficients.check()?;
         }
         positive("step_s", setup.step_s)?;
-        let smallest = radii_m.iter().fold(f64::INFINITY, |a, &r| a.min(r));
+        let smallest = grains.place.iter().fold(f64::INFINITY, |a, p| a.min(p[3]));
         let stable_s = stable_step_s(&setup.law, setup.density_kg_m3, smallest, setup.fastest_m_s)?;
         if setup.step_s > stable_s {
             return Err(DemError::Step { received_s: setup.step_s, stable_s });
         }
-        let grains = Grains::new(radii_m, positions_m, setup.density_kg_m3, setup.step_s);
-        let shapes: Vec<Shape> = setup.walls.iter().map(|w| w.shape).collect();
+        let shapes: Vec<Shape> = setup.walls.iter().map(|w| w.shape.clone()).collect();
         let factors = setup.walls.iter().map(|w| setup.law.factors(&w.coefficients)).collect();
         Ok(Self {
             gravity: setup.gravity_m_s2,
             drag: setup.drag_per_m,
             step: setup.step_s,
+            fastest: setup.fastest_m_s,
             steps: 0,
             factors: setup.law.factors(&setup.grains),
             neighbours: Neighbours::new(&grains),
             forces: Forces::default(),
-            walls: Walls::new(&shapes, factors, n),
+            walls: Walls::new(&shapes, factors, grains.len()),
             grains,
+            bodies,
             counters: Counters::default(),
             fresh: true,
         })
     }
 
-    /// Sets velocity in m/s and angular velocity in rad/s of a grain.
+    /// Sets velocity in m/s and angular velocity in rad/s of a grain or a clump.
     pub fn set_motion(&mut self, grain: usize, velocity_m_s: V3, spin_rad_s: V3) -> Result<(), DemError> {
         finite("velocity_m_s", velocity_m_s)?;
         finite("spin_rad_s", spin_rad_s)?;
+        if let Some(bodies) = &mut self.bodies {
+            self.fresh = true;
+            return bodies.set_motion(grain, velocity_m_s, spin_rad_s, &mut self.grains);
+        }
         let count = self.grains.len();
         let motion = self.grains.motion.get_mut(grain).ok_or(DemError::Index {
             name: "grain",
@@ -133,6 +161,20 @@ impl Simulation {
         self.walls.remove(wall)
     }
 
+    /// Lets a wall move from now on, as a funnel along a path or a bowl about a pivot; its index is that in [`Setup::walls`].
+    ///
+    /// # Errors
+    /// [`DemError::Index`]; [`DemError::OutOfRange`] for what is not finite, and for a wall faster than [`Setup::fastest_m_s`].
+    pub fn move_wall(&mut self, wall: usize, motion: WallMotion) -> Result<(), DemError> {
+        finite("velocity_m_s", motion.velocity_m_s)?;
+        finite("spin_rad_s", motion.spin_rad_s)?;
+        finite("about_m", motion.about_m)?;
+        let v = motion.velocity_m_s;
+        within("speed of a wall in m/s", dot(v, v).sqrt(), 0.0, self.fastest)?;
+        self.fresh = true;
+        self.walls.set_motion(wall, motion)
+    }
+
     /// One step of velocity Verlet; dashpots act on the velocities at half the step.
     pub fn step(&mut self) {
         if self.fresh {
@@ -140,6 +182,32 @@ impl Simulation {
             self.react();
             self.fresh = false;
         }
+        let mut left = self.walls.advance(self.step);
+        if let Some(bodies) = &mut self.bodies {
+            bodies.advance(&mut self.grains, self.gravity, self.drag, self.step);
+            left |= self.grains.place.iter().enumerate().any(|(i, p)| self.neighbours.left(i, p));
+        } else {
+            left |= self.drift();
+        }
+        if left {
+            self.rebuild();
+        }
+        self.react();
+        if let Some(bodies) = &mut self.bodies {
+            bodies.finish(&mut self.grains, self.gravity, self.drag, self.step);
+        } else {
+            let grains = &mut self.grains;
+            for ((motion, load), kick) in grains.motion.iter_mut().zip(&grains.load).zip(&grains.kick) {
+                motion.velocity = along(motion.velocity, kick[0], load.force);
+                motion.spin = along(motion.spin, kick[1], load.torque);
+            }
+        }
+        self.steps += 1;
+        self.counters.steps += 1;
+    }
+
+    /// Half a kick and the drift of grains that are spheres; tells whether one has left its margin.
+    fn drift(&mut self) -> bool {
         let mut left = false;
         let grains = &mut self.grains;
         for (i, (((place, motion), load), kick)) in
@@ -152,18 +220,7 @@ impl Simulation {
             }
             left |= self.neighbours.left(i, place);
         }
-        if left {
-            self.rebuild();
-        }
-        self.react();
-        for ((motion, load), kick) in
-            self.grains.motion.iter_mut().zip(&self.grains.load).zip(&self.grains.kick)
-        {
-            motion.velocity = along(motion.velocity, kick[0], load.force);
-            motion.spin = along(motion.spin, kick[1], load.torque);
-        }
-        self.steps += 1;
-        self.counters.steps += 1;
+        left
     }
 
     /// Takes a number of steps; motion that is no longer finite is an error.
@@ -185,7 +242,7 @@ impl Simulation {
         while self.steps < end {
             let count = LOOK_EVERY.min(end - self.steps);
             self.run(count)?;
-            let quiet = self.finite_energy()? <= rest.kinetic_j * self.grains.len() as f64;
+            let quiet = self.finite_energy()? <= rest.kinetic_j * self.bodies_or_grains() as f64;
             still = if quiet { still + count } else { 0 };
             if still >= hold {
                 return Ok(true);
@@ -195,8 +252,12 @@ impl Simulation {
     }
 
     fn finite_energy(&self) -> Result<f64, DemError> {
-        let kinetic = kinetic(&self.grains);
+        let kinetic = self.bodies.as_ref().map_or_else(|| kinetic(&self.grains), Bodies::kinetic);
         if kinetic.is_finite() { Ok(kinetic) } else { Err(DemError::Diverged { time_s: self.time_s() }) }
+    }
+
+    fn bodies_or_grains(&self) -> usize {
+        self.bodies.as_ref().map_or(self.grains.len(), Bodies::len)
     }
 
     fn rebuild(&mut self) {
@@ -207,6 +268,20 @@ impl Simulation {
 
     /// All forces at the present places.
     fn react(&mut self) {
+        if self.bodies.is_some() {
+            // Gravity and drag act on clumps, not on their spheres.
+            self.grains.load.fill(Load::default());
+        } else {
+            self.fields();
+        }
+        self.counters.contacts +=
+            self.forces.react(&mut self.neighbours, &mut self.grains, &self.factors, self.step);
+        self.counters.pairs += self.neighbours.len() as u64;
+        self.walls.react(&mut self.grains, self.step);
+    }
+
+    /// Gravity and drag.
+    fn fields(&mut self) {
         for ((load, mass), motion) in
             self.grains.load.iter_mut().zip(&self.grains.mass).zip(&self.grains.motion)
         {
@@ -217,10 +292,14 @@ impl Simulation {
             }
             *load = Load { force: scale(acceleration, *mass), torque: [0.0; 3] };
         }
-        self.counters.contacts +=
-            self.forces.react(&mut self.neighbours, &mut self.grains, &self.factors, self.step);
-        self.counters.pairs += self.neighbours.len() as u64;
-        self.walls.react(&mut self.grains, self.step);
+    }
+
+    /// The force in N of all grains on a wall in the last step: what a load cell under it would read.
+    ///
+    /// # Errors
+    /// [`DemError::Index`].
+    pub fn wall_load_n(&self, wall: usize) -> Result<[f64; 3], DemError> {
+        self.walls.load(wall)
     }
 
     /// The step in s.
@@ -243,7 +322,7 @@ impl Simulation {
         self.grains.place.iter().map(|p| p[3])
     }
 
-    /// Masses in kg.
+    /// Masses in kg; of a clump's spheres, the clump's.
     pub fn masses_kg(&self) -> &[f64] {
         &self.grains.mass
     }
@@ -260,7 +339,18 @@ impl Simulation {
 
     /// Energies at the present places, springs as of the last step.
     pub fn energy(&self) -> Energy {
-        energy(&self.grains, self.gravity, &self.factors, &self.neighbours, &self.walls)
+        let spheres = energy(&self.grains, self.gravity, &self.factors, &self.neighbours, &self.walls);
+        self.bodies.as_ref().map_or(spheres, |b| b.energy(self.gravity, spheres))
+    }
+
+    /// Centre of mass (m) and rotation (unit quaternion x, y, z, w from principal axes to the world) of each clump.
+    pub fn clump_poses(&self) -> impl Iterator<Item = ([f64; 3], [f64; 4])> + '_ {
+        self.bodies.iter().flat_map(Bodies::poses)
+    }
+
+    /// Velocity (m/s) and angular velocity (rad/s) of each clump.
+    pub fn clump_motions(&self) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + '_ {
+        self.bodies.iter().flat_map(Bodies::motions)
     }
 
     /// What has been done so far.

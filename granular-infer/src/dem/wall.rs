@@ -1,15 +1,17 @@
-//! Walls: planes, cone frustums, tubes; the contacts of grains with them.
+//! Walls: planes, cone frustums, tubes, meshes, at rest or moving; the contacts of grains with them.
 
 use super::{
     contact::{History, Pair, Touch, react, sizes},
     error::{DemError, finite, positive, within},
+    frame::{Frame, WallMotion},
     grains::Grains,
     material::{Coefficients, Factors},
+    mesh::Mesh,
     vector::{V3, along, dot, scale, sub},
 };
 
-/// The surface of a wall that does not move.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The surface of a wall, as it stands at the beginning.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// An infinite plane; grains are on the side that the normal points to.
     Plane {
@@ -40,10 +42,13 @@ pub enum Shape {
         /// Height of the lower rim, m.
         bottom_m: f64,
     },
+    /// A thin triangle mesh, both of whose sides hold grains. A grain touches it at its nearest point: in a corner that is
+    /// narrower than the grain it is held by one face at a time.
+    Mesh(Mesh),
 }
 
 /// A wall and what grains do on it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Wall {
     /// The surface.
     pub shape: Shape,
@@ -70,12 +75,13 @@ impl Shape {
                 finite("axis_m and bottom_m", [axis_m[0], axis_m[1], bottom_m])?;
                 positive("radius_m", radius_m)
             }
+            Self::Mesh(_) => Ok(()),
         }
     }
 }
 
 /// A surface made ready for looking up distances.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 enum Surface {
     Plane {
         offset: f64,
@@ -89,11 +95,13 @@ enum Surface {
         length: f64,
         rim: bool,
     },
+    Mesh(Mesh),
 }
 
 impl Surface {
     fn of(shape: &Shape) -> Self {
         match *shape {
+            Shape::Mesh(ref mesh) => Self::Mesh(mesh.clone()),
             Shape::Plane { point_m, normal } => {
                 let normal = scale(normal, 1.0 / dot(normal, normal).sqrt());
                 Self::Plane { offset: dot(point_m, normal), normal }
@@ -118,10 +126,12 @@ impl Surface {
         }
     }
 
-    /// Distance and the unit vector from the surface to the point; none where the surface ends before.
+    /// Distance and the unit vector from the surface to the point; none where the surface ends before, or a mesh is farther
+    /// than `most`.
     #[inline(always)]
-    fn nearest(&self, point: V3) -> Option<(f64, V3)> {
+    fn nearest(&self, point: V3, most: f64) -> Option<(f64, V3)> {
         match *self {
+            Self::Mesh(ref mesh) => mesh.nearest(point, most),
             Self::Plane { offset, normal } => Some((dot(point, normal) - offset, normal)),
             Self::Turned { axis, start, direction, length, rim } => {
                 let (x, y) = (point[0] - axis[0], point[1] - axis[1]);
@@ -143,9 +153,10 @@ impl Surface {
         }
     }
 
-    /// A distance that is never too long, whether or not the surface ends before.
-    fn at_least(&self, point: V3) -> f64 {
-        match *self {
+    /// Whether the surface may be nearer than `most`, whether or not it ends before.
+    fn near(&self, point: V3, most: f64) -> bool {
+        let at_least = match *self {
+            Self::Mesh(ref mesh) => return mesh.nearest(point, most).is_some(),
             Self::Plane { offset, normal } => dot(point, normal) - offset,
             Self::Turned { axis, start, direction, length, .. } => {
                 let (x, y) = (point[0] - axis[0], point[1] - axis[1]);
@@ -154,7 +165,8 @@ impl Surface {
                 let (u, w) = (u - along_line * direction[0], w - along_line * direction[1]);
                 (u * u + w * w).sqrt()
             }
-        }
+        };
+        at_least <= most
     }
 }
 
@@ -171,8 +183,11 @@ struct Near {
 #[derive(Debug, Clone)]
 pub(crate) struct Walls {
     surfaces: Vec<Surface>,
+    frames: Vec<Frame>,
     factors: Vec<Factors>,
     present: Vec<bool>,
+    /// Force of the grains on each wall in the last step, N.
+    loads: Vec<V3>,
     near: Vec<Near>,
     before: Vec<Near>,
 }
@@ -181,8 +196,10 @@ impl Walls {
     pub(crate) fn new(shapes: &[Shape], factors: Vec<Factors>, grains: usize) -> Self {
         Self {
             surfaces: shapes.iter().map(Surface::of).collect(),
+            frames: vec![Frame::default(); shapes.len()],
             factors,
             present: vec![true; shapes.len()],
+            loads: vec![[0.0; 3]; shapes.len()],
             near: Vec::with_capacity(2 * grains + 16),
             before: Vec::with_capacity(2 * grains + 16),
         }
@@ -198,8 +215,38 @@ impl Walls {
         Ok(())
     }
 
+    /// Force in N of the grains on a wall.
+    pub(crate) fn load(&self, wall: usize) -> Result<V3, DemError> {
+        let count = self.loads.len();
+        self.loads.get(wall).copied().ok_or(DemError::Index { name: "wall", received: wall, count })
+    }
+
+    /// Lets a wall move from now on.
+    pub(crate) fn set_motion(&mut self, wall: usize, motion: WallMotion) -> Result<(), DemError> {
+        let count = self.present.len();
+        let frame =
+            self.frames.get_mut(wall).ok_or(DemError::Index { name: "wall", received: wall, count })?;
+        frame.set(motion);
+        Ok(())
+    }
+
+    /// Moves the walls on by a step in s; tells whether one has gone farther than its list of grains allows.
+    pub(crate) fn advance(&mut self, step: f64) -> bool {
+        let mut left = false;
+        for frame in &mut self.frames {
+            if frame.moves() {
+                left |= frame.advance(step);
+            }
+        }
+        left
+    }
+
     /// Lists the grains that may touch a wall before one moves farther than its margin, in m.
     pub(crate) fn rebuild(&mut self, grains: &Grains, margin: &[f64]) {
+        let largest = grains.place.iter().fold(0.0, |a: f64, p| a.max(p[3]));
+        for frame in self.frames.iter_mut().filter(|f| f.moves()) {
+            frame.list(grains, largest);
+        }
         std::mem::swap(&mut self.near, &mut self.before);
         self.near.clear();
         let mut old = self.before.iter().peekable();
@@ -209,7 +256,8 @@ impl Walls {
             }
             for (g, (place, margin)) in grains.place.iter().zip(margin).enumerate() {
                 let [x, y, z, radius] = *place;
-                if surface.at_least([x, y, z]) > radius + margin {
+                let frame = &self.frames[w];
+                if !surface.near(frame.inside([x, y, z]), radius + margin + frame.allowed()) {
                     continue;
                 }
                 let key = (w as u32, g as u32);
@@ -224,27 +272,33 @@ impl Walls {
 
     /// Adds the walls' forces to the grains.
     pub(crate) fn react(&mut self, grains: &mut Grains, step: f64) {
+        self.loads.fill([0.0; 3]);
         for near in &mut self.near {
             let g = near.grain as usize;
             let [x, y, z, radius] = grains.place[g];
-            let (distance, normal) = match self.surfaces[near.wall as usize].nearest([x, y, z]) {
-                Some(found) if found.0 < radius => found,
+            let frame = &self.frames[near.wall as usize];
+            let found = self.surfaces[near.wall as usize].nearest(frame.inside([x, y, z]), radius);
+            let (distance, normal) = match found {
+                Some((distance, normal)) if distance < radius => (distance, frame.outside(normal)),
                 _ => {
                     near.history = History::default();
                     continue;
                 }
             };
             let motion = &grains.motion[g];
+            let (velocity, spin) = frame.motion_at(along([x, y, z], -distance, normal));
             let factors = &self.factors[near.wall as usize];
             let touch = Touch {
                 normal,
                 overlap: radius - distance,
                 sizes: sizes(factors.hertz, radius, radius - distance),
-                velocity: motion.velocity,
+                velocity: sub(motion.velocity, velocity),
                 surface: scale(motion.spin, distance),
-                rotation: motion.spin,
+                rotation: sub(motion.spin, spin),
             };
             let r = react(factors, &near.pair, &touch, &mut near.history, step);
+            let on_wall = &mut self.loads[near.wall as usize];
+            *on_wall = sub(*on_wall, r.force);
             let load = &mut grains.load[g];
             load.force = along(load.force, 1.0, r.force);
             load.torque = sub(along(load.torque, -distance, r.turn), scale(r.couple, -1.0));
@@ -256,7 +310,8 @@ impl Walls {
         for near in &self.near {
             let [x, y, z, radius] = grains.place[near.grain as usize];
             let wall = near.wall as usize;
-            if let Some((distance, _)) = self.surfaces[wall].nearest([x, y, z])
+            let inside = self.frames[wall].inside([x, y, z]);
+            if let Some((distance, _)) = self.surfaces[wall].nearest(inside, radius)
                 && distance < radius
             {
                 each(&self.factors[wall], &near.pair, &near.history, radius - distance);

@@ -1,0 +1,36 @@
+//! Pours chapter 3's campaign, or one of heights, through the runner of bayes-sim: resumable, in shards that merge.
+//!
+//! ```text
+//! cargo run --release -p granular-infer --example pours -- grains 2000 SHARD OF FILE    prior over the grains, from 12 cm
+//! cargo run --release -p granular-infer --example pours -- heights 200 SHARD OF FILE     couscous from 1 to 13 cm
+//! ```
+//! Run again with the same arguments it goes on where it was stopped. SHARD counts from 0.
+#![allow(clippy::print_stdout, reason = "says how far it is")]
+
+use std::error::Error;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use bayes_sim::campaign::{Campaign, Shard, Simulator};
+use bayes_sim::prior::Prior;
+use granular_infer::scene::{COUSCOUS, FromHeight, OfGrain, Scene, prior};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [kind, count, index, of, file] = arguments.as_slice() else {
+        return Err("expected grains|heights COUNT SHARD OF FILE".into());
+    };
+    let scene = Scene::default();
+    let (simulator, prior, seed): (Box<dyn Simulator>, Prior, u64) = match kind.as_str() {
+        "grains" => (Box::new(FromHeight { scene, height_m: 0.12 }), prior()?, 1),
+        "heights" => (Box::new(OfGrain { scene, grain: COUSCOUS }), Prior::uniform(&[[0.01, 0.13]])?, 2),
+        other => return Err(format!("{other}: expected grains or heights").into()),
+    };
+    let campaign = Campaign { prior, x_dim: simulator.x_dim(), count: count.parse()?, seed };
+    let shard = Shard { index: index.parse()?, count: of.parse()? };
+    let progress = |done: usize, all: usize| println!("{done} of {all}");
+    let results =
+        campaign.run(simulator.as_ref(), shard, Path::new(file), &progress, &AtomicBool::new(false))?;
+    println!("{} pours, {} of them failed", results.records.len(), results.failures().count());
+    Ok(())
+}

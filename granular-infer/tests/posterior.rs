@@ -1,0 +1,43 @@
+//! The shipped posterior on pours it has not seen, and what it refuses.
+#![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+
+use granular_infer::posterior::GrainPosterior;
+use granular_infer::scene::{Grain, Scene, prior};
+use granular_infer::tasks::{Ring, RingHeights};
+use granular_infer::view::View;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Restitution shows in a heap: estimates of soft and of hard grains lie apart, each nearer to its own.
+#[test]
+fn soft_grains_are_told_from_hard_ones() {
+    let (posterior, scene, view) = (GrainPosterior::shipped().unwrap(), Scene::default(), View::default());
+    let [soft, hard] = [0.15, 0.7].map(|restitution| {
+        let grain = Grain { sliding_friction: 0.6, rolling_friction: 0.05, restitution };
+        let heap = scene.grains(&grain, 0.12, 3).unwrap();
+        let seen = view.features(&heap, &scene.rig, &mut ChaCha8Rng::seed_from_u64(3)).unwrap();
+        let inferred = posterior.infer(&seen).unwrap();
+        assert!(!inferred.resemblance.is_doubtful());
+        assert!(prior().unwrap().contains(&inferred.estimate().theta()));
+        inferred.estimate().restitution
+    });
+    assert!(soft < 0.4 && hard > 0.5, "{soft} and {hard}");
+}
+
+#[test]
+fn what_no_pour_looks_like_is_doubted_or_refused() {
+    let posterior = GrainPosterior::shipped().unwrap();
+    assert!(posterior.infer(&[1.0; 16]).unwrap().resemblance.is_doubtful());
+    assert!(posterior.infer(&[f64::NAN; 16]).is_err());
+    assert!(GrainPosterior::from_bytes(b"nothing").is_err());
+    assert_eq!(GrainPosterior::from_bytes(&posterior.to_bytes().unwrap()).unwrap(), posterior);
+}
+
+/// Higher pours make wider rings.
+#[test]
+fn wider_rings_are_poured_from_higher_up() {
+    let heights = RingHeights::shipped().unwrap();
+    let of = |outer_m: f64| heights.height_m(Ring { inner_m: 0.3 * outer_m, outer_m }).unwrap().0;
+    assert!(of(0.026) < 0.05 && of(0.034) > of(0.026) + 0.01, "{} {}", of(0.026), of(0.034));
+    assert!(heights.height_m(Ring { inner_m: f64::NAN, outer_m: 0.03 }).is_err());
+}
