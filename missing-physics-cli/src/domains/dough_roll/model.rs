@@ -6,11 +6,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::{Dynamics, Roll};
 use dough_mbrl::filter::{Fresh, Step as Followed, follow};
+use dough_mbrl::repair::answered;
 use dough_mbrl::sensitivity::{PER_ROLL, white};
 use dough_mbrl::tie::Tie;
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 
 use super::read::{RunOfRolls, Step};
 use super::spec::{Effects, Places, build};
@@ -126,7 +127,8 @@ impl DoughModel {
             let [throw, depth] = step.roll.action;
             let response =
                 effects.response(step.step, step.t_s, self.band.force_n(throw, depth), throw, x[0]);
-            left * (x + response * self.dynamics.change(x, &step.roll.action))
+            let learned = x + self.dynamics.change(x, &step.roll.action);
+            left * Vector3::from(answered(&(*x).into(), &learned.into(), response))
         })
     }
 
