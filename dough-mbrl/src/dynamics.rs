@@ -1,7 +1,7 @@
 //! Dynamics of a dough, learned from rolls, with the uncertainty of what was learned.
 //!
-//! A polynomial of degree 2 with free coefficients, and a remainder of degrees 3 and 4 that is held small by a prior whose size the rolls
-//! themselves say. The coefficients are those that make the innovations of all doughs most likely.
+//! A polynomial of degree 2, and a remainder of degrees 3 and 4; the size of each degree's coefficients is said by the rolls themselves.
+//! The coefficients are those that make the innovations of all doughs most likely.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
@@ -74,8 +74,7 @@ pub(crate) struct Surface {
 impl Surface {
     /// Least squares on measured states, without a remainder: where learning begins.
     fn measured(rolls: &[&Roll]) -> Result<Self, LearnError> {
-        let rows: Vec<Vec<f64>> =
-            rolls.iter().map(|r| inputs(&Vector3::from(r.state), &r.action)).collect();
+        let rows: Vec<Vec<f64>> = rolls.iter().map(|r| inputs(&Vector3::from(r.state), &r.action)).collect();
         let features = Polynomial::standardised(&rows, REMAINDER);
         let free = features.up_to(DEGREE);
         let least = 2 * free;
@@ -101,8 +100,7 @@ impl Surface {
         if r.diagonal().iter().any(|d| !(d.abs() > 1e-10 * largest)) {
             return Err(Self::undetermined());
         }
-        let found =
-            r.solve_upper_triangular(&qr.q().tr_mul(&change)).ok_or_else(Self::undetermined)?;
+        let found = r.solve_upper_triangular(&qr.q().tr_mul(&change)).ok_or_else(Self::undetermined)?;
         let rest = change - polynomial * &found;
         let left = Vector3::from_fn(|k, _| (rest.column(k).norm_squared() / (n - free) as f64).max(1e-16));
         let mut coefficients = DMatrix::zeros(features.len(), 3);

@@ -74,11 +74,13 @@ const HELD: f64 = 6.0;
 
 /// Learns from doughs, beginning with a surface and what scatters measurements.
 pub(crate) fn learn(doughs: &[Vec<Roll>], surface: Surface, noise: Noise) -> Result<Learned, LearnError> {
-    let changes = doughs.iter().flatten().map(|r| (Vector3::from(r.next) - Vector3::from(r.state)).norm_squared());
+    let changes =
+        doughs.iter().flatten().map(|r| (Vector3::from(r.next) - Vector3::from(r.state)).norm_squared());
     let rolls = doughs.iter().map(Vec::len).sum::<usize>().max(1) as f64;
     let change = changes.sum::<f64>() / rolls;
     let remainder = PARTS.iter().map(|part| Vector3::repeat(part * part * change)).collect();
-    let own = if doughs.len() < DOUGHS { Vector3::zeros() } else { Vector3::repeat(OWN_PART.powi(2) * change) };
+    let own =
+        if doughs.len() < DOUGHS { Vector3::zeros() } else { Vector3::repeat(OWN_PART.powi(2) * change) };
     let courses = vec![[Vector3::zeros(); COURSES]; doughs.len()];
     let mut learning = Learning { doughs, surface, noise, own, remainder, courses, learned: 0.0, change };
     let mut precision = None;
@@ -106,9 +108,8 @@ impl Learning<'_> {
         let n = 3 * self.surface.terms_of_each();
         let mut sums = Sums { square: DMatrix::zeros(n, n), pull: DVector::zeros(n), own: Vec::new() };
         for (at, dough) in self.doughs.iter().enumerate() {
-            let steps = follow(dough, &fresh, &self.noise, 0.0, |i, x| {
-                x + self.surface.change(x, &dough[i].action)
-            });
+            let steps =
+                follow(dough, &fresh, &self.noise, 0.0, |i, x| x + self.surface.change(x, &dough[i].action));
             let terms = |i: usize| self.surface.terms(&steps[i].state, &dough[i].action);
             let all = sensitivity(&steps, terms, |_| 1.0, n / 3);
             let (off, shared, own) = (white(&steps), all.columns(0, n), all.columns(n, OWN));

@@ -123,7 +123,11 @@ mod tests {
         let repaired = Repaired::new(learned(0.4), response).unwrap();
         let (state, deep, shallow) = ([0.07, 0.04, 0.03], [0.08, 0.02], [0.08, 5e-3]);
         // 96 N/m: 2.2 N and 0.5 N.
-        approx::assert_relative_eq!(repaired.next(&state, &deep)[0], 0.07 * f64::sqrt(1.0 + 0.4 * 0.02 / 0.07), max_relative = 1e-5);
+        approx::assert_relative_eq!(
+            repaired.next(&state, &deep)[0],
+            0.07 * f64::sqrt(1.0 + 0.4 * 0.02 / 0.07),
+            max_relative = 1e-5
+        );
         assert_eq!(repaired.next(&state, &shallow), state);
         approx::assert_relative_eq!(
             repaired.predict(&state, &deep)[1].mean,
@@ -138,13 +142,28 @@ mod tests {
         let mut repaired = Repaired::new(learned(0.4), response).unwrap();
         let (state, action) = ([0.07, 0.04, 0.03], [0.08, 0.02]);
         let before = repaired.next(&state, &action);
-        for roll in rolls(0.2).into_iter().filter(|r| response.of(&r.action) > 0.0) {
-            repaired.add(&roll, 10.0).unwrap();
+        for roll in rolls(0.4).into_iter().filter(|r| response.of(&r.action) > 0.0) {
+            let next = answered(&roll.state, &roll.next, 0.5);
+            repaired.add(&Roll { next, ..roll }, 10.0).unwrap();
         }
         let slipped = Roll { state, action: [0.08, 5e-3], next: state };
         repaired.add(&slipped, 1e3).unwrap();
         repaired.refit().unwrap();
         approx::assert_relative_eq!(repaired.next(&state, &action)[0], before[0], max_relative = 1e-5);
+    }
+
+    /// Half a roll twice is the roll; what keeps its volume keeps it.
+    #[test]
+    fn parts_of_a_roll_keep_the_volume() {
+        let (state, next) = ([0.05, 0.04, 0.03], [0.0625, 0.036, 0.03 / 1.125]);
+        let volume = |s: &State| s.iter().product::<f64>();
+        for response in [0.0, 0.3, 1.0, 1.7] {
+            let part = answered(&state, &next, response);
+            approx::assert_relative_eq!(volume(&part), volume(&state), max_relative = 1e-12);
+        }
+        let half = answered(&state, &next, 0.5);
+        approx::assert_relative_eq!(half[0] * half[0] / state[0], next[0], max_relative = 1e-12);
+        assert!(answered(&state, &[-0.01, 0.04, 0.03], 0.5).iter().all(|v| v.is_finite()));
     }
 
     #[test]

@@ -292,6 +292,31 @@ fn caution_keeps_away_from_what_is_unsure() {
     assert!(depth(20.0) < 0.5 * depth(0.0), "{} of {}", depth(20.0), depth(0.0));
 }
 
+/// A dough 20 mm short of its goal, and dynamics that may do more than they say: no roll shortens what became too long.
+#[test]
+fn plans_leave_room_for_what_a_roll_may_do_beyond_its_prediction() {
+    let eager = Told(|s, a| {
+        let grown = 1.0 + 2.0 * a[1];
+        [s[0] * grown, s[1] / grown.sqrt(), s[2] / grown.sqrt()]
+    });
+    let longest = |too_long: f64| {
+        let mut task = task(&eager, 0.0);
+        task.state = [0.13, 0.02, 0.02];
+        task.worth.too_long = too_long;
+        let mut plan = Vec::new();
+        PowellPlanner::default().plan(&task, &mut plan, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+        let next = eager.next(&task.state, &task.first(&plan))[0];
+        task.state[0] + (1.0 + task.worth.doubt) * (next - task.state[0])
+    };
+    assert!(longest(5.0) < 0.156, "{}", longest(5.0));
+    assert!(longest(0.0) > 0.16, "{}", longest(0.0));
+    // What is predicted to shorten stays as long as it is.
+    let shrinks = Told(|s, _| [0.9 * s[0], s[1], s[2]]);
+    let still = Told(|s, _| *s);
+    let cost = |dynamics: &Told| task(dynamics, 0.0).cost(&[0.5; 20]);
+    assert_eq!(cost(&shrinks), cost(&still));
+}
+
 #[test]
 fn what_cannot_be_planned_is_said() {
     let (good, bad) = (Told(law), Told(|_, _| [f64::NAN; 3]));
