@@ -99,14 +99,14 @@ fn too_few_rolls_and_rolls_that_are_all_alike_are_errors() {
     assert!(matches!(Dynamics::learn(&alike), Err(LearnError::Undetermined { degree: 2 })));
 }
 
-/// Learned from twelve doughs, and asked of twelve others: what is left of their innovations, once it has been taken apart by what
+/// Learned from forty doughs, and asked of twelve others: what is left of their innovations, once it has been taken apart by what
 /// was not learned, is as large as it is said to be, and no dough is off as a whole.
 #[test]
 fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
     let (mut square, mut count, mut levels, mut doughs_seen) = (0.0, 0.0, 0.0, 0.0);
-    for seed in 10..16 {
+    for seed in 10..13 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let dynamics = Dynamics::learn(&doughs(12, 0.05, SIGMA, &mut rng)).unwrap();
+        let dynamics = Dynamics::learn(&doughs(40, 0.05, SIGMA, &mut rng)).unwrap();
         let others = doughs(12, 0.05, SIGMA, &mut rng);
         let first: Vec<[f64; 3]> = others.iter().map(|d| d[0].state).collect();
         let fresh = Fresh::of(&first, dynamics.noise());
