@@ -129,7 +129,8 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
         }
     }
     assert!((0.9..1.1).contains(&(square / count)), "{}", square / count);
-    assert!((0.6..1.3).contains(&(levels / doughs_seen)), "{}", levels / doughs_seen);
+    // Here no dough does anything for itself, and some is held possible: less than one.
+    assert!(levels / doughs_seen < 1.2, "{}", levels / doughs_seen);
 }
 
 /// A filter that knows the law and the noise leaves innovations that are white.
