@@ -7,6 +7,8 @@ pub struct Polynomial {
     scale: Vec<f64>,
     /// Powers of each variable, term by term, by degree.
     powers: Vec<Vec<u8>>,
+    /// Each term but the first is an earlier one times a variable.
+    parents: Vec<(usize, usize)>,
 }
 
 impl Polynomial {
@@ -23,23 +25,23 @@ impl Polynomial {
                 if spread > 1e-12 * mean[k].abs().max(f64::MIN_POSITIVE) { spread } else { 1.0 }
             })
             .collect();
-        let mut powers = vec![vec![0; inputs]];
-        let mut last = powers.clone();
+        let (mut powers, mut parents) = (vec![vec![0; inputs]], Vec::new());
+        let mut first = 0;
         for _ in 0..degree {
-            let mut next = Vec::new();
-            for term in &last {
+            let end = powers.len();
+            for parent in first..end {
                 // Each monomial once: a variable is multiplied in only after those that are already there.
-                let from = term.iter().rposition(|&p| p > 0).unwrap_or(0);
+                let from = powers[parent].iter().rposition(|&p: &u8| p > 0).unwrap_or(0);
                 for k in from..inputs {
-                    let mut more = term.clone();
+                    let mut more = powers[parent].clone();
                     more[k] += 1;
-                    next.push(more);
+                    powers.push(more);
+                    parents.push((parent, k));
                 }
             }
-            powers.extend(next.iter().cloned());
-            last = next;
+            first = end;
         }
-        Self { mean, scale, powers }
+        Self { mean, scale, powers, parents }
     }
 
     /// Number of terms.
@@ -59,10 +61,15 @@ impl Polynomial {
 
     /// The terms at a row of the variables.
     pub fn terms(&self, row: &[f64]) -> Vec<f64> {
-        let z: Vec<f64> =
-            row.iter().zip(self.mean.iter().zip(&self.scale)).map(|(x, (m, s))| (x - m) / s).collect();
-        let product = |p: &Vec<u8>| z.iter().zip(p).map(|(z, &p)| z.powi(i32::from(p))).product();
-        self.powers.iter().map(product).collect()
+        // What is missing of a row counts as its mean.
+        let standard = |(k, mean): (usize, &f64)| row.get(k).map_or(0.0, |x| (x - mean) / self.scale[k]);
+        let z: Vec<f64> = self.mean.iter().enumerate().map(standard).collect();
+        let mut terms = Vec::with_capacity(self.powers.len());
+        terms.push(1.0);
+        for &(parent, k) in &self.parents {
+            terms.push(terms[parent] * z[k]);
+        }
+        terms
     }
 }
 

@@ -17,12 +17,17 @@ pub struct Worth {
     /// Part of the goal's tolerance within which a predicted state counts as there: a plan that only just enters it misses half of
     /// the time, and what is too long stays too long. In (0, 1].
     pub aim: f64,
+    /// Cost of each metre by which the dough may get too long, since no roll shortens it; 0 counts too long like too short.
+    pub too_long: f64,
+    /// By how much more than predicted a roll may lengthen, as a part of what is predicted: what `too_long` counts with.
+    pub doubt: f64,
 }
 
 impl Default for Worth {
-    /// Ten rolls, 0.9, certain; a third of the tolerance.
+    /// Ten rolls, 0.9, certain; a third of the tolerance; too long is dear, and a roll may do two and a half times what is
+    /// predicted: deep rolls of a long dough do, on the fake.
     fn default() -> Self {
-        Self { horizon: 10, discount: 0.9, caution: 0.0, aim: 1.0 / 3.0 }
+        Self { horizon: 10, discount: 0.9, caution: 0.0, aim: 1.0 / 3.0, too_long: 5.0, doubt: 1.5 }
     }
 }
 
@@ -37,7 +42,11 @@ impl Worth {
         PlanError::setting("discount", self.discount, good, "above 0, at most 1")?;
         let good = self.caution >= 0.0 && self.caution.is_finite();
         PlanError::setting("caution", self.caution, good, "at least 0, finite")?;
-        PlanError::setting("aim", self.aim, self.aim > 0.0 && self.aim <= 1.0, "above 0, at most 1")
+        PlanError::setting("aim", self.aim, self.aim > 0.0 && self.aim <= 1.0, "above 0, at most 1")?;
+        for (name, value) in [("too_long", self.too_long), ("doubt", self.doubt)] {
+            PlanError::setting(name, value, value >= 0.0 && value.is_finite(), "at least 0, finite")?;
+        }
+        Ok(())
     }
 }
 
@@ -100,9 +109,14 @@ impl Task<'_> {
             } else {
                 self.dynamics.next(&state, &action)
             };
-            // Dynamics that predict no dough predict nothing good.
-            state = next.map(|v| if v.is_nan() { 10.0 } else { v.clamp(1e-3, 10.0) });
-            cost += discount * (self.goal.distance_m(&state) + self.worth.caution * unsure);
+            // Dynamics that predict no dough predict nothing good; and no roll shortens it.
+            let mut next = next.map(|v| if v.is_nan() { 10.0 } else { v.clamp(1e-3, 10.0) });
+            next[0] = next[0].max(state[0]);
+            let longest = next[0] + self.worth.doubt * (next[0] - state[0]);
+            let too_long = (longest - self.goal.state[0] - 0.5 * self.goal.within_m).max(0.0);
+            state = next;
+            let off = self.goal.distance_m(&state) + self.worth.caution * unsure;
+            cost += discount * (off + self.worth.too_long * too_long);
             discount *= self.worth.discount;
         }
         cost

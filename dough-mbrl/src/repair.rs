@@ -8,7 +8,7 @@ use crate::predictor::{PlanError, Predictor, Refit};
 /// What a diagnosis found; the default changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
-    /// Change over the learned change, above 0.
+    /// Strain over the learned strain, above 0.
     pub factor: f64,
     /// Force (N) below which the band slips and changes nothing; 0: it never slips.
     pub slip_n: f64,
@@ -23,13 +23,23 @@ impl Default for Response {
 }
 
 impl Response {
-    /// Change over the learned change for a roll.
+    /// Strain over the learned strain of a roll.
     pub fn of(&self, action: &Action) -> f64 {
         if self.band.force_n(action[0], action[1]) < self.slip_n { 0.0 } else { self.factor }
     }
 }
 
-/// Repaired dynamics: `next = state + response x learned change`.
+/// A state after a part of a roll, or more than it: each dimension's logarithmic strain is `response` times that of the whole roll, so
+/// that what keeps its volume keeps it.
+pub fn answered(state: &State, next: &State, response: f64) -> State {
+    std::array::from_fn(|k| {
+        let ratio = next[k] / state[k];
+        // A strain that is none (a prediction of no dough) is left a change.
+        if ratio > 0.0 { state[k] * ratio.powf(response) } else { state[k] + response * (next[k] - state[k]) }
+    })
+}
+
+/// Repaired dynamics: the learned ones, [`answered`].
 #[derive(Debug, Clone)]
 pub struct Repaired<M> {
     learned: M,
@@ -51,19 +61,15 @@ impl<M> Repaired<M> {
 
 impl<M: Predictor> Predictor for Repaired<M> {
     fn next(&self, state: &State, action: &Action) -> State {
-        let response = self.response.of(action);
-        let next = self.learned.next(state, action);
-        std::array::from_fn(|k| state[k] + response * (next[k] - state[k]))
+        answered(state, &self.learned.next(state, action), self.response.of(action))
     }
 
     /// As unsure as the learned dynamics, whatever the response: a sigma holds the camera's noise too.
     fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
         let response = self.response.of(action);
         let learned = self.learned.predict(state, action);
-        std::array::from_fn(|k| Prediction {
-            mean: state[k] + response * (learned[k].mean - state[k]),
-            sigma: learned[k].sigma * response.max(1.0),
-        })
+        let mean = answered(state, &learned.map(|p| p.mean), response);
+        std::array::from_fn(|k| Prediction { mean: mean[k], sigma: learned[k].sigma * response.max(1.0) })
     }
 }
 
@@ -75,7 +81,7 @@ impl<M: Refit> Refit for Repaired<M> {
         if response == 0.0 {
             return Ok(());
         }
-        let next = std::array::from_fn(|k| roll.state[k] + (roll.next[k] - roll.state[k]) / response);
+        let next = answered(&roll.state, &roll.next, 1.0 / response);
         // The noise is divided too.
         self.learned.add(&Roll { next, ..*roll }, weight * response * response)
     }
@@ -117,11 +123,15 @@ mod tests {
         let repaired = Repaired::new(learned(0.4), response).unwrap();
         let (state, deep, shallow) = ([0.07, 0.04, 0.03], [0.08, 0.02], [0.08, 5e-3]);
         // 96 N/m: 2.2 N and 0.5 N.
-        approx::assert_relative_eq!(repaired.next(&state, &deep)[0], 0.07 + 0.2 * 0.02, max_relative = 1e-5);
+        approx::assert_relative_eq!(
+            repaired.next(&state, &deep)[0],
+            0.07 * f64::sqrt(1.0 + 0.4 * 0.02 / 0.07),
+            max_relative = 1e-5
+        );
         assert_eq!(repaired.next(&state, &shallow), state);
         approx::assert_relative_eq!(
             repaired.predict(&state, &deep)[1].mean,
-            0.04 - 0.04 * 0.02,
+            0.04 * f64::sqrt(1.0 - 0.08 * 0.02 / 0.04),
             max_relative = 1e-5
         );
     }
@@ -132,13 +142,28 @@ mod tests {
         let mut repaired = Repaired::new(learned(0.4), response).unwrap();
         let (state, action) = ([0.07, 0.04, 0.03], [0.08, 0.02]);
         let before = repaired.next(&state, &action);
-        for roll in rolls(0.2).into_iter().filter(|r| response.of(&r.action) > 0.0) {
-            repaired.add(&roll, 10.0).unwrap();
+        for roll in rolls(0.4).into_iter().filter(|r| response.of(&r.action) > 0.0) {
+            let next = answered(&roll.state, &roll.next, 0.5);
+            repaired.add(&Roll { next, ..roll }, 10.0).unwrap();
         }
         let slipped = Roll { state, action: [0.08, 5e-3], next: state };
         repaired.add(&slipped, 1e3).unwrap();
         repaired.refit().unwrap();
         approx::assert_relative_eq!(repaired.next(&state, &action)[0], before[0], max_relative = 1e-5);
+    }
+
+    /// Half a roll twice is the roll; what keeps its volume keeps it.
+    #[test]
+    fn parts_of_a_roll_keep_the_volume() {
+        let (state, next) = ([0.05, 0.04, 0.03], [0.0625, 0.036, 0.03 / 1.125]);
+        let volume = |s: &State| s.iter().product::<f64>();
+        for response in [0.0, 0.3, 1.0, 1.7] {
+            let part = answered(&state, &next, response);
+            approx::assert_relative_eq!(volume(&part), volume(&state), max_relative = 1e-12);
+        }
+        let half = answered(&state, &next, 0.5);
+        approx::assert_relative_eq!(half[0] * half[0] / state[0], next[0], max_relative = 1e-12);
+        assert!(answered(&state, &[-0.01, 0.04, 0.03], 0.5).iter().all(|v| v.is_finite()));
     }
 
     #[test]

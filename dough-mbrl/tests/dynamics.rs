@@ -3,6 +3,9 @@
 
 use dough_mbrl::dynamics::{Dynamics, LearnError, Roll};
 use dough_mbrl::filter::{Fresh, Noise, follow};
+use dough_mbrl::sensitivity::{PER_ROLL, white};
+use dough_mbrl::tie::Tie;
+use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -94,6 +97,40 @@ fn too_few_rolls_and_rolls_that_are_all_alike_are_errors() {
     ));
     let alike = vec![vec![few[0][0]; 100]];
     assert!(matches!(Dynamics::learn(&alike), Err(LearnError::Undetermined { degree: 2 })));
+}
+
+/// Learned from forty doughs, and asked of twelve others: what is left of their innovations, once it has been taken apart by what
+/// was not learned, is as large as it is said to be, and no dough is off as a whole.
+#[test]
+fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
+    let (mut square, mut count, mut levels, mut doughs_seen) = (0.0, 0.0, 0.0, 0.0);
+    for seed in 10..13 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let dynamics = Dynamics::learn(&doughs(40, 0.05, SIGMA, &mut rng)).unwrap();
+        let others = doughs(12, 0.05, SIGMA, &mut rng);
+        let first: Vec<[f64; 3]> = others.iter().map(|d| d[0].state).collect();
+        let fresh = Fresh::of(&first, dynamics.noise());
+        let follow_one = |dough: &Vec<Roll>| {
+            follow(dough, &fresh, dynamics.noise(), 0.0, |i, x| x + dynamics.change(x, &dough[i].action))
+        };
+        let steps: Vec<_> = others.iter().map(follow_one).collect();
+        let answers: Vec<_> =
+            others.iter().zip(&steps).map(|(d, s)| dynamics.unlearned(s, d, |_| 1.0)).collect();
+        let off: Vec<f64> = steps.iter().flat_map(|s| white(s).iter().copied().collect::<Vec<_>>()).collect();
+        let apart = Tie::new(&answers).untie(&DVector::from_vec(off));
+        square += apart.norm_squared();
+        count += apart.len() as f64;
+        for dough in apart.as_slice().chunks(8 * PER_ROLL) {
+            for k in 0..3 {
+                let sum: f64 = dough.iter().skip(k).step_by(PER_ROLL).sum();
+                levels += sum * sum / 8.0;
+                doughs_seen += 1.0;
+            }
+        }
+    }
+    assert!((0.9..1.1).contains(&(square / count)), "{}", square / count);
+    // Here no dough does anything for itself, and some is held possible: less than one.
+    assert!(levels / doughs_seen < 1.2, "{}", levels / doughs_seen);
 }
 
 /// A filter that knows the law and the noise leaves innovations that are white.

@@ -292,6 +292,32 @@ fn caution_keeps_away_from_what_is_unsure() {
     assert!(depth(20.0) < 0.5 * depth(0.0), "{} of {}", depth(20.0), depth(0.0));
 }
 
+/// A dough 20 mm short of its goal, and dynamics that may do more than they say: no roll shortens what became too long.
+#[test]
+fn plans_leave_room_for_what_a_roll_may_do_beyond_its_prediction() {
+    let eager = Told(|s, a| {
+        let grown = 1.0 + 10.0 * a[1];
+        [s[0] * grown, s[1] / grown.sqrt(), s[2] / grown.sqrt()]
+    });
+    // There in one roll, or in two gentle ones.
+    let cost = |too_long: f64, rolls: [f64; 2]| {
+        let mut task = task(&eager, 0.0);
+        task.state = [0.13, 0.02, 0.02];
+        task.worth.too_long = too_long;
+        let mut plan = vec![0.5; 20];
+        (plan[1], plan[3]) = (rolls[0], rolls[1]);
+        task.cost(&plan)
+    };
+    let (bold, gentle) = ([0.69, 0.5], [0.2, 0.0]);
+    assert!(cost(0.0, bold) < cost(0.0, gentle));
+    assert!(cost(5.0, gentle) < 0.5 * cost(5.0, bold), "{} of {}", cost(5.0, gentle), cost(5.0, bold));
+    // What is predicted to shorten stays as long as it is.
+    let shrinks = Told(|s, _| [0.9 * s[0], s[1], s[2]]);
+    let still = Told(|s, _| *s);
+    let cost = |dynamics: &Told| task(dynamics, 0.0).cost(&[0.5; 20]);
+    assert_eq!(cost(&shrinks), cost(&still));
+}
+
 #[test]
 fn what_cannot_be_planned_is_said() {
     let (good, bad) = (Told(law), Told(|_, _| [f64::NAN; 3]));

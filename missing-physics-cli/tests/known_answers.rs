@@ -132,8 +132,8 @@ fn a_measured_sound_of_a_bouncing_ball() {
     assert!(answer["impacts"].as_array().unwrap().len() >= 30);
 }
 
-/// Where the response is half the learned one (c05), what the learned polynomial cannot follow shows: the right mechanism is
-/// closest, and is not said to explain.
+/// Where the response is half the learned one (c05), the right mechanism is closest, its factor is right, and it is not said to
+/// explain: something of the width is left.
 #[test]
 fn practice_doughs() {
     practice_cases_but("dough-roll", &[("c05", "unexplained")]);

@@ -4,11 +4,14 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dough_mbrl::band::Band;
-use dough_mbrl::dynamics::{Dynamics, Roll, courses};
+use dough_mbrl::dynamics::{Dynamics, Roll};
 use dough_mbrl::filter::{Fresh, Step as Followed, follow};
+use dough_mbrl::repair::answered;
+use dough_mbrl::sensitivity::{PER_ROLL, white};
+use dough_mbrl::tie::Tie;
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
-use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, SymmetricEigen};
+use nalgebra::{DVector, Vector3};
 
 use super::read::{RunOfRolls, Step};
 use super::spec::{Effects, Places, build};
@@ -18,9 +21,7 @@ use super::spec::{Effects, Places, build};
 struct Block {
     doughs: Vec<Dough>,
     fresh: Fresh,
-    /// Directions in which errors are tied, one a column, and by how much each is to be shortened.
-    tied: DMatrix<f64>,
-    shorter: DVector<f64>,
+    tie: Tie,
     /// Errors where nothing has happened.
     off: DVector<f64>,
 }
@@ -46,6 +47,8 @@ pub(super) struct DoughModel {
     spec: Spec,
     places: Places,
     blocks: Vec<Block>,
+    /// What of the learned response the recording shows, all rolls alike: the smaller it is, the less counts what was not learned.
+    shown: Option<f64>,
     /// Block and dough of each run.
     runs: HashMap<String, (usize, usize)>,
     kept: Errors,
@@ -56,8 +59,6 @@ pub(super) struct DoughModel {
 /// Channels: the three dimensions after a roll, and before it.
 pub(super) const CHANNELS: [&str; 6] =
     ["next_length_m", "next_width_m", "next_height_m", "length_m", "width_m", "height_m"];
-/// Errors of a roll: of the measurement after it, and before it.
-const PER_ROLL: usize = CHANNELS.len();
 
 impl DoughModel {
     pub(super) fn new(band: Band, dynamics: Dynamics, timed: bool, steps: &[Step]) -> Self {
@@ -71,7 +72,7 @@ impl DoughModel {
             (noise.measured[usize::from(c < 3)][c % 3] + noise.process[c % 3]).sqrt()
         });
         let (blocks, runs, kept) = (Vec::new(), HashMap::new(), Mutex::default());
-        Self { band, dynamics, spec, places, blocks, runs, kept, scale }
+        Self { band, dynamics, spec, places, blocks, shown: None, runs, kept, scale }
     }
 
     /// Adds runs whose errors are tied, and says what the engine is to see of them.
@@ -85,62 +86,38 @@ impl DoughModel {
         }
         let fresh: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
         let fresh = Fresh::of(&fresh, self.dynamics.noise());
-        let (tied, shorter) = self.tie(&doughs, &fresh, first);
-        let mut block = Block { doughs, fresh, tied, shorter, off: DVector::zeros(first) };
+        let shown = self.shown.unwrap_or_else(|| self.mean_response(&doughs, &fresh));
+        self.shown = Some(shown);
+        let tie = self.tie(&doughs, &fresh, shown);
+        let mut block = Block { doughs, fresh, tie, off: DVector::zeros(first) };
         block.off = self.errors(&block, &Effects::OFF);
         self.blocks.push(block);
         runs.iter().enumerate().map(|(k, (label, _))| self.shown(label, k)).collect()
     }
 
-    /// How the uncertainty of what was learned ties the errors of doughs: directions, and by how much each is to be shortened.
-    fn tie(&self, doughs: &[Dough], fresh: &Fresh, rows: usize) -> (DMatrix<f64>, DVector<f64>) {
-        /// Below this part of its own variance nothing is said to be tied.
-        const LEAST: f64 = 1e-3;
-        let p = self.dynamics.coefficients();
-        // Coefficients of all doughs, then each one's own level and slope.
-        let columns = 3 * p + 6 * doughs.len();
-        let own = self.dynamics.own();
-        let mut all = DMatrix::zeros(rows, columns);
-        for (at, dough) in doughs.iter().enumerate() {
-            let courses = courses(dough.rolls.len());
-            let mut sensitivity = OMatrix::<f64, Const<3>, Dyn>::zeros(columns);
-            for (i, step) in self.follow(dough, fresh, &Effects::OFF).iter().enumerate() {
-                let row = dough.first + PER_ROLL * i;
-                let mut write = |offset: usize,
-                                 factor: &nalgebra::Matrix3<f64>,
-                                 sensitivity: &OMatrix<f64, Const<3>, Dyn>| {
-                    let mut white = -sensitivity.clone();
-                    factor.solve_lower_triangular_mut(&mut white);
-                    all.view_mut((row + offset, 0), (3, columns)).copy_from(&white);
-                };
-                write(3, &step.before.factor, &sensitivity);
-                sensitivity -= step.before.gain * &sensitivity;
-                sensitivity = step.gradient * &sensitivity;
-                for (k, told) in self.dynamics.told(&step.state, &dough.rolls[i].action).iter().enumerate() {
-                    let mut coefficients = sensitivity.view_mut((k, k * p), (1, p));
-                    coefficients += told.transpose();
-                }
-                for (c, course) in courses.iter().enumerate() {
-                    for (k, own) in own.iter().enumerate() {
-                        sensitivity[(k, 3 * p + 6 * at + 3 * c + k)] += own * course[i];
-                    }
-                }
-                write(0, &step.after.factor, &sensitivity);
-                sensitivity -= step.after.gain * &sensitivity;
-            }
+    /// The response that makes the innovations least.
+    fn mean_response(&self, doughs: &[Dough], fresh: &Fresh) -> f64 {
+        let cost = |factor: f64| -> f64 {
+            let effects = Effects { factor, ..Effects::OFF };
+            doughs.iter().map(|d| white(&self.follow(d, fresh, &effects)).norm_squared()).sum()
+        };
+        // Golden sections of its logarithm.
+        const PART: f64 = 0.618_033_988_749_894_8;
+        let (mut low, mut high) = (f64::ln(0.1), f64::ln(10.0));
+        for _ in 0..20 {
+            let (a, b) = (high - PART * (high - low), low + PART * (high - low));
+            if cost(a.exp()) < cost(b.exp()) { high = b } else { low = a }
         }
-        let eigen = SymmetricEigen::new(all.tr_mul(&all));
-        let strong: Vec<usize> = (0..columns).filter(|&k| eigen.eigenvalues[k] > LEAST).collect();
-        let mut tied = DMatrix::zeros(rows, strong.len());
-        let shorter = DVector::from_iterator(
-            strong.len(),
-            strong.iter().map(|&k| 1.0 - 1.0 / (1.0 + eigen.eigenvalues[k]).sqrt()),
-        );
-        for (column, &k) in strong.iter().enumerate() {
-            let direction = &all * eigen.eigenvectors.column(k) / eigen.eigenvalues[k].sqrt();
-            tied.set_column(column, &direction);
-        }
-        (tied, shorter)
+        (0.5 * (low + high)).exp()
+    }
+
+    /// How the uncertainty of what was learned ties the errors of doughs.
+    fn tie(&self, doughs: &[Dough], fresh: &Fresh, shown: f64) -> Tie {
+        let answers = |dough: &Dough| {
+            let steps = self.follow(dough, fresh, &Effects { factor: shown, ..Effects::OFF });
+            self.dynamics.unlearned(&steps, &dough.rolls, |_| shown)
+        };
+        Tie::new(&doughs.iter().map(answers).collect::<Vec<_>>())
     }
 
     fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
@@ -150,22 +127,19 @@ impl DoughModel {
             let [throw, depth] = step.roll.action;
             let response =
                 effects.response(step.step, step.t_s, self.band.force_n(throw, depth), throw, x[0]);
-            left * (x + response * self.dynamics.change(x, &step.roll.action))
+            let learned = x + self.dynamics.change(x, &step.roll.action);
+            left * Vector3::from(answered(&(*x).into(), &learned.into(), response))
         })
     }
 
     /// The errors of a block under some effects: independent, of variance one.
     fn errors(&self, block: &Block, effects: &Effects) -> DVector<f64> {
-        let mut errors = DVector::zeros(block.tied.nrows());
+        let mut errors = DVector::zeros(block.off.len());
         for dough in &block.doughs {
-            for (i, step) in self.follow(dough, &block.fresh, effects).iter().enumerate() {
-                let row = dough.first + PER_ROLL * i;
-                errors.fixed_rows_mut::<3>(row).copy_from(&step.after.white());
-                errors.fixed_rows_mut::<3>(row + 3).copy_from(&step.before.white());
-            }
+            let own = white(&self.follow(dough, &block.fresh, effects));
+            errors.rows_mut(dough.first, own.len()).copy_from(&own);
         }
-        let along = block.tied.tr_mul(&errors).component_mul(&block.shorter);
-        errors - &block.tied * along
+        block.tie.untie(&errors)
     }
 
     /// The same, kept for the other runs of the block.

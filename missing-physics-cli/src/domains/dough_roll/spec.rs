@@ -94,7 +94,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
         [
             "another stiffness",
             "The dough answers every roll by a common factor more (or less) than the one it was learned from.",
-            "change = factor x learned change (1: no effect)",
+            "logarithmic strain = factor x learned strain (1: no effect)",
             "thesis, section 7.5",
         ],
         &["drying", "band-softening"],
@@ -107,7 +107,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
             [
                 "drying",
                 "The dough dries, and answers less and less with time.",
-                "change = exp(-rate t) x learned change",
+                "logarithmic strain = exp(-rate t) x learned strain",
                 "Bloksma 1990 (dough rheology and water), Cereal Foods World 35",
             ],
             &["stiffness-change", "band-softening"],
@@ -157,7 +157,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
         [
             "a band that tires",
             "The band softens roll by roll, and recovers before a new run.",
-            "change = exp(-rate (step - 1)) x learned change",
+            "logarithmic strain = exp(-rate (step - 1)) x learned strain",
             "Mullins 1969, doi:10.5254/1.3539210",
         ],
         &["drying", "stiffness-change"],
