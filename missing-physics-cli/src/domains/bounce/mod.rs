@@ -5,6 +5,7 @@
 
 mod array;
 mod assemble;
+mod chance;
 mod drop;
 mod experiments;
 mod model;
