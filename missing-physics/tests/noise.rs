@@ -92,7 +92,7 @@ fn fast_then_slow(seed: u64) -> Recording {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xf00d);
     let fresh = Normal::new(0.0, World::NULL.sigma * (1.0 - PHI * PHI).sqrt()).unwrap();
     for run in &mut recording.runs {
-        let kept = |i: usize| i < 40 || i % 4 == 0;
+        let kept = |i: usize| i < 40 || i.is_multiple_of(4);
         let pick = |column: &[f64]| (0..column.len()).filter(|&i| kept(i)).map(|i| column[i]).collect();
         run.inputs = run.inputs.iter().map(|c| pick(c)).collect();
         run.outputs = run.outputs.iter().map(|c| pick(c)).collect();
