@@ -24,6 +24,9 @@ use rand_chacha::ChaCha8Rng;
 /// A sound recording: its files.
 type Files = Vec<(&'static str, Vec<u8>)>;
 
+/// Header, data, and the name and bytes of a file beside them.
+type Made = (String, String, &'static str, Vec<u8>);
+
 /// A kind of recording: its name, its files, which of them are mutilated, and whether it is diagnosed where it is read.
 struct Kind {
     name: &'static str,
@@ -54,7 +57,7 @@ fn kinds() -> Vec<Kind> {
     let sound = "format = 1\ndomain = \"bounce\"\n[audio]\nfiles = [\"a.wav\"]\n".to_owned();
     let line = (0..12).map(|i| format!("a,{i},{i}.1\n")).collect::<String>();
     let program = (PROGRAM.to_owned(), format!("run,t_s,y_m\n{line}"), "answers.jsonl", answers());
-    let of_files: [(&'static str, bool, (String, String, &'static str, Vec<u8>)); 5] = [
+    let of_files: [(&'static str, bool, Made); 5] = [
         ("png", false, heap),
         ("stl", true, mesh("a.stl", stl())),
         ("obj", true, mesh("a.obj", obj())),
