@@ -17,7 +17,7 @@ use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::fake::{AXIA80, Box3, Cavity, FakeWrist, Load, Round};
 use liquid_haptics::pour::{Bead, Mouth, Pour};
 use liquid_haptics::viscosity::{Bottle, Verdict, ViscosityFit};
-use liquid_haptics::volume::{ForceGain, Liquid, MassFit, Pose, VolumeFit, fit_mass};
+use liquid_haptics::volume::{ForceGain, Liquid, MassFit, Pose, Ties, VolumeFit, fit_mass};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench, world_from_body};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
@@ -49,10 +49,12 @@ fn main() -> Outcome<()> {
     let small = examples::small();
     let (levels, sweeps) = if small { (5, 1) } else { (13, 5) };
     println!("{:44} {:>20} {:>20}", "", "here", "thesis");
-    sweeps_of_the_bottle(levels, sweeps)?;
-    carton(sweeps)?;
+    let calibration = calibrate()?;
+    let ties = calibration.ties;
+    sweeps_of_the_bottle(&calibration, levels, sweeps)?;
+    carton(sweeps, ties)?;
     which_liquid(if small { 2 } else { 5 })?;
-    pours(if small { 1 } else { 5 })?;
+    pours(if small { 1 } else { 5 }, ties)?;
     mishaps()
 }
 
@@ -113,13 +115,20 @@ struct Felt {
     inside: bool,
 }
 
-fn volume(container: &dyn Container, grasp: Grasp, poses: &[Pose], liquid: Liquid) -> Outcome<[f64; 3]> {
+fn volume(
+    container: &dyn Container,
+    grasp: Grasp,
+    poses: &[Pose],
+    liquid: Liquid,
+    ties: Ties,
+) -> Outcome<[f64; 3]> {
     let fit = VolumeFit {
         container,
         grasp,
         departures: Departures::default(),
         liquid,
         sigma_nm: None,
+        ties,
         widest_share: 0.5,
     };
     let estimate = fit.estimate(poses)?;
@@ -131,35 +140,53 @@ fn mass(poses: &[Pose], empty: Option<&[Pose]>) -> Outcome<liquid_haptics::volum
     Ok(fit_mass(&GRASP, poses, &MassFit { gain, offsets: false, sigma_n: None })?)
 }
 
-fn sweeps_of_the_bottle(levels: u32, sweeps: u32) -> Outcome<()> {
+/// What ten turns of the empty bottle tell of the sensor, once for all.
+struct Calibration {
+    empty: Vec<Pose>,
+    /// Variance of the mass from turn to turn, kg^2: turns differ by more than the scatter of one turn's poses shows.
+    mass_variance: f64,
+    /// How the torque's errors go on from pose to pose.
+    ties: Ties,
+}
+
+fn calibrate() -> Outcome<Calibration> {
+    let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
+    let turns: Outcome<Vec<Vec<Pose>>> =
+        (0..10_u64).into_par_iter().map(|k| sweep(bottle_load(0.0, WATER, 1e-6), 900 + k)).collect();
+    let turns = turns?;
+    let zeros = turns.iter().map(|poses| Ok(mass(poses, None)?.mass_kg)).collect::<Outcome<Vec<f64>>>()?;
+    let middle = zeros.iter().sum::<f64>() / zeros.len() as f64;
+    let mass_variance = zeros.iter().map(|z| (z - middle).powi(2)).sum::<f64>() / (zeros.len() - 1) as f64;
+    let error = |pose: &Pose| {
+        let stated = GRASP.wrench(&inner, pose.tilt_rad, 0.0, 0.0, &Departures::default())?;
+        Ok(pose.wrench.tau_z_nm - stated.tau_z_nm)
+    };
+    let errors: Outcome<Vec<Vec<f64>>> = turns.iter().map(|turn| turn.iter().map(error).collect()).collect();
+    let (ties, _) = Ties::of_sweeps(&errors?)?;
+    Ok(Calibration { empty: turns.concat(), mass_variance, ties })
+}
+
+fn sweeps_of_the_bottle(calibration: &Calibration, levels: u32, sweeps: u32) -> Outcome<()> {
+    let Calibration { empty, mass_variance, ties } = calibration;
     let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
     let outer = Cylinder::new(RADIUS_M, LENGTH_M, 0.0)?;
-    // The sensor is calibrated once, on ten turns of the empty bottle.
-    let empty: Outcome<Vec<Vec<Pose>>> =
-        (0..10_u64).into_par_iter().map(|k| sweep(bottle_load(0.0, WATER, 1e-6), 900 + k)).collect();
-    let empty = empty?;
-    // Turns differ by more than the scatter of one turn's poses shows: the sensor wanders.
-    let zeros = empty.iter().map(|poses| Ok(mass(poses, None)?.mass_kg)).collect::<Outcome<Vec<f64>>>()?;
-    let middle = zeros.iter().sum::<f64>() / zeros.len() as f64;
-    let wander = zeros.iter().map(|z| (z - middle).powi(2)).sum::<f64>() / (zeros.len() - 1) as f64;
-    let empty: Vec<Pose> = empty.concat();
     let felt: Outcome<Vec<Felt>> = (0..levels * sweeps)
         .into_par_iter()
         .map(|k| {
             let truth = inner.capacity_m3() * f64::from(k / sweeps) / f64::from(levels - 1);
             let poses = sweep(bottle_load(WATER * truth, WATER, 1e-6), u64::from(k))?;
-            let found = mass(&poses, Some(&empty))?;
+            let found = mass(&poses, Some(empty))?;
             let raw = mass(&poses, None)?;
             let liquid = Liquid::Mass {
                 mass_kg: found.mass_kg.max(0.0),
-                error_kg: (found.error_kg.powi(2) + wander).sqrt(),
+                error_kg: (found.error_kg.powi(2) + mass_variance).sqrt(),
             };
-            let [volume_m3, low, high] = volume(&inner, GRASP, &poses, liquid)?;
+            let [volume_m3, low, high] = volume(&inner, GRASP, &poses, liquid, *ties)?;
             Ok(Felt {
                 raw_mass: raw.mass_kg - WATER * truth,
                 mass: found.mass_kg - WATER * truth,
                 volume: volume_m3 - truth,
-                outer: volume(&outer, GRASP, &poses, liquid)?[0] - truth,
+                outer: volume(&outer, GRASP, &poses, liquid, *ties)?[0] - truth,
                 inside: low <= truth && truth <= high,
             })
         })
@@ -178,7 +205,7 @@ fn sweeps_of_the_bottle(levels: u32, sweeps: u32) -> Outcome<()> {
 }
 
 /// A half-gallon carton as a mesh: a box with a gable.
-fn carton(sweeps: u32) -> Outcome<()> {
+fn carton(sweeps: u32, ties: Ties) -> Outcome<()> {
     let (width, walls, gable) = (0.095, 0.19, 0.04);
     let half = 0.5 * width;
     let corner = |k: usize| [(-half, -half), (half, -half), (half, half), (-half, half)][k];
@@ -226,7 +253,7 @@ fn carton(sweeps: u32) -> Outcome<()> {
             let poses = sweep(load, 100 + u64::from(k))?;
             let fit = MassFit { gain: ForceGain::Known(0.0), offsets: false, sigma_n: None };
             let found = fit_mass(&grasp, &poses, &fit)?;
-            Ok(volume(&mesh, grasp, &poses, Liquid::from(&found))?[0] - truth)
+            Ok(volume(&mesh, grasp, &poses, Liquid::from(&found), ties)?[0] - truth)
         })
         .collect();
     line("volume, milk carton as a mesh", &shown(&errors?, 1e6, "mL"), "1.69 +- 24.69 mL");
@@ -323,7 +350,7 @@ fn which_liquid(each: u64) -> Outcome<()> {
 }
 
 /// 100 mL from what was felt to be inside: the bottle has a lip, water a bead, and neither is quite as stated.
-fn pours(each: u64) -> Outcome<()> {
+fn pours(each: u64, ties: Ties) -> Outcome<()> {
     let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
     let (lip, rim, bead) = (0.027, LENGTH_M - WALL_M, 0.0048);
     let tries: Vec<(f64, u64)> =
@@ -334,7 +361,7 @@ fn pours(each: u64) -> Outcome<()> {
             let seed = 8000 + i + (1e7 * truth) as u64;
             let load = Load { force_gain: 0.0, ..bottle_load(WATER * truth, WATER, 1e-6) };
             let poses = sweep(load, seed)?;
-            let [inside, ..] = volume(&inner, GRASP, &poses, Liquid::from(&mass(&poses, None)?))?;
+            let [inside, ..] = volume(&inner, GRASP, &poses, Liquid::from(&mass(&poses, None)?), ties)?;
             let mouth = Mouth::new(lip, rim)?;
             let pour = Pour::new(&inner, mouth, Bead::measured(bead, bead)?, PI)?;
             let tilt = pour.tilt_rad(inside, 100e-6)?;

@@ -11,14 +11,14 @@ use hw_traits::camera::DepthCamera;
 use hw_traits::gripper::Gripper;
 use rayon::prelude::*;
 use stretch::cloud::{Cloud, CloudSettings, Rest, Window};
-use stretch::contact::{Diameters, diameters};
+use stretch::contact::{Ball, Diameters, cap, diameters};
 use stretch::fake::{Filling, Membrane, Rig, Shape, Sheet};
 use stretch::modulus::{Press, Surface};
 use stretch::palpate::{Palpation, Programme, palpate};
 use stretch::segment::{SegmentSettings, Segmenter};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    faces()?;
+    geometry()?;
     let surface = forces()?;
     let felt = balloons(&surface)?;
     let path = std::env::temp_dir().join("stretch.svg");
@@ -31,9 +31,9 @@ fn at(z: f64) -> Pose {
     Pose { position_m: [0.0, 0.0, z], rotation_xyzw: [0.0, 0.0, 0.0, 1.0] }
 }
 
-/// Diameters of a standing cylinder as the camera sees them.
-fn seen(diameter_m: f64, stretch_m: f64, depth_m: f64, seed: u64) -> Result<Diameters, Box<dyn Error>> {
-    let mut rig = Rig::new(Shape::Cylinder { radius_m: 0.5 * diameter_m }, Filling::Rigid, seed);
+/// What the camera sees of a rigid object, and what of it touches.
+fn seen(shape: Shape, stretch_m: f64, depth_m: f64, seed: u64) -> Result<(Cloud, Segmenter), Box<dyn Error>> {
+    let mut rig = Rig::new(shape, Filling::Rigid, seed);
     rig.open_to(0.1 + stretch_m, 0.1)?;
     let free = rig.depth_m()?.value;
     let level = Rest::level(rig.eye.distance_m)?;
@@ -44,32 +44,48 @@ fn seen(diameter_m: f64, stretch_m: f64, depth_m: f64, seed: u64) -> Result<Diam
     let mut cloud = Cloud::default();
     cloud.fill(&picture, &rig.intrinsics(), &rest, window, &CloudSettings::default())?;
     let mut segmenter = Segmenter::default();
-    let states = segmenter.segment(&cloud, &SegmentSettings::default());
-    Ok(diameters(&cloud, states)?)
+    segmenter.segment(&cloud, &SegmentSettings::default());
+    Ok((cloud, segmenter))
 }
 
-/// Figure 6.4: errors of a 20 mm cylinder's diameters.
-fn faces() -> Result<(), Box<dyn Error>> {
+/// A standing cylinder's diameters.
+fn face(radius_m: f64, stretch_m: f64, depth_m: f64) -> Result<Diameters, Box<dyn Error>> {
+    let (cloud, segmenter) = seen(Shape::Cylinder { radius_m }, stretch_m, depth_m, 64)?;
+    Ok(diameters(&cloud, &segmenter.states)?)
+}
+
+/// A ball.
+fn sphere(radius_m: f64, stretch_m: f64, depth_m: f64) -> Result<Ball, Box<dyn Error>> {
+    let (cloud, segmenter) = seen(Shape::Ball { radius_m }, stretch_m, depth_m, 64)?;
+    Ok(cap(&cloud, &segmenter.states)?)
+}
+
+/// Figure 6.4: errors of a 20 mm cylinder's diameters, and of a 30 mm ball's.
+fn geometry() -> Result<(), Box<dyn Error>> {
     let (depths, stretches): (Vec<f64>, Vec<f64>) = if examples::small() {
         (vec![0.006, 0.012], vec![0.0, 0.06])
     } else {
-        (vec![0.002, 0.004, 0.006, 0.009, 0.012, 0.015], (0..=6).map(|k| 0.01 * f64::from(k)).collect())
+        (vec![0.002, 0.004, 0.006, 0.009, 0.012, 0.015], vec![0.0, 0.02, 0.04, 0.06])
     };
-    println!(
-        "Errors of a 20 mm face's diameters along i / j (mm); rows: stretch (mm), columns: depth (mm) (figure 6.4)"
-    );
-    let head: String = depths.iter().map(|d| format!("{:>16.0}", 1e3 * d)).collect();
-    println!("{:>4}{head}", "");
-    for x in &stretches {
-        let cells: Vec<String> = depths
-            .par_iter()
-            .map(|d| match seen(0.02, *x, *d, 64) {
-                Ok(f) => format!("{:>+7.2} / {:>+6.2}", 1e3 * (f.i_m.0 - 0.02), 1e3 * (f.j_m.0 - 0.02)),
-                Err(_) => format!("{:>16}", "no edge"),
-            })
-            .collect();
-        println!("{:>4.0}{}", 1e3 * x, cells.iter().map(|c| format!("{c:>16}")).collect::<String>());
-    }
+    let table = |title: &str, cell: &(dyn Fn(f64, f64) -> String + Sync)| {
+        println!("{title}; rows: stretch (mm), columns: depth (mm)");
+        let head: String = depths.iter().map(|d| format!("{:>17.0}", 1e3 * d)).collect();
+        println!("{:>4}{head}", "");
+        for x in &stretches {
+            let cells: Vec<String> = depths.par_iter().map(|d| format!("{:>17}", cell(*x, *d))).collect();
+            println!("{:>4.0}{}", 1e3 * x, cells.concat());
+        }
+    };
+    table("Errors of a 20 mm face's diameters along i / j (mm)", &|x, d| match face(0.01, x, d) {
+        Ok(f) => format!("{:+.2} / {:+.2}", 1e3 * (f.i_m.0 - 0.02), 1e3 * (f.j_m.0 - 0.02)),
+        Err(_) => "no edge".to_owned(),
+    });
+    table("\nErrors of a 30 mm ball's diameter (mm), and their 95 % half width", &|x, d| match sphere(
+        0.015, x, d,
+    ) {
+        Ok(b) => format!("{:+.2} +- {:.2}", 2e3 * (b.radius_m - 0.015), 3.92e3 * b.radius_sigma_m),
+        Err(_) => "flat".to_owned(),
+    });
     Ok(())
 }
 

@@ -23,6 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             folder: folder.into(),
             json: None,
             html: None,
+            svg: None,
             model: None,
             options: Options::default(),
             threads: 0,

@@ -17,7 +17,7 @@ use hw_traits::rotary::Rotary;
 use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::fake::{AXIA80, FakeWrist, Load, Round};
 use liquid_haptics::viscosity::{Bottle, Regime, Verdict, ViscosityFit};
-use liquid_haptics::volume::{ForceGain, Liquid, MassFit, Pose, VolumeFit, fit_mass};
+use liquid_haptics::volume::{ForceGain, Liquid, MassFit, Pose, Ties, VolumeFit, fit_mass};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench, world_from_body};
 
 const GRASP: Grasp = Grasp {
@@ -80,6 +80,7 @@ fn a_sweep_gives_mass_and_volume_back() {
             departures: Departures::default(),
             liquid: Liquid::from(&felt),
             sigma_nm: None,
+            ties: Ties::NONE,
             widest_share: 0.5,
         };
         let estimate = fit.estimate(&poses).unwrap();

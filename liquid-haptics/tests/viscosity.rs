@@ -69,71 +69,127 @@ fn slosh(bottle: &Bottle, viscosity: f64, amplitude: f64, seconds: f64) -> impl 
     move |t| 0.03 + table[((t / step) as usize).min(table.len() - 1)]
 }
 
-/// The torque (N m) of a film that drains while and after the bottle turns upright at a constant rate: upwind finite volumes in
-/// every strip, gravity's share along the wall growing with the turn. Table of time after the turn and torque.
-fn drain(bottle: &Bottle, viscosity: f64, turn_s: f64, seconds: f64) -> Vec<(f64, f64)> {
-    const STRIPS: usize = 32;
-    const CELLS: usize = 480;
-    let (r, length) = (bottle.radius_m, bottle.length_m);
-    let (mut low, mut high) = (-r, r);
-    let depth_at = |y: f64, chord: f64| {
-        let wall = (r * r - y * y).sqrt();
-        (wall - chord.max(-wall)).max(0.0)
-    };
-    let width = 2.0 * r / STRIPS as f64;
-    let ys: Vec<f64> = (0..STRIPS).map(|j| -r + (j as f64 + 0.5) * width).collect();
-    for _ in 0..60 {
-        let chord = 0.5 * (low + high);
-        let area: f64 = ys.iter().map(|y| depth_at(*y, chord) * width).sum();
-        if area * length > bottle.volume_m3 { low = chord } else { high = chord }
+/// A film's strips along the wall: depth of every cell, and where the strips are (the wall's distance from the axis' plane, width).
+struct Film {
+    walls: Vec<[f64; 2]>,
+    depths: Vec<Vec<f64>>,
+    edges: Vec<f64>,
+    /// Depth of each cell's lower edge less its middle, limited.
+    halves: Vec<Vec<f64>>,
+}
+
+impl Film {
+    /// The prism in which the liquid lies on its side.
+    fn new(bottle: &Bottle) -> Self {
+        const STRIPS: usize = 48;
+        const CELLS: usize = 120;
+        let (r, length) = (bottle.radius_m, bottle.length_m);
+        let step = PI / STRIPS as f64;
+        let wall = |k: usize| r * ((k as f64 + 0.5) * step).sin();
+        let walls: Vec<[f64; 2]> = (0..STRIPS).map(|k| [wall(k), wall(k) * step]).collect();
+        let depth = |wall: f64, chord: f64| (wall - chord.max(-wall)).max(0.0);
+        let (mut low, mut high) = (-r, r);
+        for _ in 0..60 {
+            let chord = 0.5 * (low + high);
+            let area: f64 = walls.iter().map(|[wall, width]| depth(*wall, chord) * width).sum();
+            if area * length > bottle.volume_m3 { low = chord } else { high = chord }
+        }
+        let depths = walls.iter().map(|[wall, _]| vec![depth(*wall, low); CELLS]).collect();
+        // Finer towards the top, where the fan is steep.
+        let edges = (0..=CELLS).map(|i| length * (i as f64 / CELLS as f64).powi(2)).collect();
+        let halves = vec![vec![0.0; CELLS]; STRIPS];
+        Self { walls, depths, edges, halves }
     }
-    let mut film: Vec<Vec<f64>> = ys.iter().map(|y| vec![depth_at(*y, low); CELLS]).collect();
-    // Finer towards the top, where the fan is steep.
-    let edge = |i: usize| length * (i as f64 / CELLS as f64).powi(2);
-    let size: Vec<f64> = (0..CELLS).map(|i| edge(i + 1) - edge(i)).collect();
+
+    fn size(&self, i: usize) -> f64 {
+        self.edges[i + 1] - self.edges[i]
+    }
+
+    /// Slopes by the minmod limiter; nothing is on the wall above the first cell.
+    fn limit(&mut self, wet: usize) {
+        let middle = |i: usize| 0.5 * (self.edges[i] + self.edges[i + 1]);
+        for (strip, halves) in self.depths.iter().zip(&mut self.halves) {
+            let mut before = strip[0] / middle(0);
+            for i in 0..wet {
+                let after = if i + 1 < strip.len() {
+                    (strip[i + 1] - strip[i]) / (middle(i + 1) - middle(i))
+                } else {
+                    before
+                };
+                let slope =
+                    if before * after <= 0.0 { 0.0 } else { before.signum() * before.abs().min(after.abs()) };
+                halves[i] = 0.5 * slope * (self.edges[i + 1] - self.edges[i]);
+                before = after;
+            }
+        }
+    }
+
+    /// One explicit step of second order in space, a share of which is mixed with what was before (Heun's method in two).
+    fn step(&mut self, h: f64, flux: f64, wet: usize, before: Option<&[Vec<f64>]>) {
+        self.limit(wet);
+        let sizes: Vec<f64> = (0..wet).map(|i| self.size(i)).collect();
+        for (k, (strip, halves)) in self.depths.iter_mut().zip(&self.halves).enumerate() {
+            let mut inflow = 0.0;
+            for i in 0..wet {
+                let outflow = flux * (strip[i] + halves[i]).max(0.0).powi(3);
+                strip[i] += h / sizes[i] * (inflow - outflow);
+                inflow = outflow;
+                if let Some(before) = before {
+                    strip[i] = 0.5 * (strip[i] + before[k][i]);
+                }
+            }
+        }
+    }
+
+    /// How many cells the film reaches down to the pool, the last in part, and its moment about the axis.
+    fn above_pool(&mut self, bottle: &Bottle) -> (usize, f64) {
+        let cells = self.edges.len() - 1;
+        self.limit(cells);
+        let disc = PI * bottle.radius_m.powi(2);
+        let (mut above, mut moment) = (0.0, 0.0);
+        for i in 0..cells {
+            let (mut area, mut lever) = (0.0, 0.0);
+            for ((strip, halves), [wall, width]) in self.depths.iter().zip(&self.halves).zip(&self.walls) {
+                area += width * strip[i];
+                lever += width * (wall * strip[i] - 0.5 * (strip[i].powi(2) + halves[i].powi(2) / 3.0));
+            }
+            let (ds, level) = (self.size(i), bottle.length_m - self.edges[i + 1]);
+            if disc * level + above + area * ds < bottle.volume_m3 {
+                let spare = disc * (level + ds) + above - bottle.volume_m3;
+                let part = (spare / ((disc - area) * ds)).clamp(0.0, 1.0);
+                return (i + 1, moment + part * lever * ds);
+            }
+            above += area * ds;
+            moment += lever * ds;
+        }
+        (cells, moment)
+    }
+}
+
+/// The torque (N m) of a film that drains while and after the bottle turns upright at a constant rate: finite volumes of second order
+/// in every strip, gravity's share along the wall growing with the turn. Table of time after the turn and torque.
+fn drain(bottle: &Bottle, viscosity: f64, turn_s: f64, seconds: f64) -> Vec<(f64, f64)> {
+    let mut film = Film::new(bottle);
+    let cells = film.edges.len() - 1;
     let mut now = -turn_s;
     let mut out = Vec::new();
     while now < seconds {
-        // The pool's level: what is not film is pool.
-        let area = |i: usize| film.iter().map(|f| f[i] * width).sum::<f64>();
-        let (mut above, mut moment, mut wet) = (0.0, 0.0, CELLS);
-        for (i, &ds) in size.iter().enumerate() {
-            let level = length - edge(i + 1);
-            let slice = area(i) * ds;
-            if PI * r * r * level + above + slice < bottle.volume_m3 {
-                // The pool begins within this cell.
-                let part = ((PI * r * r * (level + ds) + above - bottle.volume_m3)
-                    / (PI * r * r * ds - slice))
-                    .clamp(0.0, 1.0);
-                moment += part * moment_of(&film, &ys, i, width, r) * ds;
-                wet = i + 1;
-                break;
-            }
-            above += slice;
-            moment += moment_of(&film, &ys, i, width, r) * ds;
-        }
+        let (wet, moment) = film.above_pool(bottle);
         out.push((now, -bottle.mass_kg / bottle.volume_m3 * GRAVITY * moment));
         let angle = if turn_s > 0.0 { 0.5 * PI * (-now / turn_s).clamp(0.0, 1.0) } else { 0.0 };
         let pull = GRAVITY * angle.cos();
-        let pace =
-            film.iter().flat_map(|f| f[..wet].iter().zip(&size)).fold(0.0f64, |a, (d, ds)| a.max(d * d / ds));
-        let step = (0.8 * viscosity / (pull.max(1e-3 * GRAVITY) * pace)).min(0.02);
+        let wet = (wet + 2).min(cells);
+        let pace = (0..wet)
+            .flat_map(|i| film.depths.iter().map(move |d| (d[i], i)))
+            .fold(0.0f64, |most, (depth, i)| most.max(depth * depth / film.size(i)));
+        let step = (0.5 * viscosity / (pull.max(1e-3 * GRAVITY) * pace)).min(0.02);
         let step = if now < 0.0 { step.min(turn_s / 200.0) } else { step };
-        for f in &mut film {
-            let mut inflow = 0.0;
-            for (cell, ds) in f.iter_mut().zip(&size).take(wet) {
-                let outflow = pull * cell.powi(3) / (3.0 * viscosity);
-                *cell += step / ds * (inflow - outflow);
-                inflow = outflow;
-            }
-        }
+        let (before, flux) = (film.depths.clone(), pull / (3.0 * viscosity));
+        film.step(step, flux, wet, None);
+        film.step(step, flux, wet, Some(&before));
         now += step;
     }
     out
-}
-
-fn moment_of(film: &[Vec<f64>], ys: &[f64], i: usize, width: f64, r: f64) -> f64 {
-    film.iter().zip(ys).map(|(f, y)| width * ((r * r - y * y).sqrt() * f[i] - 0.5 * f[i] * f[i])).sum()
 }
 
 fn table(points: Vec<(f64, f64)>) -> impl Fn(f64) -> f64 {
@@ -191,16 +247,30 @@ fn a_slosh_gives_the_viscosity_back() {
 #[test]
 fn a_drain_gives_the_viscosity_back() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
-    let (mut inside, mut all) = (0, 0);
+    let (mut inside, mut all, mut refused) = (0, 0, 0);
     println!("{:>6} {:>6} {:>9} {:>20}", "Pa s", "share", "error", "interval");
-    for (share, turn) in [(0.2, 0.3), (0.4, 0.0), (0.5, 0.5)] {
+    for (share, turn) in [(0.1, 0.2), (0.2, 0.3), (0.4, 0.0), (0.5, 0.5), (0.7, 0.3), (0.9, 0.0)] {
         let bottle = bottle(0.035, 0.172, share, 1400.0);
         for dynamic in [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0] {
             let viscosity = dynamic / 1400.0;
             let signal = table(drain(&bottle, viscosity, turn, 30.0));
-            for _ in 0..2 {
+            for _ in 0..3 {
                 let (t, y) = sensed(&signal, 30.0, &mut rng);
-                let estimate = told(fit(bottle, turn).estimate(&t, &y).unwrap());
+                // Ends that are 1.5 times apart: some 20 % to either side.
+                let fit = ViscosityFit { widest_factor: 1.5, ..fit(bottle, turn) };
+                let estimate = match fit.estimate(&t, &y).unwrap() {
+                    Verdict::Viscosity(estimate) => estimate,
+                    Verdict::Refused(why) => {
+                        println!("{dynamic:>6} {share:>6}   refused: {why:?}");
+                        assert!(
+                            matches!(why, Refusal::TooNoisy { .. } | Refusal::NothingMoves { .. }),
+                            "{why:?}"
+                        );
+                        assert!(share > 0.5, "{dynamic} {share}: {why:?}");
+                        refused += 1;
+                        continue;
+                    }
+                };
                 assert!(matches!(estimate.regime, Regime::Draining { .. }), "{dynamic} {estimate:?}");
                 let error = estimate.dynamic_pa_s / dynamic - 1.0;
                 let [low, high] = estimate.interval_m2_s.map(|nu| nu * 1400.0);
@@ -211,9 +281,9 @@ fn a_drain_gives_the_viscosity_back() {
             }
         }
     }
-    println!("{inside} of {all} inside their 95 % intervals");
-    // The finite volumes themselves are 1 % high.
-    assert!(inside * 100 >= all * 70, "{inside} of {all}");
+    println!("{inside} of {all} inside their 95 % intervals, {refused} refused");
+    assert!(refused <= 42, "{refused}");
+    assert!(inside * 100 >= all * 91, "{inside} of {all}");
 }
 
 /// What the readings do not tell is refused, and why.

@@ -31,6 +31,9 @@ enum Command {
         /// Write the report as one HTML page as well.
         #[arg(long, value_name = "FILE")]
         html: Option<PathBuf>,
+        /// Write a picture of where it misses most as SVG as well.
+        #[arg(long, value_name = "FILE")]
+        svg: Option<PathBuf>,
         /// Write the repaired model as well, for `predict`.
         #[arg(long, value_name = "FILE")]
         write_model: Option<PathBuf>,
@@ -124,9 +127,10 @@ impl Drop for Bar {
 
 fn run(command: Command) -> Result<String, CommandError> {
     match command {
-        Command::Diagnose { folder, json, html, write_model, seed, threads, alpha } => {
+        Command::Diagnose { folder, json, html, svg, write_model, seed, threads, alpha } => {
             let options = Options { alpha, seed, ..Options::default() };
-            let arguments = DiagnoseArguments { folder, json, html, model: write_model, options, threads };
+            let arguments =
+                DiagnoseArguments { folder, json, html, svg, model: write_model, options, threads };
             commands::diagnose(&arguments, &Bar::new())
         }
         Command::Predict { model, folder, csv } => commands::predict(&model, &folder, csv.as_deref()),

@@ -1,6 +1,6 @@
 //! What touches: a ball's radius, a face's plane, a flat face's diameters along both axes.
 
-use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
 use crate::cloud::Cloud;
 use crate::segment::State;
@@ -40,6 +40,9 @@ pub enum ContactError {
     },
 }
 
+/// Tukey's biweight is 95 % efficient with this cut, in standard deviations.
+const TUKEY: f64 = 4.685;
+
 /// A ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ball {
@@ -77,7 +80,7 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
     for _ in 0..30 {
         let off: Vec<f64> = own.iter().map(|p| (p - centre).norm() - radius).collect();
         let scatter = spread(&off);
-        let cut = 4.685 * scatter.max(1e-9);
+        let cut = TUKEY * scatter.max(1e-9);
         let (mut gram, mut right, mut weight, mut square) = (Matrix4::zeros(), Vector4::zeros(), 0.0, 0.0);
         for (p, r) in own.iter().zip(&off) {
             let w = (1.0 - (r / cut).powi(2)).max(0.0).powi(2);
@@ -157,6 +160,109 @@ fn spread(off: &[f64]) -> f64 {
 pub fn points(cloud: &Cloud, states: &[State]) -> Vec<[f64; 3]> {
     let touching = states.iter().enumerate().filter(|(_, s)| **s == State::Contact);
     touching.filter_map(|(i, _)| cloud.raw_point(i)).collect()
+}
+
+/// The ball that touches, fitted with the flank beside it.
+///
+/// A contact's edge is blurred by the smoothing that found it, and the flank that is let in flattens a small ball. So the edge is
+/// fitted too: within a distance a of the axis, heights are the ball's; beyond it the free membrane goes on with the ball's slope
+/// and falls like the logarithm of the distance, `h(rho) = h(a) + a h'(a) ln(rho / a)`.
+///
+/// # Errors
+/// [`ContactError`].
+pub fn cap(cloud: &Cloud, states: &[State]) -> Result<Ball, ContactError> {
+    let touching = points(cloud, states);
+    let whole = ball(&touching)?;
+    let axis = [whole.centre_m[0], whole.centre_m[1]];
+    let from_axis = |p: &[f64; 3]| (p[0] - axis[0]).hypot(p[1] - axis[1]);
+    let mut distances: Vec<f64> = touching.iter().map(from_axis).collect();
+    let outer = distances.len() * 9 / 10;
+    let rough = *distances.select_nth_unstable_by(outer, f64::total_cmp).1;
+    let all = (0..states.len()).filter_map(|i| cloud.raw_point(i));
+    let near: Vec<[f64; 3]> = all.filter(|p| from_axis(p) < FLANK * rough).collect();
+    Ok(Cap::start(&whole, rough).fit(&near).unwrap_or(whole))
+}
+
+/// How far the flank is looked at, of the contact's rough radius: near the edge a membrane of any tensions and frame is alike.
+const FLANK: f64 = 1.2;
+
+/// A ball in a membrane: axis, the top's distance from the lens, radius, edge; m.
+#[derive(Debug, Clone, Copy)]
+struct Cap(SVector<f64, 7>);
+
+impl Cap {
+    fn start(ball: &Ball, rough: f64) -> Self {
+        let [x, y, z] = ball.centre_m;
+        let edge = (0.7 * rough).min(0.7 * ball.radius_m);
+        Self([x, y, z - ball.radius_m, ball.radius_m, edge, 0.0, 0.0].into())
+    }
+
+    /// Distance of the membrane from the lens at a place, and its derivatives.
+    fn distance(&self, x: f64, y: f64) -> (f64, SVector<f64, 7>) {
+        let [x0, y0, top, radius, edge, even, odd] = self.0.into();
+        let (dx, dy) = (x - x0, y - y0);
+        let rho = dx.hypot(dy).max(1e-9);
+        let held = rho.min(edge);
+        let w = (radius * radius - held * held).sqrt();
+        let beyond = (rho / held).ln();
+        let (bend, turn) = (edge * edge / w, (dx * dx - dy * dy) / (rho * rho));
+        let curve = even + odd * turn;
+        let fall = beyond + curve * beyond * beyond;
+        let z = top + radius - w + bend * fall;
+        let by_rho = (held * held / w) * (1.0 + 2.0 * curve * beyond) / rho;
+        let cubed = edge * edge / (w * w * w);
+        let by_radius = 1.0 - radius / w - cubed * radius * fall;
+        let by_edge = if rho > edge {
+            edge / w + (2.0 + edge * edge / (w * w)) * edge / w * fall
+                - bend * (1.0 + 2.0 * curve * beyond) / edge
+        } else {
+            0.0
+        };
+        let flank = bend * beyond * beyond;
+        let slopes = [-by_rho * dx / rho, -by_rho * dy / rho, 1.0, by_radius, by_edge, flank, flank * turn];
+        (z, slopes.into())
+    }
+
+    /// Gauss-Newton with Tukey's weights; none where it does not settle within the contact.
+    fn fit(mut self, near: &[[f64; 3]]) -> Option<Ball> {
+        for _ in 0..60 {
+            let rows: Vec<(f64, SVector<f64, 7>)> = near
+                .iter()
+                .map(|p| {
+                    let (z, slope) = self.distance(p[0], p[1]);
+                    (p[2] - z, slope)
+                })
+                .collect();
+            let off: Vec<f64> = rows.iter().map(|r| r.0).collect();
+            let scatter_m = spread(&off);
+            let cut = TUKEY * scatter_m.max(1e-9);
+            let (mut gram, mut right) = (SMatrix::<f64, 7, 7>::zeros(), SVector::<f64, 7>::zeros());
+            let (mut weight, mut square) = (0.0, 0.0);
+            for (r, slope) in &rows {
+                let w = (1.0 - (r / cut).powi(2)).max(0.0).powi(2);
+                gram += w * slope * slope.transpose();
+                right += w * *r * slope;
+                weight += w;
+                square += w * r * r;
+            }
+            let inverse = gram.try_inverse()?;
+            let step = inverse * right;
+            // Radius and edge by a quarter at most, so that the edge stays inside the ball.
+            let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(1.0, f64::min);
+            self.0 += part * step;
+            let [x, y, top, radius_m, edge, ..] = <[f64; 7]>::from(self.0);
+            if !(radius_m.is_finite() && radius_m > 0.0 && edge > 0.05 * radius_m && edge < 0.97 * radius_m) {
+                return None;
+            }
+            if step.fixed_rows::<5>(0).norm() < 1e-8 * radius_m {
+                let radius_sigma_m = (inverse[(3, 3)] * square / (weight - 7.0).max(1.0)).sqrt();
+                let settled = radius_m > 3.0 * radius_sigma_m;
+                let centre_m = [x, y, top + radius_m];
+                return settled.then_some(Ball { centre_m, radius_m, radius_sigma_m, scatter_m });
+            }
+        }
+        None
+    }
 }
 
 /// Diameters of a flat round face.

@@ -11,7 +11,7 @@ use hw_traits::gripper::Gripper;
 use hw_traits::{Error, ErrorKind};
 
 use crate::cloud::{Cloud, CloudError, CloudSettings, Rest, Window};
-use crate::contact::{Ball, ContactError, ball, points};
+use crate::contact::{Ball, ContactError, cap};
 use crate::force::{ForceError, Load, Seen, indentation_m, load};
 use crate::modulus::Surface;
 use crate::segment::{SegmentSettings, Segmenter};
@@ -329,7 +329,7 @@ impl Eyes {
                 .fill(&picture, &rig.intrinsics(), &rest, window, &programme.cloud)
                 .map_err(PalpateError::Cloud)?;
             let states = self.segmenter.segment(&self.cloud, &programme.segment);
-            let touching = ball(&points(&self.cloud, states)).map_err(PalpateError::Contact)?;
+            let touching = cap(&self.cloud, states).map_err(PalpateError::Contact)?;
             apexes.push(rest.distance_m - (touching.centre_m[2] - touching.radius_m));
             balls.push(touching);
         }

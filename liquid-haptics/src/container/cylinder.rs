@@ -105,7 +105,7 @@ impl Cylinder {
             return (std::f64::consts::PI * radius * radius * height_m / cos).min(capacity);
         }
         let delta = above_lowest / (radius * sin);
-        radius.powi(3) * Tilted::new(length / radius, sin, cos).volume(delta).0
+        radius.powi(3) * Tilted::new(length / radius, sin, cos).volume(delta)[0]
     }
 }
 
@@ -120,7 +120,7 @@ impl Container for Cylinder {
         if !(volume_m3 >= 0.0 && volume_m3 <= capacity_m3 * (1.0 + 1e-12)) {
             return Err(ContainerError::Volume { got_m3: volume_m3, capacity_m3 });
         }
-        let sin = up.x.hypot(up.y);
+        let sin = (up.x * up.x + up.y * up.y).sqrt();
         let (sideways, along, height) = self.settle(sin, up.z, volume_m3.min(capacity_m3));
         // The lower side is where up does not point.
         let (lower_x, lower_y) = if sin > 0.0 { (-up.x / sin, -up.y / sin) } else { (1.0, 0.0) };

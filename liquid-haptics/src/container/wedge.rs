@@ -9,13 +9,16 @@
 //! * `E1 = 2 int_0^alpha (cos phi - cos alpha) (1 - cos phi) sin^2 phi` (moment about the lowest line of the wall).
 //!
 //! Thesis section 2.3 and appendix A.2 have the same wedges as four cases, each 0/0 where the tilt or the volume vanish. Here
-//! small segments are power series, and two angles that nearly agree (a cylinder nearly on its side) are an average over the
-//! slices between them; both to rounding.
+//! small segments are power series, and two angles that nearly agree (a cylinder nearly on its side) are Taylor's series about the
+//! slice in the middle; both to rounding.
 
 /// Angles below this one have their functions as series.
 const SERIES_BELOW: f64 = 1.0;
-/// Where the nearer wedge is at least this share of the farther one, slices are averaged.
-const NEARLY_ALIKE: f64 = 0.85;
+/// Where the surface moves sideways by at most this share of its place at the bottom, slices are summed about the middle one: the
+/// first term left out is below rounding.
+const NEARLY_ALIKE: f64 = 0.06;
+/// Householder's step of third order leaves the fourth power of a change this small: nothing.
+const CLOSE: f64 = 1e-4;
 
 /// Functions of a segment's angle.
 #[derive(Debug, Clone, Copy)]
@@ -26,9 +29,14 @@ struct Segment {
     delta: f64,
 }
 
-fn series(alpha: f64, power: i32, coefficients: &[f64; 10]) -> f64 {
-    let square = alpha * alpha;
-    alpha.powi(power) * coefficients.iter().rev().fold(0.0, |sum, c| sum * square + c)
+/// `alpha^power` times a polynomial in `alpha^2`, its terms paired so that they do not wait for each other (Estrin 1960).
+#[inline]
+fn series(alpha: f64, power: i32, c: &[f64; 10]) -> f64 {
+    let x = alpha * alpha;
+    let (x2, x4) = (x * x, x * x * x * x);
+    let low = (c[0] + c[1] * x) + x2 * (c[2] + c[3] * x);
+    let middle = (c[4] + c[5] * x) + x2 * (c[6] + c[7] * x);
+    alpha.powi(power) * (low + x4 * (middle + x4 * (c[8] + c[9] * x)))
 }
 
 impl Segment {
@@ -150,15 +158,53 @@ impl Segment {
     }
 }
 
-/// Gauss-Legendre nodes and weights on [0, 1], 6 points (Abramowitz and Stegun 1964, table 25.4).
-const NODES: [(f64, f64); 6] = [
-    (0.033_765_242_898_423_975, 0.085_662_246_189_585_17),
-    (0.169_395_306_766_867_76, 0.180_380_786_524_069_3),
-    (0.380_690_406_958_401_5, 0.233_956_967_286_345_53),
-    (0.619_309_593_041_598_5, 0.233_956_967_286_345_53),
-    (0.830_604_693_233_132_3, 0.180_380_786_524_069_3),
-    (0.966_234_757_101_576, 0.085_662_246_189_585_17),
-];
+/// Slices of a cylinder nearly on its side, by Taylor's series about the middle one in half the surface's sideways move `d`.
+///
+/// With `e = d^2 / sin^4` of the middle angle all even terms of area and moment are the middle slice's plus powers of `e`.
+struct Slices {
+    middle: Segment,
+    half: f64,
+    e: f64,
+}
+
+impl Slices {
+    fn new(delta: f64, shift: f64) -> Self {
+        let middle = Segment::of_delta(delta - 0.5 * shift);
+        let half = 0.5 * shift;
+        let root = half / (middle.sin * middle.sin);
+        Self { middle, half, e: root * root }
+    }
+
+    /// Mean area of the slices.
+    fn area(&self) -> f64 {
+        let (c, s, e) = (self.middle.cos(), self.middle.sin, self.e);
+        let more = 1.0 / 3.0 + e * (1.0 / 20.0 + e * (3.0 + 4.0 * c * c) / 168.0);
+        self.middle.area() + c * s * s * s * e * more
+    }
+
+    /// Mean of the areas' derivatives by delta: the first, and two more to leading order.
+    fn slopes(&self) -> [f64; 3] {
+        let (c, s, e) = (self.middle.cos(), self.middle.sin, self.e);
+        let square = c * c;
+        let less = 1.0 / 3.0
+            + e * ((1.0 + 4.0 * square) / 20.0 + e * (1.0 + 12.0 * square + 8.0 * square * square) / 56.0);
+        [s * (2.0 - e * less), c / s * (2.0 + e), -2.0 / (s * s * s)]
+    }
+
+    /// Mean moment of the slices about the lowest line of the wall.
+    fn moment(&self) -> f64 {
+        let (c, s, e) = (self.middle.cos(), self.middle.sin, self.e);
+        let near = 1.0 / (1.0 + c);
+        let more = (2.0 - near) / 3.0 - e * near * (1.0 / 20.0 + e * (4.0 * c * c - 2.0 * c + 1.0) / 168.0);
+        self.middle.moment() + s.powi(5) * e * more
+    }
+
+    /// Mean of the areas times their place along the axis (-1/2 at the bottom, 1/2 at the lid).
+    fn along(&self) -> f64 {
+        let (c, s, e) = (self.middle.cos(), self.middle.sin, self.e);
+        -self.half * s * (1.0 / 3.0 - e * (1.0 / 30.0 + e * (1.0 + 4.0 * c * c) / 280.0))
+    }
+}
 
 /// A tilted cylinder of unit radius.
 #[derive(Debug, Clone, Copy)]
@@ -169,7 +215,7 @@ pub(super) struct Tilted {
     tangent: f64,
 }
 
-/// Volume and the centre of mass's distances from the lowest line of the wall and from the bottom.
+/// The centre of mass's distances from the lowest line of the wall and from the bottom.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sums {
     pub(super) from_wall: f64,
@@ -182,43 +228,61 @@ impl Tilted {
         Self { length, shift: length * cos / sin, tangent: sin / cos.max(f64::MIN_POSITIVE) }
     }
 
-    /// The wedges at bottom and lid; the second is empty where the surface does not reach the lid.
-    fn ends(&self, delta: f64) -> (Segment, Segment) {
-        (Segment::of_delta(delta), Segment::of_delta((delta - self.shift).max(0.0)))
+    fn alike(&self, delta: f64) -> bool {
+        self.shift < NEARLY_ALIKE * delta
     }
 
-    /// Volume of the liquid whose surface meets the bottom at `x = 1 - delta`, and its derivative by `delta`.
-    pub(super) fn volume(&self, delta: f64) -> (f64, f64) {
-        let (near, far) = self.ends(delta);
-        let (k0, k1) = (near.k0(), far.k0());
-        if k1 > NEARLY_ALIKE * k0 {
-            let slices = |of: fn(&Segment) -> f64| -> f64 {
-                NODES.iter().map(|(t, w)| w * of(&Segment::of_delta(delta - self.shift * t))).sum()
-            };
-            return (self.length * slices(Segment::area), self.length * slices(|s| 2.0 * s.sin));
+    /// The segment at the lid, where the surface reaches it.
+    fn far(&self, delta: f64) -> Option<Segment> {
+        (delta > self.shift).then(|| Segment::of_delta(delta - self.shift))
+    }
+
+    /// Volume of the liquid whose surface meets the bottom at `x = 1 - delta`, and its derivatives by `delta`.
+    pub(super) fn volume(&self, delta: f64) -> [f64; 4] {
+        if self.alike(delta) {
+            let slices = Slices::new(delta, self.shift);
+            let [first, second, third] = slices.slopes();
+            return [slices.area(), first, second, third].map(|v| self.length * v);
         }
-        (self.tangent * (k0 - k1), self.tangent * (near.area() - far.area()))
+        let of = |s: &Segment| [s.k0(), s.area(), 2.0 * s.sin, 2.0 * s.cos() / s.sin];
+        let mut sums = of(&Segment::of_delta(delta));
+        if let Some(far) = self.far(delta) {
+            sums.iter_mut().zip(of(&far)).for_each(|(near, far)| *near -= far);
+        }
+        sums.map(|v| self.tangent * v)
     }
 
-    /// The `delta` of a volume, by Newton's method in logarithms, between brackets.
+    /// A `delta` of a volume to some per cent: the leading powers of a wedge (of a prism, where the surface reaches the lid) with
+    /// their next terms; those that no expansion gives are fitted at `delta` of 1 and 2.
+    fn guess(&self, volume: f64) -> f64 {
+        let w = (15.0 / 128f64.sqrt() * volume / self.tangent).powf(0.4);
+        let wedge = w * (1.0 + w * (3.0 / 70.0 + w * (2.7e-3 + w * 8.2e-3)));
+        if wedge <= self.shift {
+            return wedge;
+        }
+        let p = (3.0 / 32f64.sqrt() * volume / self.length).cbrt().powi(2);
+        let middle = p * (1.0 + p * (0.1 + p * 0.052));
+        middle + 0.5 * self.shift - self.shift * self.shift / (48.0 * middle)
+    }
+
+    /// The `delta` of a volume by Householder's method of third order, between brackets.
     pub(super) fn delta_of(&self, volume: f64) -> f64 {
-        // Both bounds on the volume (no lid; all slices like the lowest one) give a delta that is too small.
-        let wedge = (7.5 * volume / self.tangent).powf(0.4) * 0.5;
-        let prism = (1.5 * volume / self.length).powf(2.0 / 3.0) * 0.5;
-        let mut delta = wedge.max(prism).clamp(f64::MIN_POSITIVE, 2.0);
         let (mut low, mut high) = (0.0, 2.0);
-        for _ in 0..60 {
-            let (value, slope) = self.volume(delta);
-            if value < volume {
+        let mut delta = self.guess(volume).clamp(f64::MIN_POSITIVE, 2.0 - 1e-9);
+        for _ in 0..80 {
+            let [value, f1, f2, f3] = self.volume(delta);
+            let f = value - volume;
+            if f < 0.0 {
                 low = delta;
             } else {
                 high = delta;
             }
-            let power = delta * slope / value;
-            let next = delta * ((volume / value).ln() / power).exp();
+            let step = -f * (f1 * f1 - 0.5 * f * f2) / (f1 * (f1 * f1 - f * f2) + f * f * f3 / 6.0);
+            let next = delta + step;
             let next = if next >= low && next <= high { next } else { 0.5 * (low + high) };
-            // Convergence is quadratic: what is close now is exact after this step.
-            let close = (next - delta).abs() <= 1e-8 * delta;
+            // Third derivatives are singular where the surface meets an edge.
+            let edge = delta.min(2.0 - delta).min((delta - self.shift).abs());
+            let close = (next - delta).abs() <= (CLOSE * edge).max(1e-9 * delta);
             delta = next;
             if close {
                 break;
@@ -229,23 +293,23 @@ impl Tilted {
 
     /// The centre of mass of the liquid whose surface meets the bottom at `x = 1 - delta`.
     pub(super) fn center(&self, delta: f64) -> Sums {
-        let (near, far) = self.ends(delta);
-        let (k0, k1) = (near.k0(), far.k0());
-        if k1 > NEARLY_ALIKE * k0 {
-            let (mut area, mut moment, mut height) = (0.0, 0.0, 0.0);
-            for (t, w) in NODES {
-                let slice = Segment::of_delta(delta - self.shift * t);
-                let wet = w * slice.area();
-                area += wet;
-                height += wet * t;
-                moment += w * slice.moment();
-            }
-            return Sums { from_wall: moment / area, from_bottom: self.length * height / area };
+        if self.alike(delta) {
+            let slices = Slices::new(delta, self.shift);
+            let area = slices.area();
+            return Sums {
+                from_wall: slices.moment() / area,
+                from_bottom: self.length * (0.5 + slices.along() / area),
+            };
         }
-        let volume = k0 - k1;
-        Sums {
-            from_wall: (near.e1() - far.e1()) / volume,
-            from_bottom: self.tangent * (near.k2() - far.k2() - self.shift * k1) / volume,
+        let of = |s: &Segment| [s.k0(), s.e1(), s.k2()];
+        let mut sums = of(&Segment::of_delta(delta));
+        let mut lid = 0.0;
+        if let Some(far) = self.far(delta) {
+            let far = of(&far);
+            lid = self.shift * far[0];
+            sums.iter_mut().zip(far).for_each(|(near, far)| *near -= far);
         }
+        let [volume, wall, bottom] = sums;
+        Sums { from_wall: wall / volume, from_bottom: self.tangent * (bottom - lid) / volume }
     }
 }

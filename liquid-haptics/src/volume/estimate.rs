@@ -2,7 +2,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 use super::profile::{Mass, Profile};
 use super::valleys::{Grid, Valley};
-use super::{Candidate, Cause, Liquid, Pose, Verdict, VolumeError, VolumeEstimate, checked};
+use super::{Candidate, Cause, Liquid, Pose, Ties, Verdict, VolumeError, VolumeEstimate, checked};
 use crate::container::Container;
 use crate::wrench::{Departures, Grasp};
 
@@ -31,6 +31,8 @@ pub struct VolumeFit<'a> {
     pub liquid: Liquid,
     /// The torque's noise, N m; estimated from the residuals where it is absent.
     pub sigma_nm: Option<f64>,
+    /// How the torque's errors at successive poses are tied; the poses are then to be in the order in which they were felt.
+    pub ties: Ties,
     /// An interval wider than this share of the capacity leaves the volume open (0 to 1; a half is usual).
     pub widest_share: f64,
 }
@@ -43,7 +45,7 @@ impl VolumeFit<'_> {
     /// [`VolumeError::NegativeMass`], [`VolumeError::Search`], and the container's.
     pub fn estimate(&self, poses: &[Pose]) -> Result<VolumeEstimate, VolumeError> {
         self.check(poses)?;
-        let profile = Profile::new(self.container, &self.grasp, &self.departures, poses)?;
+        let profile = Profile::new(self.container, &self.grasp, &self.departures, self.ties, poses)?;
         let grid = Grid::new(&profile)?;
         let (sigma_nm, freedom) = match self.sigma_nm {
             Some(sigma) => (sigma, None),

@@ -9,12 +9,14 @@ mod estimate;
 mod mass;
 mod next;
 mod profile;
+mod ties;
 mod valleys;
 
 pub use error::VolumeError;
 pub use estimate::VolumeFit;
 pub use mass::{ForceGain, MassEstimate, MassFit, fit_mass};
 pub use next::NextTilt;
+pub use ties::Ties;
 
 use crate::wrench::PlanarWrench;
 

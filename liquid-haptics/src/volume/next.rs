@@ -52,6 +52,8 @@ impl VolumeFit<'_> {
     /// estimate's interval; where separate volumes explain the poses, the one among those that tell them apart, or else
     /// the one at which their torques differ most.
     ///
+    /// Ties between poses are left out here.
+    ///
     /// # Errors
     /// [`VolumeError::NothingToLearn`] where no torque depends on the volume, and as [`VolumeFit::estimate`].
     pub fn next_tilt(
@@ -64,7 +66,7 @@ impl VolumeFit<'_> {
         if steps == 0 {
             return Err(VolumeError::TooFew { what: "steps", got: 0, least: 1 });
         }
-        let profile = Profile::new(self.container, &self.grasp, &self.departures, poses)?;
+        let profile = Profile::new(self.container, &self.grasp, &self.departures, self.ties, poses)?;
         let capacity = profile.capacity_m3();
         let [low, high] = estimate.interval_m3.map(|v| v / capacity);
         let mut shares: Vec<f64> =

@@ -1,6 +1,8 @@
 //! The misfit of all poses as a function of the volume, the mass profiled out.
 
-use super::{Liquid, Pose};
+use nalgebra::DMatrix;
+
+use super::{Liquid, Pose, Ties};
 use crate::container::{Container, ContainerError};
 use crate::wrench::{Departures, Grasp};
 
@@ -42,8 +44,9 @@ pub(super) struct Profile<'a> {
     tilts: Vec<f64>,
     /// Torque of everything but the liquid, N m.
     shell: Vec<f64>,
-    /// Measured torque less that, N m.
+    /// Measured torque less that, N m; made independent where errors are tied.
     excess: Vec<f64>,
+    triangle: Option<DMatrix<f64>>,
 }
 
 impl<'a> Profile<'a> {
@@ -51,6 +54,7 @@ impl<'a> Profile<'a> {
         container: &'a dyn Container,
         grasp: &'a Grasp,
         departures: &'a Departures,
+        ties: Ties,
         poses: &[Pose],
     ) -> Result<Self, ContainerError> {
         let tilts: Vec<f64> = poses.iter().map(|p| p.tilt_rad).collect();
@@ -61,6 +65,7 @@ impl<'a> Profile<'a> {
             capacity_m3: container.capacity_m3(),
             shell: Vec::with_capacity(tilts.len()),
             excess: Vec::with_capacity(tilts.len()),
+            triangle: ties.triangle(tilts.len()),
             tilts,
         };
         for pose in poses {
@@ -68,6 +73,9 @@ impl<'a> Profile<'a> {
             profile.shell.push(shell);
             profile.excess.push(pose.wrench.tau_z_nm - shell);
         }
+        let mut excess = std::mem::take(&mut profile.excess);
+        profile.free(&mut excess);
+        profile.excess = excess;
         Ok(profile)
     }
 
@@ -89,10 +97,22 @@ impl<'a> Profile<'a> {
         Ok(self.torque(tilt_rad, 1.0, share)? - self.torque(tilt_rad, 0.0, share)?)
     }
 
-    /// Torques of a kilogram of the liquid at all poses, N m / kg.
+    /// Makes values of all poses whose errors are tied those of poses with errors of their own.
+    fn free(&self, values: &mut [f64]) {
+        let Some(l) = &self.triangle else { return };
+        for i in 0..values.len() {
+            let tied: f64 = (0..i).map(|j| l[(i, j)] * values[j]).sum();
+            values[i] = (values[i] - tied) / l[(i, i)];
+        }
+    }
+
+    /// Torques of a kilogram of the liquid at all poses, N m / kg; made independent as the excess is.
     pub(super) fn levers(&self, share: f64) -> Result<Vec<f64>, ContainerError> {
         let pairs = self.tilts.iter().zip(&self.shell);
-        pairs.map(|(tilt, shell)| Ok(self.torque(*tilt, 1.0, share)? - shell)).collect()
+        let lever = |(tilt, shell): (&f64, &f64)| Ok(self.torque(*tilt, 1.0, share)? - shell);
+        let mut levers = pairs.map(lever).collect::<Result<Vec<f64>, ContainerError>>()?;
+        self.free(&mut levers);
+        Ok(levers)
     }
 
     /// The mass (kg) that fits best.

@@ -2,7 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "not every test needs all; a test stops where it fails")]
 
 use liquid_haptics::container::Cylinder;
-use liquid_haptics::volume::{Liquid, Pose, VolumeEstimate, VolumeFit};
+use liquid_haptics::volume::{Liquid, Pose, Ties, VolumeEstimate, VolumeFit};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -70,7 +70,15 @@ pub(crate) fn bottle() -> Cylinder {
 }
 
 pub(crate) fn fit<'a>(container: &'a Cylinder, liquid: Liquid, sigma_nm: Option<f64>) -> VolumeFit<'a> {
-    VolumeFit { container, grasp: GRASP, departures: NONE, liquid, sigma_nm, widest_share: 0.5 }
+    VolumeFit {
+        container,
+        grasp: GRASP,
+        departures: NONE,
+        liquid,
+        sigma_nm,
+        ties: Ties::NONE,
+        widest_share: 0.5,
+    }
 }
 
 pub(crate) fn exact(mass_kg: f64) -> Liquid {

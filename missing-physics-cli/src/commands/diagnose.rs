@@ -19,6 +19,8 @@ pub struct DiagnoseArguments {
     pub json: Option<PathBuf>,
     /// Where the page goes.
     pub html: Option<PathBuf>,
+    /// Where the picture goes.
+    pub svg: Option<PathBuf>,
     /// Where the repaired model goes.
     pub model: Option<PathBuf>,
     /// Seed and false-alarm rate.
@@ -32,7 +34,7 @@ pub struct DiagnoseArguments {
 /// # Errors
 /// [`CommandError`]; nothing is written then.
 pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<String, CommandError> {
-    for path in arguments.json.iter().chain(&arguments.html).chain(&arguments.model) {
+    for path in arguments.json.iter().chain(&arguments.html).chain(&arguments.svg).chain(&arguments.model) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
             return Err(CommandError::Other(format!("{}: no such folder to write to", folder.display())));
@@ -70,6 +72,9 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
     }
     if let Some(path) = &arguments.html {
         write_whole(path, &report::html(&diagnosis, &context))?;
+    }
+    if let Some(path) = &arguments.svg {
+        write_whole(path, &report::picture(&diagnosis))?;
     }
     if let Some(path) = &arguments.model {
         write_whole(path, &Repair::new(domain, &diagnosis).to_json())?;

@@ -10,7 +10,7 @@ use super::key::word;
 use super::score::{DomainScore, Score};
 use super::table::MEASURES;
 use super::world::Judged;
-use crate::report::page::{Chart, STYLE, Series, escape};
+use crate::report::page::{CHART_STYLE, Chart, STYLE, Series, escape};
 
 /// Worlds that are shown.
 const SHOWN: usize = 10;
@@ -18,7 +18,7 @@ const SHOWN: usize = 10;
 /// The page.
 pub(super) fn page(score: &Score, judged: &[Judged], seal: &str, seed: u64) -> String {
     let mut page = format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>The proof</title><style>{STYLE}.heat td{{text-align:center;border:1px solid var(--line);padding:.25rem .4rem}}.heat th{{font-weight:400;font-size:.85rem}}</style></head><body><h1>Concealed effects: how often the tool is right, wrong and silent</h1><p class=\"note\">{} worlds, seed {seed}. Answers sealed before any diagnosis: SHA-256 <code>{seal}</code> of keys.jsonl.</p>",
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>The proof</title><style>{CHART_STYLE}{STYLE}.heat td{{text-align:center;border:1px solid var(--line);padding:.25rem .4rem}}.heat th{{font-weight:400;font-size:.85rem}}</style></head><body><h1>Concealed effects: how often the tool is right, wrong and silent</h1><p class=\"note\">{} worlds, seed {seed}. Answers sealed before any diagnosis: SHA-256 <code>{seal}</code> of keys.jsonl.</p>",
         judged.len()
     );
     page.push_str(&scores(score));

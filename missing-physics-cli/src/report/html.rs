@@ -7,19 +7,16 @@ use missing_physics::diagnosis::{Diagnosis, Verdict};
 use super::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::plots;
-use super::svg::escape;
+use super::svg::{CHART_STYLE, escape};
 use super::text::{headline, law_kind, noise_sentence, where_sentence};
 
 pub(crate) const STYLE: &str = "
-:root{--ink:#1c2430;--paper:#fff;--soft:#5b6675;--line:#dde2e8;--data:#8a94a3;--before:#c2410c;--after:#0369a1;--shade:#f59e0b33;--band:#0369a114;--card:#f6f8fa}
-@media(prefers-color-scheme:dark){:root{--ink:#e6eaf0;--paper:#12161c;--soft:#9aa6b5;--line:#2b333d;--data:#8793a3;--before:#fb923c;--after:#38bdf8;--shade:#f59e0b2e;--band:#38bdf81c;--card:#1a2028}}
 *{box-sizing:border-box}body{margin:0 auto;max-width:1020px;padding:2rem 1.2rem 4rem;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)}
 h1{font-size:1.6rem;line-height:1.25;margin:.2rem 0 1rem}h2{font-size:1.15rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--line);padding-bottom:.2rem}h3{font-size:1rem;margin:1.2rem 0 .3rem}
 .kicker,.note,figcaption{color:var(--soft);font-size:.88rem}.verdict{display:inline-block;padding:.1rem .6rem;border-radius:1rem;background:var(--after);color:var(--paper);font-weight:600;font-size:.85rem}
 .verdict.unexplained{background:var(--before)}table{border-collapse:collapse;margin:.4rem 0;width:100%;font-size:.93rem}th,td{text-align:left;padding:.3rem .7rem .3rem 0;border-bottom:1px solid var(--line);vertical-align:top}th{font-weight:600}
 .num{font-variant-numeric:tabular-nums}.charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(340px,1fr));gap:.6rem}figure{margin:0;background:var(--card);border-radius:.5rem;padding:.3rem}
-svg{width:100%;height:auto;display:block}svg text{font:11px system-ui,sans-serif;fill:var(--soft)}svg .t{font-weight:600;font-size:12px;fill:var(--ink)}.grid{stroke:var(--line);stroke-width:.7}
-polyline{fill:none;stroke-width:1.6}polyline.before{stroke:var(--before);stroke-dasharray:5 3}polyline.after{stroke:var(--after)}g.data{fill:var(--data)}g.before{fill:var(--before)}g.after{fill:var(--after)}.shade{fill:var(--shade)}.band{fill:var(--band)}
+svg{width:100%;height:auto;display:block}
 .key span{margin-right:1.2rem}.key i{display:inline-block;width:1.4rem;height:.22rem;vertical-align:middle;margin-right:.35rem}.bars th{width:14rem;font-weight:400}.track{width:45%}.bar{height:.8rem;border-radius:.2rem;background:var(--data);min-width:2px}.bar.chosen{background:var(--after)}
 ul{margin:.3rem 0;padding-left:1.2rem}code{font-size:.92em}@media print{body{max-width:none;padding:0}figure{break-inside:avoid}}
 ";
@@ -31,7 +28,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     // Writing to a string cannot fail.
     let _ = write!(
         page,
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0}: {word}</title><style>{STYLE}</style></head><body><p class=\"kicker\">{0} &#183; {1} &#183; {2} runs</p><p><span class=\"verdict {word}\">{word}</span></p><h1>{3}</h1>",
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0}: {word}</title><style>{CHART_STYLE}{STYLE}</style></head><body><p class=\"kicker\">{0} &#183; {1} &#183; {2} runs</p><p><span class=\"verdict {word}\">{word}</span></p><h1>{3}</h1>",
         escape(&context.title),
         escape(&context.domain),
         d.curves.len(),
@@ -90,7 +87,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     }
     let unsure: Vec<String> = d.undetermined.iter().chain(&d.remarks).cloned().collect();
     section(&mut page, "What these data cannot say", &list(&unsure));
-    let key = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>baseline</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>where it misses</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
+    let key = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>baseline</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>without these rows the baseline would hold</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
     section(&mut page, "Data and fits", &format!("{key}{}", plots::channels(d)));
     let noise: Vec<String> = d.noise.iter().map(|n| noise_sentence(d, n)).collect();
     section(&mut page, "Noise", &list(&noise));

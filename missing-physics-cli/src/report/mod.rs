@@ -1,4 +1,4 @@
-//! A diagnosis as text for a person, as JSON for a program, and as one HTML page.
+//! A diagnosis as text for a person, as JSON for a program, as one HTML page, and as a picture.
 
 mod html;
 mod json;
@@ -10,11 +10,12 @@ mod text;
 /// What other pages share with the report's.
 pub(crate) mod page {
     pub(crate) use super::html::STYLE;
-    pub(crate) use super::svg::{Chart, Series, escape};
+    pub(crate) use super::svg::{CHART_STYLE, Chart, Series, escape};
 }
 
 pub use html::html;
 pub use json::json;
+pub use plots::picture;
 pub use text::text;
 
 use crate::domains::Impact;

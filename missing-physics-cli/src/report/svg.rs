@@ -39,6 +39,14 @@ pub(crate) struct Chart<'a> {
     pub(crate) band: Option<f64>,
 }
 
+/// Colours, light and dark, and how charts use them.
+pub(crate) const CHART_STYLE: &str = "
+:root{--ink:#1c2430;--paper:#fff;--soft:#5b6675;--line:#dde2e8;--data:#8a94a3;--before:#c2410c;--after:#0369a1;--shade:#f59e0b33;--band:#0369a114;--card:#f6f8fa}
+@media(prefers-color-scheme:dark){:root{--ink:#e6eaf0;--paper:#12161c;--soft:#9aa6b5;--line:#2b333d;--data:#8793a3;--before:#fb923c;--after:#38bdf8;--shade:#f59e0b2e;--band:#38bdf81c;--card:#1a2028}}
+svg text{font:11px system-ui,sans-serif;fill:var(--soft)}svg .t{font-weight:600;font-size:12px;fill:var(--ink)}.grid{stroke:var(--line);stroke-width:.7}
+polyline{fill:none;stroke-width:1.6}polyline.before{stroke:var(--before);stroke-dasharray:5 3}polyline.after{stroke:var(--after)}g.data{fill:var(--data)}g.before{fill:var(--before)}g.after{fill:var(--after)}.shade{fill:var(--shade)}.band{fill:var(--band)}
+";
+
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 250.0;
 const LEFT: f64 = 62.0;
@@ -136,6 +144,28 @@ impl Chart<'_> {
         );
         svg
     }
+}
+
+/// Charts side by side as a picture that stands alone, with lines of words below.
+pub(crate) fn picture(charts: &[String], words: &[String]) -> String {
+    let (width, height) = (WIDTH * charts.len().max(1) as f64, HEIGHT + 18.0 * words.len() as f64 + 8.0);
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\"><style>{CHART_STYLE}</style><rect width=\"{width}\" height=\"{height}\" fill=\"var(--paper)\"/>"
+    );
+    for (i, chart) in charts.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            svg,
+            "<svg x=\"{}\" width=\"{WIDTH}\" height=\"{HEIGHT}\">{chart}</svg>",
+            WIDTH * i as f64
+        );
+    }
+    for (i, line) in words.iter().enumerate() {
+        let y = HEIGHT + 12.0 + 18.0 * i as f64;
+        let _ = write!(svg, "<text x=\"{LEFT}\" y=\"{y}\">{}</text>", escape(line));
+    }
+    svg.push_str("</svg>\n");
+    svg
 }
 
 /// A range that is not empty, with some room.

@@ -4,6 +4,7 @@
 //! a ledge, and liquid that could not flow from one part of the cavity to another, are not modelled.
 
 mod check;
+mod cut;
 mod error;
 mod plan;
 mod planned;

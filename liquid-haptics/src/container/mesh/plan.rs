@@ -1,24 +1,27 @@
 //! Volume and first moments below a level, for one direction of up, without clipping the mesh.
 //!
 //! Between two neighbouring vertex heights the area of the level cut is quadratic in the height, its first moments cubic: sums over
-//! the segments in which triangles cross the level. The heights are cut into intervals (leaves), a triangle adds its segment to
-//! the O(log n) nodes of a binary tree that cover its range, and the nodes' sums are handed down. Every node holds the *values* of
-//! its polynomials at four heights, which are bounded by the mesh's size; coefficients would grow without bound where an
-//! edge is nearly level.
+//! the segments in which triangles cross the level ([`Cut`]). The heights are cut into intervals (leaves), and blocks of them. Where
+//! a triangle begins and ends within a block its segment's polynomial is added and taken away again, to be summed along the block;
+//! the blocks that it crosses get it by the O(log n) nodes of a binary tree that cover them, whose sums are handed down.
+//!
+//! A polynomial far outside its triangle's range is as large as the triangle is level, and what is taken away again leaves the
+//! rounding of that. A triangle whose segment would run far out of the mesh within the block is added to each of its leaves.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
+use super::cut::{Cut, Edge};
 use crate::container::{ContainerError, Fill};
 
-/// Values of area and two moments of the cut at four heights, evenly spaced over a node's range.
-type Values = [[f64; 4]; 3];
-const NOTHING: Values = [[0.0; 4]; 3];
+/// Leaves of a block.
+const BLOCK: usize = 256;
+/// A segment may run out of the mesh by this many times its size within a block.
+const FAR: f64 = 8.0;
 
 /// One interval between vertex heights: polynomials in `t` from 0 to 1 over it, and what lies below it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Leaf {
-    area: [f64; 3],
-    moments: [[f64; 4]; 2],
+    cut: Cut,
     /// Volume, moment along up, and moments across, below the interval; about the reference point.
     below: [f64; 4],
 }
@@ -53,13 +56,19 @@ impl MeshPlan {
                 [r.dot(&across[0]), r.dot(&across[1]), r.dot(&up)]
             })
             .collect();
-        let mut heights: Vec<f64> = local.iter().map(|p| p[2]).collect();
-        heights.sort_by(f64::total_cmp);
+        let mut order: Vec<(f64, u32)> = (0..).zip(&local).map(|(i, p)| (p[2], i)).collect();
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let lowest = order.first().map_or(0, |(_, i)| *i as usize);
+        let ends = [order.first(), order.last()].map(|end| end.map_or(0.0, |(h, _)| h.abs()));
         // Heights that differ by rounding alone are one.
-        let size =
-            heights.last().copied().unwrap_or(0.0).abs().max(heights.first().copied().unwrap_or(0.0).abs());
-        heights.dedup_by(|next, kept| *next - *kept <= 4e-16 * size);
-        let lowest = local.iter().enumerate().min_by(|a, b| a.1[2].total_cmp(&b.1[2])).map_or(0, |(i, _)| i);
+        let same = 4e-16 * ends[0].max(ends[1]);
+        let (mut heights, mut rank) = (Vec::<f64>::with_capacity(order.len()), vec![0; local.len()]);
+        for (height, vertex) in order {
+            if heights.last().is_none_or(|kept| height - kept > same) {
+                heights.push(height);
+            }
+            rank[vertex as usize] = heights.len() - 1;
+        }
         let mut plan = Self {
             reference,
             up,
@@ -69,111 +78,39 @@ impl MeshPlan {
             whole: [0.0; 4],
             lowest: vertices.get(lowest).copied().unwrap_or_default(),
         };
-        let tree = plan.tree(&local, triangles);
-        plan.integrate(&tree);
+        plan.cut(&local, &rank, triangles);
+        plan.integrate();
         plan
     }
 
-    /// Adds every triangle to the tree; returns the leaves' values after all sums have been handed down.
-    fn tree(&self, local: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<Values> {
-        let leaves = self.leaves.len();
-        let size = leaves.next_power_of_two().max(1);
-        let depth = size.trailing_zeros();
-        let mut nodes = vec![NOTHING; 2 * size];
-        let rank: Vec<usize> =
-            local.iter().map(|p| self.heights.partition_point(|h| *h <= p[2]).saturating_sub(1)).collect();
-        let range = |node: usize| {
-            let below = depth - node.ilog2();
-            let first = (node << below) - size;
-            (first.min(leaves), (first + (1 << below)).min(leaves))
-        };
-        let mut add = |from: usize, to: usize, down: [&[f64; 3]; 2], up: [&[f64; 3]; 2]| {
-            let (mut l, mut r) = (from + size, to + size);
-            while l < r {
-                if l & 1 == 1 {
-                    self.add_segment(&mut nodes[l], range(l), down, up);
-                    l += 1;
-                }
-                if r & 1 == 1 {
-                    r -= 1;
-                    self.add_segment(&mut nodes[r], range(r), down, up);
-                }
-                (l, r) = (l >> 1, r >> 1);
-            }
-        };
+    /// Sums the triangles' segments in every leaf.
+    fn cut(&mut self, local: &[[f64; 3]], rank: &[usize], triangles: &[[u32; 3]]) {
+        let far = FAR * local.iter().flat_map(|p| &p[..2]).fold(0.0f64, |most, x| most.max(x.abs()));
+        let mut sums = Sums::new(&self.heights, &mut self.leaves, far);
         for t in triangles {
             let mut order = [0usize, 1, 2];
-            order.sort_by_key(|&k| rank[t[k] as usize]);
+            order.sort_unstable_by_key(|&k| rank[t[k] as usize]);
             // Whether low, middle, high run the way of the triangle.
             let even = (order[1] + 3 - order[0]) % 3 == 1;
             let [low, middle, high] = order.map(|k| t[k] as usize);
             let (a, b, c) = (&local[low], &local[middle], &local[high]);
-            let (ra, rb, rc) = (rank[low], rank[middle], rank[high]);
             // The cut runs, seen from above, from the edge that comes down to the edge that goes up.
-            let (short, long) = ([a, b], [a, c]);
-            let (down, up) = if even { (long, short) } else { (short, long) };
-            add(ra, rb, down, up);
-            let short = [b, c];
-            let (down, up) = if even { (long, short) } else { (short, long) };
-            add(rb, rc, down, up);
-        }
-        for node in 1..size {
-            let (first, end) = range(node);
-            if first >= end {
-                continue;
-            }
-            let values = nodes[node];
-            let (low, span) = (self.heights[first], self.heights[end] - self.heights[first]);
-            for child in [2 * node, 2 * node + 1] {
-                let (from, to) = range(child);
-                if from >= to {
-                    continue;
-                }
-                let begin = (self.heights[from] - low) / span;
-                let step = (self.heights[to] - self.heights[from]) / span / 3.0;
-                for (mine, theirs) in values.iter().zip(&mut nodes[child]) {
-                    let c = cubic(mine);
-                    for (k, value) in theirs.iter_mut().enumerate() {
-                        let t = begin + k as f64 * step;
-                        *value += c[0] + t * (c[1] + t * (c[2] + t * c[3]));
-                    }
+            let long = Edge::new(a, c);
+            for (short, from, to) in
+                [(Edge::new(a, b), rank[low], rank[middle]), (Edge::new(b, c), rank[middle], rank[high])]
+            {
+                if from < to {
+                    let (down, up) = if even { (&long, &short) } else { (&short, &long) };
+                    sums.add(from, to, down, up);
                 }
             }
         }
-        nodes[size..size + leaves].to_vec()
+        sums.settle();
     }
 
-    /// Adds the cut's segment between two edges over a range of leaves.
-    fn add_segment(
-        &self,
-        values: &mut Values,
-        (first, end): (usize, usize),
-        down: [&[f64; 3]; 2],
-        up: [&[f64; 3]; 2],
-    ) {
-        let (low, high) = (self.heights[first], self.heights[end]);
-        let [area, first_moment, second_moment] = values;
-        let rows = area.iter_mut().zip(first_moment.iter_mut().zip(second_moment));
-        for (k, (area, (first, second))) in rows.enumerate() {
-            let h = low + (high - low) * (k as f64 / 3.0);
-            let at = |[a, b]: [&[f64; 3]; 2]| {
-                let t = ((h - a[2]) / (b[2] - a[2])).clamp(0.0, 1.0);
-                [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]
-            };
-            let (p, q) = (at(down), at(up));
-            let cross = p[0] * q[1] - p[1] * q[0];
-            *area += 0.5 * cross;
-            *first += cross * (p[0] + q[0]) / 6.0;
-            *second += cross * (p[1] + q[1]) / 6.0;
-        }
-    }
-
-    fn integrate(&mut self, values: &[Values]) {
+    fn integrate(&mut self) {
         let mut below = [0.0; 4];
-        for (i, (leaf, values)) in self.leaves.iter_mut().zip(values).enumerate() {
-            let [area, first, second] = values.map(|v| cubic(&v));
-            leaf.area = [area[0], area[1], area[2]];
-            leaf.moments = [first, second];
+        for (i, leaf) in self.leaves.iter_mut().enumerate() {
             leaf.below = below;
             let span = self.heights[i + 1] - self.heights[i];
             below = leaf.up_to(1.0, self.heights[i], span);
@@ -236,25 +173,137 @@ impl MeshPlan {
     }
 }
 
+/// The leaves' cuts in the making.
+struct Sums<'a> {
+    heights: &'a [f64],
+    leaves: &'a mut [Leaf],
+    /// What begins and, with the other sign, ends with each leaf, over the leaf's block.
+    steps: Vec<Cut>,
+    /// Cuts of whole blocks, a binary tree.
+    tree: Vec<Cut>,
+    blocks: usize,
+    far: f64,
+}
+
+impl<'a> Sums<'a> {
+    fn new(heights: &'a [f64], leaves: &'a mut [Leaf], far: f64) -> Self {
+        let count = leaves.len().div_ceil(BLOCK);
+        let blocks = count.next_power_of_two();
+        let steps = vec![Cut::default(); leaves.len()];
+        Self { heights, leaves, steps, tree: vec![Cut::default(); 2 * blocks], blocks, far }
+    }
+
+    /// Adds the segment between two edges to the leaves from `from` to before `to`.
+    fn add(&mut self, from: usize, to: usize, down: &Edge, up: &Edge) {
+        let (first, last) = (from / BLOCK, (to - 1) / BLOCK);
+        // Blocks that are crossed whole.
+        let (mut l, mut r) = (first + 1, last);
+        if first == last {
+            self.within(from, to, down, up);
+        } else {
+            self.within(from, (first + 1) * BLOCK, down, up);
+            self.within(last * BLOCK, to, down, up);
+        }
+        l += self.blocks;
+        r += self.blocks;
+        while l < r {
+            if l & 1 == 1 {
+                self.cross(l, down, up);
+                l += 1;
+            }
+            if r & 1 == 1 {
+                r -= 1;
+                self.cross(r, down, up);
+            }
+            (l, r) = (l >> 1, r >> 1);
+        }
+    }
+
+    /// Within one block.
+    fn within(&mut self, from: usize, to: usize, down: &Edge, up: &Edge) {
+        let start = from - from % BLOCK;
+        let end = (start + BLOCK).min(self.leaves.len());
+        let at = |leaf: usize| self.heights[leaf];
+        let ends = [down, up].map(|edge| [edge.at(at(start)), edge.at(at(end))]);
+        let reach = ends.iter().flatten().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
+        if reach <= self.far {
+            let cut = Cut::between(ends[0], ends[1]);
+            self.steps[from].add(&cut, 1.0);
+            if to < end {
+                self.steps[to].add(&cut, -1.0);
+            }
+            return;
+        }
+        for leaf in from..to {
+            let ends = [down, up].map(|edge| [edge.clamped(at(leaf)), edge.clamped(at(leaf + 1))]);
+            self.leaves[leaf].cut.add(&Cut::between(ends[0], ends[1]), 1.0);
+        }
+    }
+
+    /// The blocks below a node of the tree, as leaves.
+    fn range(&self, node: usize) -> (usize, usize) {
+        let below = self.blocks.trailing_zeros() - node.ilog2();
+        let first = (node << below) - self.blocks;
+        let end = first + (1 << below);
+        ((first * BLOCK).min(self.leaves.len()), (end * BLOCK).min(self.leaves.len()))
+    }
+
+    fn cross(&mut self, node: usize, down: &Edge, up: &Edge) {
+        let (from, to) = self.range(node);
+        let (low, high) = (self.heights[from], self.heights[to]);
+        let ends = [down, up].map(|edge| [edge.clamped(low), edge.clamped(high)]);
+        self.tree[node].add(&Cut::between(ends[0], ends[1]), 1.0);
+    }
+
+    /// Hands the sums down to the leaves.
+    fn settle(&mut self) {
+        let place = |outer: (usize, usize), inner: (usize, usize)| {
+            let span = self.heights[outer.1] - self.heights[outer.0];
+            let begin = (self.heights[inner.0] - self.heights[outer.0]) / span;
+            (begin, (self.heights[inner.1] - self.heights[inner.0]) / span)
+        };
+        for node in 1..self.blocks {
+            let outer = self.range(node);
+            for child in [2 * node, 2 * node + 1] {
+                let inner = self.range(child);
+                if inner.0 < inner.1 {
+                    let (begin, width) = place(outer, inner);
+                    let part = self.tree[node].part(begin, width);
+                    self.tree[child].add(&part, 1.0);
+                }
+            }
+        }
+        for block in 0..self.leaves.len().div_ceil(BLOCK) {
+            let outer = self.range(self.blocks + block);
+            let mut here = self.tree[self.blocks + block];
+            for leaf in outer.0..outer.1 {
+                here.add(&self.steps[leaf], 1.0);
+                let (begin, width) = place(outer, (leaf, leaf + 1));
+                self.leaves[leaf].cut.add(&here.part(begin, width), 1.0);
+            }
+        }
+    }
+}
+
 impl Leaf {
     /// Volume and moments below `t` within the interval.
     fn up_to(&self, t: f64, low: f64, span: f64) -> [f64; 4] {
         let t = t.clamp(0.0, 1.0);
-        let [a, b, c] = self.area;
+        let [a, b, c] = self.cut.area;
         let volume = span * t * (a + t * (b / 2.0 + t * c / 3.0));
         let lifted = span * span * t * t * (a / 2.0 + t * (b / 3.0 + t * c / 4.0));
         let moment = |m: &[f64; 4]| span * t * (m[0] + t * (m[1] / 2.0 + t * (m[2] / 3.0 + t * m[3] / 4.0)));
         [
             self.below[0] + volume,
             self.below[1] + low * volume + lifted,
-            self.below[2] + moment(&self.moments[0]),
-            self.below[3] + moment(&self.moments[1]),
+            self.below[2] + moment(&self.cut.moments[0]),
+            self.below[3] + moment(&self.cut.moments[1]),
         ]
     }
 
     /// The `t` below which lies a volume, given over the interval's span: Newton's method between brackets.
     fn height_of(&self, volume: f64) -> f64 {
-        let [a, b, c] = self.area;
+        let [a, b, c] = self.cut.area;
         let (mut low, mut high) = (0.0, 1.0);
         let mut t = 0.5;
         for _ in 0..60 {
@@ -274,14 +323,4 @@ impl Leaf {
         }
         t
     }
-}
-
-/// Coefficients of the cubic through four values at 0, 1/3, 2/3 and 1.
-fn cubic(v: &[f64; 4]) -> [f64; 4] {
-    [
-        v[0],
-        -5.5 * v[0] + 9.0 * v[1] - 4.5 * v[2] + v[3],
-        9.0 * v[0] - 22.5 * v[1] + 18.0 * v[2] - 4.5 * v[3],
-        -4.5 * v[0] + 13.5 * v[1] - 13.5 * v[2] + 4.5 * v[3],
-    ]
 }

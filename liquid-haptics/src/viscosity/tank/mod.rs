@@ -1,19 +1,22 @@
 //! Damping of the first mode in tanks of other shapes: `gamma = C1 (nu / (d^(3/2) sqrt(g)))^n1`, d a characteristic length.
 //!
-//! Dodge (2000, The New Dynamic Behavior of Liquids in Moving Containers, ch. 2) and Ibrahim (2005,
-//! doi:10.1017/CBO9780511536656, ch. 3) tabulate C1 and n1. Of such a table only the upright cylinder's row (0.79 and 1/2, thesis eq.
-//! 2.4) could be checked against a source at hand, so no other number is copied here. Instead C1 is computed, with n1 = 1/2, from
-//! the tank's own first mode and the boundary layer it drags along the wetted wall (Landau and Lifshitz 1987, Fluid Mechanics,
-//! section 25; Keulegan 1959, doi:10.1017/S0022112059000404; Case and Parkinson 1957, doi:10.1017/S0022112057000154):
+//! [`Tank::published`] has the measured laws that could be found (Dodge 2000, The New Dynamic Behavior of Liquids in Moving
+//! Containers, ch. 2; Ibrahim 2005, doi:10.1017/CBO9780511536656, ch. 3): upright cylinder, sphere, cone. For every shape C1 is
+//! computed as well, with n1 = 1/2, from the tank's own first mode and the boundary layer it drags along the wetted wall (Landau and
+//! Lifshitz 1987, Fluid Mechanics, section 25; Keulegan 1959, doi:10.1017/S0022112059000404; Case and Parkinson 1957,
+//! doi:10.1017/S0022112057000154):
 //!
 //! `gamma = sqrt(nu / (8 omega)) int_wall |grad phi|^2 dS / int |grad phi|^2 dV`.
 //!
 //! Measured damping is larger than this: the contact line and a surface that is not clean add to it. In the upright cylinder the
-//! measured law is 1.42 times the computed one ([`MEASURED_OVER_COMPUTED`]); for other shapes that factor is a guess, and is the
-//! caller's to make.
+//! measured law is 1.42 times the computed one ([`MEASURED_OVER_COMPUTED`]); for shapes without a measured law that factor is a guess,
+//! and is the caller's to make.
 
 mod harmonic;
+mod published;
 mod upright;
+
+pub use published::PublishedLaw;
 
 use std::f64::consts::PI;
 

@@ -214,6 +214,12 @@ impl Model for LiquidTiltModel {
         self.feel(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
+    /// Poses are settled ones, seconds apart: a sensor that wanders forgets within a few of them. What lasts longer is physics, such
+    /// as a grip that slips and stays.
+    fn longest_noise(&self) -> f64 {
+        2.9
+    }
+
     fn start(&self, run: &Run, own: &mut [f64]) {
         let grasp = &self.setup.grasp;
         let Some(forces) = run.outputs.get(1) else { return };

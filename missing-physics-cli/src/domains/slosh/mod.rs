@@ -1,5 +1,6 @@
 //! The domain `slosh`: the decay of a liquid's wave after a fast rotation, felt at the wrist.
 
+mod envelope;
 mod experiments;
 pub mod model;
 

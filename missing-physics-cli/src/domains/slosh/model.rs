@@ -268,13 +268,13 @@ impl Model for SloshModel {
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let p = &self.places;
         if mechanism == self.friction {
-            // Faint friction beside the viscosity that was found; or much of it, and then of what the baseline took for viscosity
-            // a part is friction.
-            let viscosity = self.spec.parameters[p.viscosity.index].start;
+            // Faint friction beside the viscosity that was found, and what the wave's envelope says.
+            let omega = self.cylinders[0].angular_frequency_rad_s(0, 0.0);
             let faint = [0.0, 0.006, 0.02].map(|share| vec![(p.friction.index, share * self.largest)]);
-            let much = [0.015, 0.03, 0.06, 0.1, 0.15].into_iter().flat_map(|share| {
-                let friction = (p.friction.index, share * self.largest);
-                [0.05, 0.3, 1.0].map(|factor| vec![friction, (p.viscosity.index, factor * viscosity)])
+            let shown = super::envelope::starts(runs, omega, self.largest, ENVELOPES).into_iter();
+            let much = shown.map(|[ratio, friction]| {
+                let viscosity = self.cylinders[0].kinematic_viscosity_m2_s(ratio);
+                vec![(p.friction.index, friction), (p.viscosity.index, viscosity)]
             });
             return faint.into_iter().chain(much).collect();
         }
@@ -320,6 +320,8 @@ fn second_band(cylinder: &UprightCylinder) -> [f64; 2] {
 
 /// Bounds of the arm's frequency, rad/s.
 const ARM_RAD_S: [f64; 2] = [1.0, 1000.0];
+/// How many places of the envelope's search are tried.
+const ENVELOPES: usize = 8;
 /// How many peaks of a residual's spectrum are tried.
 const PEAKS: usize = 6;
 
