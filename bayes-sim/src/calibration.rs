@@ -62,20 +62,25 @@ pub fn sbc_ranks(
     draws: usize,
     seed: u64,
 ) -> Result<Ranks, Error> {
-    check_draws(draws)?;
-    let ranks = (0..tests.len()).into_par_iter().map(|i| {
-        let (theta, x) = (tests.theta().row(i), tests.x().row(i));
-        let sample = density.sample(x, draws, &mut dice(seed, i))?;
+    let ranks = each(tests, draws, seed, |theta, x, rng| {
+        let sample = density.sample(x, draws, rng)?;
         Ok((0..theta.len()).map(|j| sample.rows().filter(|s| s[j] < theta[j]).count()).collect())
-    });
-    Ok(Ranks { ranks: ranks.collect::<Result<_, Error>>()?, draws })
+    })?;
+    Ok(Ranks { ranks, draws })
 }
 
-fn check_draws(draws: usize) -> Result<(), Error> {
+/// Looks at each test simulation, in parallel, each with dice of its own.
+fn each<T: Send>(
+    tests: &Simulations,
+    draws: usize,
+    seed: u64,
+    look: impl Fn(&[f64], &[f64], &mut ChaCha8Rng) -> Result<T, Error> + Sync,
+) -> Result<Vec<T>, Error> {
     if draws == 0 {
         return Err(Error::Setting { name: "draws", value: 0.0, rule: "at least 1" });
     }
-    Ok(())
+    let row = |i| look(tests.theta().row(i), tests.x().row(i), &mut dice(seed, i));
+    (0..tests.len()).into_par_iter().map(row).collect()
 }
 
 /// How often regions of a given probability hold the truth.
@@ -117,16 +122,13 @@ pub fn expected_coverage(
     draws: usize,
     seed: u64,
 ) -> Result<Coverage, Error> {
-    check_draws(draws)?;
-    let credibility = (0..tests.len()).into_par_iter().map(|i| {
-        let (theta, x) = (tests.theta().row(i), tests.x().row(i));
-        let mut rng = dice(seed, i);
-        let sample = density.sample(x, draws, &mut rng)?;
+    let credibility = each(tests, draws, seed, |theta, x, rng| {
+        let sample = density.sample(x, draws, rng)?;
         let truth = density.ln_density(theta, x)?;
         let above = density.ln_densities(&sample, x)?.iter().filter(|l| **l > truth).count();
-        Ok(randomised(above, draws, &mut rng))
-    });
-    Ok(Coverage { credibility: credibility.collect::<Result<_, Error>>()? })
+        Ok(randomised(above, draws, rng))
+    })?;
+    Ok(Coverage { credibility })
 }
 
 /// A rank among draws as a number in 0..1, uniform for an exact posterior.
@@ -145,7 +147,6 @@ pub fn tarp(
     draws: usize,
     seed: u64,
 ) -> Result<Coverage, Error> {
-    check_draws(draws)?;
     let prior = density.prior();
     let scales: Vec<f64> = (0..prior.dim())
         .map(|j| {
@@ -153,20 +154,18 @@ pub fn tarp(
             mean_sd(&column).1.max(f64::MIN_POSITIVE)
         })
         .collect();
-    let credibility = (0..tests.len()).into_par_iter().map(|i| {
-        let (theta, x) = (tests.theta().row(i), tests.x().row(i));
-        let mut rng = dice(seed, i);
-        let centre = prior.coordinates(&prior.sample(&mut rng));
+    let credibility = each(tests, draws, seed, |theta, x, rng| {
+        let centre = prior.coordinates(&prior.sample(rng));
         let distance = |t: &[f64]| -> f64 {
             let u = prior.coordinates(t);
             (0..u.len()).map(|j| ((u[j] - centre[j]) / scales[j]).powi(2)).sum()
         };
-        let sample = density.sample(x, draws, &mut rng)?;
+        let sample = density.sample(x, draws, rng)?;
         let truth = distance(theta);
         let nearer = sample.rows().filter(|s| distance(s) < truth).count();
-        Ok(randomised(nearer, draws, &mut rng))
-    });
-    Ok(Coverage { credibility: credibility.collect::<Result<_, Error>>()? })
+        Ok(randomised(nearer, draws, rng))
+    })?;
+    Ok(Coverage { credibility })
 }
 
 /// What a local test says of the posterior at one observation.

@@ -1,6 +1,6 @@
 //! Is a model adequate? A bank of tests with one p-value, calibrated by a parametric bootstrap of the whole fit.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -124,12 +124,20 @@ pub(crate) fn draw(
             if fixed.is_some() { (uncertainty * z).exp() } else { 1.0 }
         })
         .collect();
+    // One world for all runs; drawn from the stream's number, so that a model without any draws what it always drew.
+    let world = stream as usize;
     (0..problem.rows.len())
         .map(|run| {
+            let worlds = problem.model.by_chance(&problem.recording.runs[run]);
+            let copies = worlds.get(world.checked_rem(worlds.len()).unwrap_or(0));
+            let copy = copies.and_then(|c| c.get(rng.random_range(0..c.len().max(1))));
             (0..problem.channels())
                 .map(|c| {
-                    let mut column: Vec<f64> =
-                        problem.rows[run].valid[c].iter().map(|_| StandardNormal.sample(&mut rng)).collect();
+                    let valid = &problem.rows[run].valid[c];
+                    let mut column: Vec<f64> = match copy {
+                        Some(copy) => valid.iter().map(|&i| copy[c][i]).collect(),
+                        None => valid.iter().map(|_| StandardNormal.sample(&mut rng)).collect(),
+                    };
                     problem.whitener(run, c, noise[c].0).colour(&mut column);
                     column.iter_mut().for_each(|v| *v *= noise[c].1 * factors[c]);
                     column

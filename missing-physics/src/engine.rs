@@ -291,10 +291,14 @@ fn diagnose_with(
         }
     } else {
         if let Some((closest, p)) = best {
-            diagnosis.remarks.push(format!(
-                "the closest explanation is {}, but it leaves a misfit of its own (p = {p:.3}; {failing})",
-                work.names(&closest.set)
-            ));
+            let but = if p > enough {
+                "it predicts data that it has not seen no better than the baseline".to_owned()
+            } else {
+                format!("it leaves a misfit of its own (p = {p:.3}; {failing})")
+            };
+            diagnosis
+                .remarks
+                .push(format!("the closest explanation is {}, but {but}", work.names(&closest.set)));
         }
         tell("looking for a law in the residual", 0.0)?;
         if let Some(found) = law::find(&problem, &competing, &baseline, &base_score)? {

@@ -1,4 +1,4 @@
-//! The next experiment: the action within the rig's range for which the rivals predict the most different things.
+//! The next experiment: the action within the rig's range after which the least doubt between the rivals is expected.
 
 use nalgebra::DMatrix;
 
@@ -13,39 +13,25 @@ use crate::problem::{Problem, Selection};
 /// Below this expected log Bayes factor an experiment is not worth doing.
 const WORTHWHILE: f64 = 1.0;
 
-/// The experiment that tells all rivals apart best; where none does, the one that best tells a single rival from the rest.
+/// The experiment after which the truth is expected to be most probable, whichever rival it is; where none tells all of them
+/// apart, the words say which one it tells from the rest.
 pub(crate) fn best(
     problem: &Problem<'_>,
     rivals: &[&Candidate],
     experiments: &[Experiment],
 ) -> Option<NextExperiment> {
-    // For each experiment and rival: the log Bayes factor over the nearest other, if that rival is the truth.
-    let values: Vec<Vec<f64>> = experiments
-        .iter()
-        .map(|experiment| {
-            let over_nearest = |i: usize| {
-                (0..rivals.len())
-                    .filter(|&j| j != i)
-                    .map(|j| expected(problem, rivals[i], rivals[j], experiment).unwrap_or(0.0))
-                    .fold(f64::INFINITY, f64::min)
-            };
-            (0..rivals.len()).map(over_nearest).collect()
-        })
-        .collect();
-    let pick = |worth: &dyn Fn(&[f64]) -> f64| {
-        let best = (0..values.len()).max_by(|&a, &b| worth(&values[a]).total_cmp(&worth(&values[b])))?;
-        let value = worth(&values[best]);
-        (value >= WORTHWHILE && value.is_finite()).then_some((best, value))
-    };
-    let least = |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
-    let (at, value, alone) = match pick(&least) {
-        Some((at, value)) => (at, value, None),
-        None => {
-            let (at, value) = pick(&most)?;
-            (at, value, values[at].iter().position(|v| *v == value))
-        }
-    };
+    let most = rivals.iter().map(|r| r.evidence).fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = rivals.iter().map(|r| (r.evidence - most).exp()).collect();
+    let told: Vec<Told> =
+        experiments.iter().map(|experiment| Told::by(problem, rivals, &weights, experiment)).collect();
+    let at = (0..told.len()).max_by(|&a, &b| told[a].worth.total_cmp(&told[b].worth))?;
+    let apart = &told[at].over_nearest;
+    let (least, greatest) =
+        (apart.iter().copied().fold(f64::INFINITY, f64::min), apart.iter().copied().fold(0.0, f64::max));
+    let value = if least >= WORTHWHILE { least } else { greatest };
+    if !(value >= WORTHWHILE && value.is_finite()) {
+        return None;
+    }
     let mut separates: Vec<String> =
         rivals.iter().flat_map(|r| r.set.iter().map(|&m| problem.spec().mechanisms[m].id.clone())).collect();
     separates.sort();
@@ -55,6 +41,7 @@ pub(crate) fn best(
         names.join(" with ")
     };
     let experiment = &experiments[at];
+    let alone = apart.iter().position(|v| *v == greatest).filter(|_| least < WORTHWHILE);
     let words = match alone {
         Some(i) => format!(
             "{} (it tells {} from the others, not these from each other)",
@@ -69,6 +56,31 @@ pub(crate) fn best(
         separates,
         expected_log_bayes_factor: value,
     })
+}
+
+/// What an experiment is expected to tell.
+struct Told {
+    /// For each rival: the log Bayes factor over the nearest other, if that rival is the truth.
+    over_nearest: Vec<f64>,
+    /// How little doubt is left: minus the logarithm of the chance that the truth does not come out first.
+    worth: f64,
+}
+
+impl Told {
+    fn by(problem: &Problem<'_>, rivals: &[&Candidate], weights: &[f64], experiment: &Experiment) -> Self {
+        let mut over_nearest = vec![f64::INFINITY; rivals.len()];
+        let mut doubt = f64::MIN_POSITIVE;
+        for (i, truth) in rivals.iter().enumerate() {
+            for (j, other) in rivals.iter().enumerate().filter(|(j, _)| *j != i) {
+                let factor = expected(problem, truth, other, experiment).unwrap_or(0.0);
+                over_nearest[i] = over_nearest[i].min(factor);
+                // Bhattacharyya's bound on confusing two normal laws whose mean log likelihood ratio this is (Kailath 1967,
+                // doi:10.1109/TCOM.1967.1089532).
+                doubt += (weights[i] * weights[j]).sqrt() * (-0.25 * factor).exp();
+            }
+        }
+        Self { over_nearest, worth: -doubt.ln() }
+    }
 }
 
 /// Expected log Bayes factor of `truth` over `other` after the experiment: half the squared distance that is left once

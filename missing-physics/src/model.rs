@@ -198,6 +198,13 @@ pub trait Model: Sync {
         f64::INFINITY
     }
 
+    /// What chance alone may do to a run, in sigmas of each channel, `[world][copy][channel][row]`, of a model that knows its errors
+    /// not to be normal: as many worlds for every run, which share what is not known of the noise, and independent copies in
+    /// each. None by default.
+    fn by_chance(&self, _run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
+        &[]
+    }
+
     /// Whether a residual may depend on the prediction itself; false where predictions are made with measured inputs, and share
     /// their noise with the residual.
     fn prediction_is_clean(&self) -> bool {

@@ -15,11 +15,14 @@ pub struct Shape {
     pub length_steps: f64,
     /// Whether the correlated part is smooth (Matern 3/2) or rough (Ornstein-Uhlenbeck).
     pub smooth: bool,
+    /// Whether it is correlated from row to row, however far apart these are (a filter that runs with the readings), and not
+    /// along the noise variable.
+    pub by_row: bool,
 }
 
 impl Shape {
     /// White noise.
-    pub const WHITE: Self = Self { correlated: 0.0, length_steps: 0.0, smooth: false };
+    pub const WHITE: Self = Self { correlated: 0.0, length_steps: 0.0, smooth: false, by_row: false };
 
     /// Log prior weight against white noise: colour has to show, and a faint slow part (which would swallow any faint
     /// slow effect) has to show most.
@@ -34,14 +37,15 @@ impl Shape {
     }
 }
 
-/// The shapes among which the data choose; white first.
+/// Correlations of neighbours in noise that is an autoregression of one row.
+const PHIS: [f64; 8] = [0.2, 0.4, 0.6, 0.75, 0.86, 0.93, 0.97, 0.99];
+
+/// The shapes among which the data choose; white first, those that go by row last.
 pub fn family() -> Vec<Shape> {
     let mut shapes = vec![Shape::WHITE];
     let rough =
-        |phi: f64, correlated: f64| Shape { correlated, length_steps: -1.0 / phi.ln(), smooth: false };
-    for phi in [0.2, 0.4, 0.6, 0.75, 0.86, 0.93, 0.97, 0.99] {
-        shapes.push(rough(phi, 1.0));
-    }
+        |phi: f64, correlated: f64| Shape { correlated, length_steps: -1.0 / phi.ln(), ..Shape::WHITE };
+    shapes.extend(PHIS.map(|phi| rough(phi, 1.0)));
     for correlated in [0.15, 0.4, 0.7, 0.9, 0.98] {
         for phi in [0.75, 0.9, 0.97] {
             shapes.push(rough(phi, correlated));
@@ -49,9 +53,10 @@ pub fn family() -> Vec<Shape> {
     }
     for correlated in [0.3, 0.7, 0.93, 0.99] {
         for length_steps in [3.0, 7.0, 18.0] {
-            shapes.push(Shape { correlated, length_steps, smooth: true });
+            shapes.push(Shape { correlated, length_steps, smooth: true, ..Shape::WHITE });
         }
     }
+    shapes.extend(PHIS.map(|phi| Shape { by_row: true, ..rough(phi, 1.0) }));
     shapes
 }
 

@@ -48,7 +48,11 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         uncertainty,
         against_colour: 0.0,
         allowed: (0..problem.shapes.len())
-            .filter(|&s| s == 0 || long && problem.shapes[s].length_steps <= longest)
+            .filter(|&s| {
+                let shape = problem.shapes[s];
+                let heard = !shape.by_row || problem.uneven;
+                s == 0 || long && heard && shape.length_steps <= longest
+            })
             .collect(),
         floor,
     }

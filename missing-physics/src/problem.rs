@@ -14,6 +14,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) rows: Vec<RunRows>,
     /// Median step between rows, in the noise variable's unit.
     pub(crate) step: f64,
+    /// Whether rows are so unevenly spaced that noise along the noise variable and noise from row to row differ.
+    pub(crate) uneven: bool,
     pub(crate) slots: Vec<usize>,
     pub(crate) shared: ParameterTable,
     pub(crate) own: ParameterTable,
@@ -74,6 +76,8 @@ impl<'a> Problem<'a> {
             let whiteners = valid.iter().map(|_| shapes.iter().map(|_| OnceLock::new()).collect()).collect();
             rows.push(RunRows { valid, positions, whiteners });
         }
+        let step = median(&mut gaps).unwrap_or(1.0);
+        let odd = gaps.iter().filter(|g| (*g / step - 1.0).abs() > 0.2).count();
         let spec = model.spec();
         let own = ParameterTable::new(spec, Scope::PerRun);
         let own_start = recording
@@ -97,7 +101,8 @@ impl<'a> Problem<'a> {
             shared: ParameterTable::new(spec, Scope::Shared),
             own,
             own_start,
-            step: median(&mut gaps).unwrap_or(1.0),
+            step,
+            uneven: 10 * odd > gaps.len(),
             shapes,
             rows,
             recording,
@@ -127,8 +132,15 @@ impl<'a> Problem<'a> {
 
     pub(crate) fn whitener(&self, run: usize, channel: usize, shape: usize) -> &Whitener {
         let rows = &self.rows[run];
-        rows.whiteners[channel][shape]
-            .get_or_init(|| Whitener::new(&rows.positions[channel], self.step, self.shapes[shape]))
+        rows.whiteners[channel][shape].get_or_init(|| {
+            let shape = self.shapes[shape];
+            if shape.by_row {
+                let numbers: Vec<f64> = rows.valid[channel].iter().map(|&i| i as f64).collect();
+                Whitener::new(&numbers, 1.0, shape)
+            } else {
+                Whitener::new(&rows.positions[channel], self.step, shape)
+            }
+        })
     }
 
     /// Picks the measured rows of a channel out of a column over all rows.

@@ -83,3 +83,39 @@ fn what_lasts_is_not_set_aside() {
     assert_ne!(answer.verdict, Verdict::Adequate);
     assert!(answer.outliers.iter().filter(|o| o.row >= 35).count() == 0, "{:?}", answer.outliers);
 }
+
+/// Readings whose noise goes from row to row, taken fast and then slowly: along time it has no one length.
+fn fast_then_slow(seed: u64) -> Recording {
+    const PHI: f64 = 0.6;
+    let world = World { sigma: 0.0, rows: 200, ..World::NULL };
+    let mut recording = world.draw(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xf00d);
+    let fresh = Normal::new(0.0, World::NULL.sigma * (1.0 - PHI * PHI).sqrt()).unwrap();
+    for run in &mut recording.runs {
+        let kept = |i: usize| i < 40 || i.is_multiple_of(4);
+        let pick = |column: &[f64]| (0..column.len()).filter(|&i| kept(i)).map(|i| column[i]).collect();
+        run.inputs = run.inputs.iter().map(|c| pick(c)).collect();
+        run.outputs = run.outputs.iter().map(|c| pick(c)).collect();
+        let mut noise = fresh.sample(&mut rng) / (1.0 - PHI * PHI).sqrt();
+        for reading in &mut run.outputs[0] {
+            *reading += noise;
+            noise = PHI * noise + fresh.sample(&mut rng);
+        }
+    }
+    recording.calibration = vec![Some(World::NULL.sigma)];
+    recording
+}
+
+#[test]
+fn noise_that_goes_from_row_to_row_is_no_effect() {
+    let model = Ball::default();
+    let options = Options { replicates: 199, ..Options::default() };
+    let doubted = |seed: &u64| {
+        let answer = diagnose(&model, &fast_then_slow(*seed), &[], &options, &Silent).unwrap();
+        answer.verdict != Verdict::Adequate
+    };
+    let alarms = (0..60).filter(doubted).count();
+    println!("{alarms} alarms in 60");
+    // The 99.9 % point of a binomial law of 60 trials at 5 %.
+    assert!(alarms <= 9, "{alarms}");
+}

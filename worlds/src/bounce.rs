@@ -6,7 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-const GRAVITY_M_S2: f64 = 9.80665;
+use crate::GRAVITY_M_S2;
+
 type Vec3 = [f64; 3];
 
 /// Everything that may act beside gravity and a constant restitution; all zero is a level table in a vacuum.

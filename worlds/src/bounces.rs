@@ -32,24 +32,18 @@ impl Maker for Bounces {
             noise_known: whole(&mut rng, 0, 3) > 0,
             ..BounceWorld::drops()
         };
-        match hidden {
-            Hidden::Nothing => {}
-            Hidden::One => listed(&mut world, choose(&mut rng, LISTED, 1)[0], &mut key, &mut rng),
-            Hidden::Two => {
-                for which in choose(&mut rng, LISTED, 2) {
-                    listed(&mut world, which, &mut key, &mut rng);
-                }
-            }
-            Hidden::Unlisted => {
-                world.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
-                key.unlisted = Some("a table that is softer on one side".into());
-            }
+        for which in choose(&mut rng, LISTED, hidden.listed()) {
+            listed(&mut world, which, &mut key, &mut rng);
+        }
+        if hidden == Hidden::Unlisted {
+            world.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
+            key.unlisted = Some("a table that is softer on one side".into());
         }
         let ([header, data], unheard) = world.files_and_unheard(seed ^ 0x5eed);
         // The format asks for the share of these very runs.
         let share = unheard as f64 / world.runs as f64;
         key.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact").for_each(|p| p.value = share);
-        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+        Concealed::table(header, data, key)
     }
 }
 

@@ -13,6 +13,17 @@ pub enum Hidden {
     Unlisted,
 }
 
+impl Hidden {
+    /// How many mechanisms of the list are at work.
+    pub(crate) const fn listed(self) -> usize {
+        match self {
+            Self::Nothing | Self::Unlisted => 0,
+            Self::One => 1,
+            Self::Two => 2,
+        }
+    }
+}
+
 /// A recording with its answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concealed {
@@ -20,6 +31,13 @@ pub struct Concealed {
     pub files: Vec<(String, String)>,
     /// The answer.
     pub key: Key,
+}
+
+impl Concealed {
+    /// A recording of one table.
+    pub(crate) fn table(header: String, data: String, key: Key) -> Self {
+        Self { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+    }
 }
 
 /// What was hidden.

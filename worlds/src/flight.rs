@@ -6,6 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Uniform};
 
+use crate::GRAVITY_M_S2;
 use crate::noise::Noise;
 
 /// What is measured.
@@ -102,7 +103,6 @@ pub struct Drawn {
     pub runs: Vec<DrawnRun>,
 }
 
-const G: f64 = 9.80665;
 /// Steps of the integration in each frame.
 const STEPS: usize = 40;
 
@@ -185,7 +185,8 @@ impl FlightWorld {
             [
                 ly * y[5] - lz * y[4] - drag * air[0] - e.cord_per_s2 * (y[0] - origin[0]),
                 lz * y[3] - lx * y[5] - drag * air[1] - e.cord_per_s2 * (y[1] - origin[1]),
-                lx * y[4] - ly * y[3] - drag * air[2] - e.cord_per_s2 * (y[2] - origin[2]) + e.lift_m_s2 - G,
+                lx * y[4] - ly * y[3] - drag * air[2] - e.cord_per_s2 * (y[2] - origin[2]) + e.lift_m_s2
+                    - GRAVITY_M_S2,
             ]
         };
         let rate = |y: &[f64; 6], gust: [f64; 3]| {
@@ -219,7 +220,9 @@ impl FlightWorld {
                 Seen::Height => channels[0].push(seen[2]),
                 Seen::Space => channels.iter_mut().zip(seen).for_each(|(c, v)| c.push(v)),
                 // Specific force with an offset that every run has of its own.
-                Seen::Felt => channels[0].push(force(&y, gust_in(i * steps))[2] + G + 0.05 * phase.cos()),
+                Seen::Felt => {
+                    channels[0].push(force(&y, gust_in(i * steps))[2] + GRAVITY_M_S2 + 0.05 * phase.cos())
+                }
             }
             for step in i * steps..(i + 1) * steps {
                 let gust = gust_in(step);

@@ -31,19 +31,15 @@ impl Maker for Flights {
             ..FlightWorld::thrown(Seen::Space)
         };
         let effects = &mut world.effects;
-        match hidden {
-            Hidden::Nothing => {}
-            Hidden::One => listed(effects, choose(&mut rng, LISTED, 1)[0], &mut key, &mut rng),
-            Hidden::Two => {
-                for which in choose(&mut rng, LISTED, 2) {
-                    listed(effects, which, &mut key, &mut rng);
-                }
-            }
-            Hidden::Unlisted => unlisted(effects, &mut key, &mut rng),
+        for which in choose(&mut rng, LISTED, hidden.listed()) {
+            listed(effects, which, &mut key, &mut rng);
+        }
+        if hidden == Hidden::Unlisted {
+            unlisted(effects, &mut key, &mut rng);
         }
         let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n";
         let data = world.draw(seed ^ 0x5eed).csv(6);
-        Concealed { files: vec![("recording.toml".into(), header.into()), ("data.csv".into(), data)], key }
+        Concealed::table(header.into(), data, key)
     }
 }
 

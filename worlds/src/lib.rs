@@ -12,8 +12,12 @@ pub mod pendulum;
 pub mod press;
 pub mod presses;
 mod quadrature;
+mod set_up;
 mod sizing;
 pub mod tilt;
 pub mod tilts;
 pub mod wave;
 pub mod waves;
+
+/// Standard gravity in m/s^2.
+pub(crate) const GRAVITY_M_S2: f64 = 9.80665;

@@ -3,6 +3,7 @@
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
+use crate::GRAVITY_M_S2;
 use crate::noise::Noise;
 
 /// What slows the pendulum, as angular accelerations.
@@ -42,7 +43,7 @@ impl PendulumWorld {
         let step = 1.0 / self.rate_hz / STEPS as f64;
         let f = &self.friction;
         let smooth = |angle: f64, w: f64| {
-            -9.80665 / self.length_m * angle.sin() - (2.0 * f.viscous_per_s + f.quadratic * w.abs()) * w
+            -GRAVITY_M_S2 / self.length_m * angle.sin() - (2.0 * f.viscous_per_s + f.quadratic * w.abs()) * w
         };
         let (mut angle, mut w) = (released_rad, 0.0);
         let mut angles = Vec::with_capacity(self.rows);
@@ -90,7 +91,7 @@ mod tests {
         let angles = world(Friction::default()).swing(0.4);
         // T = 2 pi sqrt(l/g) (1 + a^2/16 + 11 a^4/3072), a = 0.4.
         let period = std::f64::consts::TAU
-            * (0.5f64 / 9.80665).sqrt()
+            * (0.5f64 / GRAVITY_M_S2).sqrt()
             * (1.0 + 0.4f64.powi(2) / 16.0 + 11.0 * 0.4f64.powi(4) / 3072.0);
         let down = |k: usize| angles[k] > 0.0 && angles[k + 1] <= 0.0;
         let crossings: Vec<f64> = (0..angles.len() - 1)
@@ -112,6 +113,6 @@ mod tests {
         let viscous = largest(Friction { viscous_per_s: 0.1, ..Friction::default() });
         assert!((viscous / 0.4 - (-0.75f64).exp()).abs() < 0.03, "{viscous}");
         let dry = largest(Friction { dry_rad_s2: 0.1, ..Friction::default() });
-        assert!((0.4 - dry - 10.5 * 2.0 * 0.1 * 0.5 / 9.80665).abs() < 0.01, "{dry}");
+        assert!((0.4 - dry - 10.5 * 2.0 * 0.1 * 0.5 / GRAVITY_M_S2).abs() < 0.01, "{dry}");
     }
 }

@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
+use crate::concealed::draw::{self, between, choose, log_between, sign, stated, whole};
 use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
 use crate::noise::Noise;
 use crate::press::{Effects, Indenter, PressWorld, Step};
-use crate::sizing::{Basis, change, sized};
+use crate::set_up::{self, Choice, SetUp};
+use crate::sizing::{Basis, change};
 
 /// The domain `indentation`.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +25,7 @@ const UNLISTED: usize = 3;
 type Conditions = (&'static str, Vec<String>);
 
 /// An indenter with its load cell, and what effects will look like before their size is known.
-struct SetUp {
+struct Press {
     world: PressWorld,
     conditions: Option<Conditions>,
     timed: bool,
@@ -50,90 +50,30 @@ impl Maker for Presses {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut key = Key::new(hidden);
-        let count = match hidden {
-            Hidden::Nothing | Hidden::Unlisted => 0,
-            Hidden::One => 1,
-            Hidden::Two => 2,
-        };
-        let sphere = whole(&mut rng, 0, 4) > 0;
-        let listed = choose(&mut rng, if sphere { LISTED } else { FOR_ALL }, count);
-        let which = whole(&mut rng, 0, UNLISTED - 1);
-        let returns = hidden == Hidden::Unlisted && which == 0;
-        let mut set_up = SetUp::draw(sphere, returns, listed.contains(&RELAXES), &mut rng);
-        let plain = set_up.basis();
-        let mut effects = Effects::default();
-        for listed in listed {
-            let wanted = strength(&mut rng);
-            let size = sized(wanted, set_up.bounds(listed), |size| {
-                let mut e = Effects::default();
-                set_up.set(&mut e, listed, size);
-                plain.left(&set_up.change(e))
-            });
-            set_up.set(&mut effects, listed, size);
-            set_up.say(&effects, listed, &mut key);
-        }
-        if count > 0 {
-            key.strength = Some(plain.left(&set_up.change(effects)));
-        }
-        if hidden == Hidden::Unlisted {
-            let bases = plain.with_pairs(&set_up.directions());
-            let rest = |e: Effects| {
-                let change = set_up.change(e);
-                bases.iter().map(|b| b.left(&change)).fold(f64::INFINITY, f64::min)
-            };
-            let wanted = strength(&mut rng);
-            let size =
-                sized(wanted, set_up.unlisted_bounds(which), |size| rest(set_up.unlisted(which, size)));
-            effects = set_up.unlisted(which, size);
-            key.strength = Some(rest(effects));
-            set_up.say_unlisted(which, &mut key);
-        }
-        set_up.world.effects = effects;
-        let [header, data] = set_up.files(&mut rng);
-        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+        set_up::conceal::<Press>(hidden, seed)
     }
 }
 
-impl SetUp {
-    fn draw(sphere: bool, returns: bool, relaxes: bool, rng: &mut ChaCha8Rng) -> Self {
-        let radius_m = [0.005, 0.0075, 0.01, 0.0125][whole(rng, 0, 3)];
-        let indenter =
-            if sphere { Indenter::Sphere(radius_m) } else { Indenter::Cone(between(rng, 0.3, 0.9)) };
-        let deepest_m = 1e-4 * (1e4 * radius_m * between(rng, 0.25, 0.7)).round();
-        let conditions = conditions(rng);
-        let kinds = conditions.as_ref().map_or(1, |(_, labels)| labels.len());
-        let softest = log_between(rng, 8e3, 5e4);
-        let stiffer = between(rng, 0.3, 1.2);
-        let moduli_pa: Vec<f64> = (0..kinds).map(|k| softest * (1.0 + stiffer * k as f64)).collect();
-        let timed = whole(rng, 0, 4) < 3 || relaxes;
-        let rests = timed && (whole(rng, 0, 2) > 0 || relaxes);
-        let up = returns || (timed && whole(rng, 0, 1) == 0);
-        let speed_m_s = log_between(rng, 3e-4, 3e-3);
-        let path = path(deepest_m, whole(rng, 25, 60), speed_m_s, rests.then(|| between(rng, 4.0, 15.0)), up);
-        let repeats = whole(rng, if kinds == 1 { 2 } else { 1 }, 3);
-        let runs = (0..kinds * repeats).map(|run| (run / repeats, path.clone())).collect();
-        let poisson_ratio = if whole(rng, 0, 3) == 0 { 0.45 } else { 0.5 };
-        let plane = softest / (1.0 - poisson_ratio * poisson_ratio);
-        let force_n = indenter.force_n(plane, deepest_m);
-        // A load cell that suits the forces.
-        let force = (force_n * log_between(rng, 3e-3, 2e-2)).clamp(5e-4, 1.5e-2);
-        let noise = draw::noise(rng, force);
-        Self {
-            force_n,
-            stiffest_n: force_n * moduli_pa[kinds - 1] / softest,
-            world: PressWorld { indenter, poisson_ratio, moduli_pa, runs, effects: Effects::default() },
-            conditions,
-            timed: timed || returns,
-            sigma: draw::sigma(&noise),
-            noise,
-            deepest_m,
-            signs: [sign(rng), sign(rng)],
-            tau_s: log_between(rng, 0.3, 8.0),
-            depth_m: deepest_m * between(rng, 0.4, 0.75),
-            pitch_m: deepest_m * between(rng, 0.12, 0.3),
-        }
+impl SetUp for Press {
+    type Effects = Effects;
+
+    fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
+        let sphere = whole(rng, 0, 4) > 0;
+        let listed = choose(rng, if sphere { LISTED } else { FOR_ALL }, hidden.listed());
+        let unlisted = whole(rng, 0, UNLISTED - 1);
+        let returns = hidden == Hidden::Unlisted && unlisted == 0;
+        let press = Self::drawn(sphere, returns, listed.contains(&RELAXES), rng);
+        (press, Choice { listed, unlisted })
+    }
+
+    fn tried(&self) -> Vec<usize> {
+        let count = if matches!(self.world.indenter, Indenter::Sphere(_)) { LISTED } else { FOR_ALL };
+        (0..count).filter(|listed| self.timed || *listed != RELAXES).collect()
+    }
+
+    /// Each of them has one sign.
+    fn turn(_: &mut ChaCha8Rng) -> f64 {
+        1.0
     }
 
     /// What the moduli can do to the readings.
@@ -148,33 +88,11 @@ impl SetUp {
         basis
     }
 
-    /// Readings in sigmas.
-    fn whitened(&self, effects: Effects, moduli_pa: &[f64]) -> Vec<f64> {
-        let world = PressWorld { effects, moduli_pa: moduli_pa.to_vec(), ..self.world.clone() };
-        world.readings().iter().map(|force| force / self.sigma).collect()
-    }
-
-    /// What effects do to the readings, in sigmas.
     fn change(&self, effects: Effects) -> Vec<f64> {
         let moduli = &self.world.moduli_pa;
         change(&self.whitened(Effects::default(), moduli), &self.whitened(effects, moduli))
     }
 
-    /// What the listed effects do when they are small.
-    fn directions(&self) -> Vec<Vec<f64>> {
-        let count = if matches!(self.world.indenter, Indenter::Sphere(_)) { LISTED } else { FOR_ALL };
-        (0..count)
-            .filter(|listed| self.timed || *listed != RELAXES)
-            .map(|listed| {
-                let mut e = Effects::default();
-                let [low, high] = self.bounds(listed);
-                self.set(&mut e, listed, (low * high).sqrt());
-                self.change(e)
-            })
-            .collect()
-    }
-
-    /// Between what sizes an effect is plausible.
     fn bounds(&self, listed: usize) -> [f64; 2] {
         let (d, f) = (self.deepest_m, self.force_n);
         match listed {
@@ -230,10 +148,6 @@ impl SetUp {
         }
     }
 
-    fn deep(&self) -> Place {
-        Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
-    }
-
     fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
         match which {
             0 => [2e-3, 0.6],
@@ -242,7 +156,7 @@ impl SetUp {
         }
     }
 
-    fn unlisted(&self, which: usize, size: f64) -> Effects {
+    fn unlisted(&self, which: usize, _turn: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
             0 => Effects { dent: size, ..none },
@@ -261,8 +175,8 @@ impl SetUp {
         key.place = place;
     }
 
-    fn files(&self, rng: &mut ChaCha8Rng) -> [String; 2] {
-        let w = &self.world;
+    fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let w = PressWorld { effects, ..self.world };
         let mut header = String::from("format = 1\ndomain = \"indentation\"\ndata = \"data.csv\"\n");
         if whole(rng, 0, 2) > 0 {
             let _ = write!(header, "\n[noise]\nforce_n = {:.3e}\n", stated(rng, &self.noise));
@@ -309,6 +223,57 @@ impl SetUp {
     }
 }
 
+impl Press {
+    fn drawn(sphere: bool, returns: bool, relaxes: bool, rng: &mut ChaCha8Rng) -> Self {
+        let radius_m = [0.005, 0.0075, 0.01, 0.0125][whole(rng, 0, 3)];
+        let indenter =
+            if sphere { Indenter::Sphere(radius_m) } else { Indenter::Cone(between(rng, 0.3, 0.9)) };
+        let deepest_m = 1e-4 * (1e4 * radius_m * between(rng, 0.25, 0.7)).round();
+        let conditions = conditions(rng);
+        let kinds = conditions.as_ref().map_or(1, |(_, labels)| labels.len());
+        let softest = log_between(rng, 8e3, 5e4);
+        let stiffer = between(rng, 0.3, 1.2);
+        let moduli_pa: Vec<f64> = (0..kinds).map(|k| softest * (1.0 + stiffer * k as f64)).collect();
+        let timed = whole(rng, 0, 4) < 3 || relaxes;
+        let rests = timed && (whole(rng, 0, 2) > 0 || relaxes);
+        let up = returns || (timed && whole(rng, 0, 1) == 0);
+        let speed_m_s = log_between(rng, 3e-4, 3e-3);
+        let path = path(deepest_m, whole(rng, 25, 60), speed_m_s, rests.then(|| between(rng, 4.0, 15.0)), up);
+        let repeats = whole(rng, if kinds == 1 { 2 } else { 1 }, 3);
+        let runs = (0..kinds * repeats).map(|run| (run / repeats, path.clone())).collect();
+        let poisson_ratio = if whole(rng, 0, 3) == 0 { 0.45 } else { 0.5 };
+        let plane = softest / (1.0 - poisson_ratio * poisson_ratio);
+        let force_n = indenter.force_n(plane, deepest_m);
+        // A load cell that suits the forces.
+        let force = (force_n * log_between(rng, 3e-3, 2e-2)).clamp(5e-4, 1.5e-2);
+        let noise = draw::noise(rng, force);
+        Self {
+            force_n,
+            stiffest_n: force_n * moduli_pa[kinds - 1] / softest,
+            world: PressWorld { indenter, poisson_ratio, moduli_pa, runs, effects: Effects::default() },
+            conditions,
+            timed: timed || returns,
+            sigma: draw::sigma(&noise),
+            noise,
+            deepest_m,
+            signs: [sign(rng), sign(rng)],
+            tau_s: log_between(rng, 0.3, 8.0),
+            depth_m: deepest_m * between(rng, 0.4, 0.75),
+            pitch_m: deepest_m * between(rng, 0.12, 0.3),
+        }
+    }
+
+    /// Readings in sigmas.
+    fn whitened(&self, effects: Effects, moduli_pa: &[f64]) -> Vec<f64> {
+        let world = PressWorld { effects, moduli_pa: moduli_pa.to_vec(), ..self.world.clone() };
+        world.readings().iter().map(|force| force / self.sigma).collect()
+    }
+
+    fn deep(&self) -> Place {
+        Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
+    }
+}
+
 /// What people vary from run to run, if anything.
 fn conditions(rng: &mut ChaCha8Rng) -> Option<Conditions> {
     let count = whole(rng, 2, 4);
@@ -349,32 +314,17 @@ fn path(deepest_m: f64, rows: usize, speed_m_s: f64, rest_s: Option<f64>, up: bo
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng as _;
+
     use super::*;
+    use crate::set_up::tests::every_effect_shows;
 
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
         for seed in 0..3 {
-            let set_up = SetUp::draw(true, true, true, &mut ChaCha8Rng::seed_from_u64(seed));
-            let plain = set_up.basis();
-            let left = |e: Effects| plain.left(&set_up.change(e));
-            for listed in 0..LISTED {
-                let strong = |size: f64| {
-                    let mut e = Effects::default();
-                    set_up.set(&mut e, listed, size);
-                    left(e)
-                };
-                let [low, high] = set_up.bounds(listed);
-                assert!(
-                    strong(high) > 5.0 * strong(low) && strong(high) > 10.0,
-                    "{listed}: {}",
-                    strong(high)
-                );
-            }
-            for which in 0..UNLISTED {
-                let [_, high] = set_up.unlisted_bounds(which);
-                assert!(left(set_up.unlisted(which, high)) > 10.0, "{which}");
-            }
-            assert!(left(Effects::default()) < 1e-9);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let press = Press::drawn(true, true, true, &mut rng);
+            every_effect_shows(&press, UNLISTED, 5.0, [10.0; 2]);
         }
     }
 }

@@ -4,9 +4,8 @@
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
+use crate::GRAVITY_M_S2;
 use crate::quadrature::gauss;
-
-const GRAVITY_M_S2: f64 = 9.80665;
 
 /// The space inside a cylindrical container, upright on its base.
 #[derive(Debug, Clone, Copy, PartialEq)]

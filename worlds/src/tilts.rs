@@ -3,13 +3,13 @@
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 
-use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
+use crate::concealed::draw::{self, between, choose, log_between, sign, stated, whole};
 use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
 use crate::noise::Noise;
-use crate::sizing::{Basis, change, sized};
+use crate::set_up::{self, Choice, SetUp};
+use crate::sizing::{Basis, change};
 use crate::tilt::{Cavity, Effects, Sweep, TiltWorld};
 
 /// The domain `liquid-tilt`.
@@ -20,7 +20,7 @@ const LISTED: usize = 9;
 const UNLISTED: usize = 4;
 
 /// A container in a gripper with its sensor, and what effects will look like before their size is known.
-struct SetUp {
+struct Container {
     world: TiltWorld,
     density_kg_m3: f64,
     density_known: bool,
@@ -41,91 +41,22 @@ impl Maker for Tilts {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut key = Key::new(hidden);
-        let mut set_up = SetUp::draw(&mut rng);
-        let plain = set_up.basis();
-        let mut effects = Effects::default();
-        let count = match hidden {
-            Hidden::Nothing | Hidden::Unlisted => 0,
-            Hidden::One => 1,
-            Hidden::Two => 2,
-        };
-        for listed in choose(&mut rng, LISTED, count) {
-            let wanted = strength(&mut rng);
-            let size = sized(wanted, set_up.bounds(listed), |size| {
-                let mut e = Effects::default();
-                set_up.set(&mut e, listed, size);
-                plain.left(&set_up.change(e))
-            });
-            set_up.set(&mut effects, listed, size);
-            set_up.say(&effects, listed, &mut key);
-        }
-        if count > 0 {
-            key.strength = Some(plain.left(&set_up.change(effects)));
-        }
-        if hidden == Hidden::Unlisted {
-            let which = whole(&mut rng, 0, UNLISTED - 1);
-            let bases = plain.with_pairs(&set_up.directions());
-            let rest = |e: Effects| {
-                let change = set_up.change(e);
-                bases.iter().map(|b| b.left(&change)).fold(f64::INFINITY, f64::min)
-            };
-            let (wanted, turn) = (strength(&mut rng), sign(&mut rng));
-            let bounds = set_up.unlisted_bounds(which);
-            let size = sized(wanted, bounds, |size| rest(set_up.unlisted(which, turn, size)));
-            effects = set_up.unlisted(which, turn, size);
-            key.strength = Some(rest(effects));
-            set_up.say_unlisted(which, &mut key);
-        }
-        set_up.world.effects = effects;
-        let [header, data] = set_up.files(&mut rng);
-        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+        set_up::conceal::<Container>(hidden, seed)
     }
 }
 
-impl SetUp {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
-        let outside = Cavity { radius_m: between(rng, 0.03, 0.05), length_m: between(rng, 0.15, 0.23) };
-        let density_kg_m3 = between(rng, 780.0, 1350.0);
-        let tilts_rad = poses(rng);
-        // Some sweep up and down by turns, so that an effect of the order shows.
-        let both_ways = whole(rng, 0, 2) == 0;
-        let runs = whole(rng, 3, 6);
-        let sweeps: Vec<Sweep> = (0..runs)
-            .map(|run| {
-                // Fills that are spread over the container, none of them empty or brim full.
-                let fill = 0.12 + 0.68 * (run as f64 + between(rng, 0.1, 0.9)) / runs as f64;
-                // Measured in to a millilitre; the file states it so.
-                let volume_m3 = (fill * outside.volume_m3() * 1e6).round() * 1e-6;
-                let mut tilts_rad = tilts_rad.clone();
-                if both_ways && run % 2 == 1 {
-                    tilts_rad.reverse();
-                }
-                Sweep { mass_kg: density_kg_m3 * volume_m3, volume_m3, tilts_rad }
-            })
-            .collect();
-        let [force, torque] = [log_between(rng, 8e-3, 3e-2), log_between(rng, 1.2e-4, 5e-4)];
-        let noise = [draw::noise(rng, force), draw::noise(rng, torque)];
-        let slip_run = whole(rng, 0, runs - 1);
-        Self {
-            density_kg_m3,
-            density_known: whole(rng, 0, 9) < 6,
-            volumes_known: whole(rng, 0, 1) == 0,
-            sigma: [draw::sigma(&noise[0]), draw::sigma(&noise[1])],
-            noise,
-            signs: std::array::from_fn(|_| sign(rng)),
-            slip_at: [slip_run, whole(rng, tilts_rad.len() / 4, 3 * tilts_rad.len() / 4)],
-            taut_from_rad: between(rng, 0.3, 0.65) * tilts_rad.iter().copied().fold(0.0, f64::max),
-            world: TiltWorld {
-                outside,
-                container_kg: between(rng, 0.05, 0.13),
-                gripper_kg: between(rng, 0.25, 0.6),
-                grasp_m: outside.length_m * between(rng, 0.25, 0.8),
-                sweeps,
-                effects: Effects::default(),
-            },
-        }
+impl SetUp for Container {
+    type Effects = Effects;
+
+    fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
+        let container = Self::drawn(rng);
+        let listed = choose(rng, LISTED, hidden.listed());
+        let unlisted = if hidden == Hidden::Unlisted { whole(rng, 0, UNLISTED - 1) } else { 0 };
+        (container, Choice { listed, unlisted })
+    }
+
+    fn tried(&self) -> Vec<usize> {
+        (0..LISTED).collect()
     }
 
     /// What is not known of the liquid can be anything: mass and volume of each run, as far as they are not stated.
@@ -151,35 +82,11 @@ impl SetUp {
         basis
     }
 
-    /// Readings in sigmas.
-    fn whitened(&self, world: &TiltWorld) -> Vec<f64> {
-        let [force, torque] = self.sigma;
-        world.readings().iter().flat_map(|[f, t]| [f / force, t / torque]).collect()
-    }
-
-    /// What effects do to the readings, in sigmas.
     fn change(&self, effects: Effects) -> Vec<f64> {
         let at_work = TiltWorld { effects, ..self.world.clone() };
         change(&self.whitened(&self.world), &self.whitened(&at_work))
     }
 
-    /// What the listed effects do when they are small.
-    fn directions(&self) -> Vec<Vec<f64>> {
-        (0..LISTED)
-            .map(|listed| {
-                let mut e = Effects::default();
-                let [low, high] = self.bounds(listed);
-                self.set(&mut e, listed, (low * high).sqrt());
-                self.change(e)
-            })
-            .collect()
-    }
-
-    fn rows(&self) -> f64 {
-        self.world.sweeps.iter().map(|s| s.tilts_rad.len() as f64).sum()
-    }
-
-    /// Between what sizes an effect is plausible.
     fn bounds(&self, listed: usize) -> [f64; 2] {
         match listed {
             0 => [1e-4, 4e-3],
@@ -224,17 +131,6 @@ impl SetUp {
         }
     }
 
-    /// From the pose of the slip to the end of its run.
-    fn late(&self) -> Place {
-        let [run, pose] = self.slip_at;
-        let late = &self.world.sweeps[run].tilts_rad[pose..];
-        Place {
-            variable: "theta_rad".into(),
-            from: late.iter().copied().fold(f64::INFINITY, f64::min),
-            to: late.iter().copied().fold(0.0, f64::max),
-        }
-    }
-
     fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
         match which {
             0 => [1e-4, 0.05],
@@ -269,8 +165,8 @@ impl SetUp {
         key.place = place;
     }
 
-    fn files(&self, rng: &mut ChaCha8Rng) -> [String; 2] {
-        let w = &self.world;
+    fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let w = TiltWorld { effects, ..self.world };
         let mut header = String::from("format = 1\ndomain = \"liquid-tilt\"\ndata = \"data.csv\"\n");
         if whole(rng, 0, 2) > 0 {
             let [force, torque] = [stated(rng, &self.noise[0]), stated(rng, &self.noise[1])];
@@ -318,6 +214,72 @@ impl SetUp {
     }
 }
 
+impl Container {
+    fn drawn(rng: &mut ChaCha8Rng) -> Self {
+        let outside = Cavity { radius_m: between(rng, 0.03, 0.05), length_m: between(rng, 0.15, 0.23) };
+        let density_kg_m3 = between(rng, 780.0, 1350.0);
+        let tilts_rad = poses(rng);
+        // Some sweep up and down by turns, so that an effect of the order shows.
+        let both_ways = whole(rng, 0, 2) == 0;
+        let runs = whole(rng, 3, 6);
+        let sweeps: Vec<Sweep> = (0..runs)
+            .map(|run| {
+                // Fills that are spread over the container, none of them empty or brim full.
+                let fill = 0.12 + 0.68 * (run as f64 + between(rng, 0.1, 0.9)) / runs as f64;
+                // Measured in to a millilitre; the file states it so.
+                let volume_m3 = (fill * outside.volume_m3() * 1e6).round() * 1e-6;
+                let mut tilts_rad = tilts_rad.clone();
+                if both_ways && run % 2 == 1 {
+                    tilts_rad.reverse();
+                }
+                Sweep { mass_kg: density_kg_m3 * volume_m3, volume_m3, tilts_rad }
+            })
+            .collect();
+        let [force, torque] = [log_between(rng, 8e-3, 3e-2), log_between(rng, 1.2e-4, 5e-4)];
+        let noise = [draw::noise(rng, force), draw::noise(rng, torque)];
+        let slip_run = whole(rng, 0, runs - 1);
+        Self {
+            density_kg_m3,
+            density_known: whole(rng, 0, 9) < 6,
+            volumes_known: whole(rng, 0, 1) == 0,
+            sigma: [draw::sigma(&noise[0]), draw::sigma(&noise[1])],
+            noise,
+            signs: std::array::from_fn(|_| sign(rng)),
+            slip_at: [slip_run, whole(rng, tilts_rad.len() / 4, 3 * tilts_rad.len() / 4)],
+            taut_from_rad: between(rng, 0.3, 0.65) * tilts_rad.iter().copied().fold(0.0, f64::max),
+            world: TiltWorld {
+                outside,
+                container_kg: between(rng, 0.05, 0.13),
+                gripper_kg: between(rng, 0.25, 0.6),
+                grasp_m: outside.length_m * between(rng, 0.25, 0.8),
+                sweeps,
+                effects: Effects::default(),
+            },
+        }
+    }
+
+    /// Readings in sigmas.
+    fn whitened(&self, world: &TiltWorld) -> Vec<f64> {
+        let [force, torque] = self.sigma;
+        world.readings().iter().flat_map(|[f, t]| [f / force, t / torque]).collect()
+    }
+
+    fn rows(&self) -> f64 {
+        self.world.sweeps.iter().map(|s| s.tilts_rad.len() as f64).sum()
+    }
+
+    /// From the pose of the slip to the end of its run.
+    fn late(&self) -> Place {
+        let [run, pose] = self.slip_at;
+        let late = &self.world.sweeps[run].tilts_rad[pose..];
+        Place {
+            variable: "theta_rad".into(),
+            from: late.iter().copied().fold(f64::INFINITY, f64::min),
+            to: late.iter().copied().fold(0.0, f64::max),
+        }
+    }
+}
+
 /// Stated tilts of a sweep, from upright on, in steps of whole half degrees.
 fn poses(rng: &mut ChaCha8Rng) -> Vec<f64> {
     let count = whole(rng, 12, 25);
@@ -329,33 +291,18 @@ fn poses(rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng as _;
+
     use super::*;
+    use crate::set_up::tests::every_effect_shows;
 
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
         for seed in 0..3 {
-            let mut set_up = SetUp::draw(&mut ChaCha8Rng::seed_from_u64(seed));
-            set_up.density_known = true;
-            let plain = set_up.basis();
-            let left = |e: Effects| plain.left(&set_up.change(e));
-            for listed in 0..LISTED {
-                let strong = |size: f64| {
-                    let mut e = Effects::default();
-                    set_up.set(&mut e, listed, size);
-                    left(e)
-                };
-                let [low, high] = set_up.bounds(listed);
-                assert!(
-                    strong(high) > 5.0 * strong(low) && strong(high) > 10.0,
-                    "{listed}: {}",
-                    strong(high)
-                );
-            }
-            for which in 0..UNLISTED {
-                let [_, high] = set_up.unlisted_bounds(which);
-                assert!(left(set_up.unlisted(which, 1.0, high)) > 10.0, "{which}");
-            }
-            assert!(left(Effects::default()) < 1e-9);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut container = Container::drawn(&mut rng);
+            container.density_known = true;
+            every_effect_shows(&container, UNLISTED, 5.0, [10.0; 2]);
         }
     }
 
@@ -363,11 +310,11 @@ mod tests {
     /// mass is known where both are.
     #[test]
     fn what_is_stated_is_not_free() {
-        let mut set_up = SetUp::draw(&mut ChaCha8Rng::seed_from_u64(8));
+        let mut container = Container::drawn(&mut ChaCha8Rng::seed_from_u64(8));
         let gain = Effects { force_gain: 0.002, ..Effects::default() };
         let mut left = |density, volumes| {
-            (set_up.density_known, set_up.volumes_known) = (density, volumes);
-            set_up.basis().left(&set_up.change(gain))
+            (container.density_known, container.volumes_known) = (density, volumes);
+            container.basis().left(&container.change(gain))
         };
         let [nothing, density, both] = [left(false, false), left(true, false), left(true, true)];
         assert!(both > density && density > nothing, "{both} {density} {nothing}");

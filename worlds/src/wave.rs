@@ -3,7 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-const GRAVITY_M_S2: f64 = 9.80665;
+use crate::GRAVITY_M_S2;
+
 /// Roots of the first and second antisymmetric mode of a cylinder (k R).
 pub(crate) const ROOTS: [f64; 2] = [1.841_184, 5.331_443];
 
@@ -258,7 +259,7 @@ mod tests {
     fn the_first_mode_is_a_damped_cosine() {
         let w = world(Effects::default());
         let k: f64 = ROOTS[0] / 0.04;
-        let omega = (9.80665 * k * (k * 4e-4 / (PI * 0.0016)).tanh()).sqrt();
+        let omega = (GRAVITY_M_S2 * k * (k * 4e-4 / (PI * 0.0016)).tanh()).sqrt();
         approx::assert_relative_eq!(w.omega_rad_s(ROOTS[0], w.depth_m()), omega, max_relative = 1e-12);
         let ratio = w.damping_ratio(w.depth_m());
         // Deep water: 0.79 sqrt(1e-6/(0.008 * 3.1316)) = 0.00499, and 1.6 % more for the bottom.

@@ -3,13 +3,13 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{self, between, choose, log_between, sign, stated, strength, whole};
+use crate::concealed::draw::{self, between, choose, log_between, stated, whole};
 use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
 use crate::noise::Noise;
-use crate::sizing::{Basis, change, sized};
+use crate::set_up::{self, Choice, SetUp};
+use crate::sizing::{Basis, change};
 use crate::wave::{Effects, ROOTS, Ring, Start, WaveWorld};
 
 /// The domain `slosh`.
@@ -20,7 +20,7 @@ const LISTED: usize = 7;
 const UNLISTED: usize = 4;
 
 /// A cylinder, its sensor, and what effects will look like before their size is known.
-struct SetUp {
+struct Bottle {
     world: WaveWorld,
     noise: Noise,
     /// One sigma of a reading.
@@ -42,106 +42,21 @@ impl Maker for Waves {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut key = Key::new(hidden);
-        let which = whole(&mut rng, 0, UNLISTED - 1);
-        let leaks = hidden == Hidden::Unlisted && which == 1;
-        let mut set_up = SetUp::draw(leaks, &mut rng);
-        let plain = set_up.basis();
-        let mut effects = Effects::default();
-        let count = match hidden {
-            Hidden::Nothing | Hidden::Unlisted => 0,
-            Hidden::One => 1,
-            Hidden::Two => 2,
-        };
-        for listed in choose(&mut rng, LISTED, count) {
-            let wanted = strength(&mut rng);
-            let size = sized(wanted, set_up.bounds(listed), |size| {
-                let mut e = Effects::default();
-                set_up.set(&mut e, listed, size);
-                plain.left(&set_up.change(e))
-            });
-            set_up.set(&mut effects, listed, size);
-            set_up.say(&effects, listed, &mut key);
-        }
-        if count > 0 {
-            key.strength = Some(plain.left(&set_up.change(effects)));
-        }
-        if hidden == Hidden::Unlisted {
-            let bases = plain.with_pairs(&set_up.directions());
-            let rest = |e: Effects| {
-                let change = set_up.change(e);
-                bases.iter().map(|b| b.left(&change)).fold(f64::INFINITY, f64::min)
-            };
-            let wanted = strength(&mut rng);
-            let (bounds, turn) = (set_up.unlisted_bounds(which), sign(&mut rng));
-            let size = sized(wanted, bounds, |size| rest(set_up.unlisted(which, turn, size)));
-            effects = set_up.unlisted(which, turn, size);
-            key.strength = Some(rest(effects));
-            set_up.say_unlisted(which, &mut key);
-        }
-        set_up.world.effects = effects;
-        let [header, data] = set_up.files(&mut rng);
-        Concealed { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+        set_up::conceal::<Bottle>(hidden, seed)
     }
 }
 
-impl SetUp {
-    fn draw(leaks: bool, rng: &mut ChaCha8Rng) -> Self {
-        let sideways = whole(rng, 0, 3) == 0;
-        // A force is the torque over the arm it acts with, 5 to 15 cm.
-        let sigma = if sideways { log_between(rng, 2e-3, 1e-2) } else { log_between(rng, 1.5e-4, 5e-4) };
-        let noise = draw::noise(rng, sigma);
-        let radius_m = between(rng, 0.03, 0.055);
-        // A leak is seen by the bottom, so the liquid must not be deep.
-        let depth = radius_m * if leaks { between(rng, 0.4, 0.7) } else { log_between(rng, 0.6, 2.8) };
-        let volume_m3 = std::f64::consts::PI * radius_m * radius_m * depth;
-        let largest = sigma * log_between(rng, 10.0, 60.0);
-        let runs = if leaks { whole(rng, 3, 6) } else { whole(rng, 2, 6) };
-        let starts = (0..runs)
-            .map(|_| Start {
-                amplitude: largest * between(rng, 0.5, 1.0),
-                phases_rad: std::array::from_fn(|_| between(rng, 0.0, TAU)),
-                reading: between(rng, -1.0, 1.0),
-            })
-            .collect();
-        let rate_hz = [50.0, 100.0, 125.0][whole(rng, 0, 2)];
-        let duration_s = between(rng, 5.0, 10.0);
-        let world = WaveWorld {
-            radius_m,
-            mass_kg: volume_m3 * between(rng, 780.0, 1300.0),
-            volume_m3,
-            viscosity_m2_s: log_between(rng, 8e-7, 3e-5),
-            starts,
-            rows: (duration_s * rate_hz) as usize,
-            rate_hz,
-            effects: Effects::default(),
-        };
-        let mode = |root: f64| world.omega_rad_s(root, world.depth_m());
-        // An arm's frequency is its own: far from the first three modes.
-        let modes = [mode(ROOTS[0]), mode(ROOTS[1]), mode(8.536)];
-        let arm = loop {
-            let omega = log_between(rng, 28.0, 110.0);
-            if modes.iter().all(|m| (omega / m - 1.0).abs() > 0.12) {
-                break omega;
-            }
-        };
-        let rings = [[modes[1], log_between(rng, 0.004, 0.03)], [arm, log_between(rng, 0.003, 0.03)]];
-        let hardens = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
-        let machine = [modes[0] * between(rng, 1.15, 1.8), duration_s * between(rng, 0.2, 0.6)];
-        let slip_s = duration_s * between(rng, 0.2, 0.8);
-        Self {
-            sigma: draw::sigma(&noise),
-            noise,
-            least_tension_n_m: log_between(rng, 0.015, 0.05),
-            lag_s: log_between(rng, 0.015, 0.15),
-            world,
-            sideways,
-            rings,
-            hardens,
-            machine,
-            slip_s,
-        }
+impl SetUp for Bottle {
+    type Effects = Effects;
+
+    fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
+        let unlisted = whole(rng, 0, UNLISTED - 1);
+        let bottle = Self::drawn(hidden == Hidden::Unlisted && unlisted == 1, rng);
+        (bottle, Choice { listed: choose(rng, LISTED, hidden.listed()), unlisted })
+    }
+
+    fn tried(&self) -> Vec<usize> {
+        (0..LISTED).collect()
     }
 
     /// What the amplitude, the phase and the viscosity of each run can do to the readings.
@@ -168,26 +83,12 @@ impl SetUp {
         basis
     }
 
-    /// What effects do to the readings, in sigmas.
     fn change(&self, effects: Effects) -> Vec<f64> {
         let at_work = WaveWorld { effects, ..self.world.clone() };
         let difference = change(&self.world.readings(), &at_work.readings());
         difference.iter().map(|x| x / self.sigma).collect()
     }
 
-    /// What the listed effects do when they are small.
-    fn directions(&self) -> Vec<Vec<f64>> {
-        (0..LISTED)
-            .map(|listed| {
-                let mut e = Effects::default();
-                let [low, high] = self.bounds(listed);
-                self.set(&mut e, listed, (low * high).sqrt());
-                self.change(e)
-            })
-            .collect()
-    }
-
-    /// Between what sizes an effect is plausible.
     fn bounds(&self, listed: usize) -> [f64; 2] {
         let largest = self.largest();
         match listed {
@@ -272,12 +173,8 @@ impl SetUp {
         key.place = place;
     }
 
-    fn largest(&self) -> f64 {
-        self.world.starts.iter().map(|s| s.amplitude).fold(0.0, f64::max)
-    }
-
-    fn files(&self, rng: &mut ChaCha8Rng) -> [String; 2] {
-        let w = &self.world;
+    fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let w = WaveWorld { effects, ..self.world };
         let channel = if self.sideways { "fx_n" } else { "tau_z_nm" };
         let mut header = String::from("format = 1\ndomain = \"slosh\"\ndata = \"data.csv\"\n");
         if whole(rng, 0, 2) > 0 {
@@ -305,45 +202,97 @@ impl SetUp {
     }
 }
 
+impl Bottle {
+    fn drawn(leaks: bool, rng: &mut ChaCha8Rng) -> Self {
+        let sideways = whole(rng, 0, 3) == 0;
+        // A force is the torque over the arm it acts with, 5 to 15 cm.
+        let sigma = if sideways { log_between(rng, 2e-3, 1e-2) } else { log_between(rng, 1.5e-4, 5e-4) };
+        let noise = draw::noise(rng, sigma);
+        let radius_m = between(rng, 0.03, 0.055);
+        // A leak is seen by the bottom, so the liquid must not be deep.
+        let depth = radius_m * if leaks { between(rng, 0.4, 0.7) } else { log_between(rng, 0.6, 2.8) };
+        let volume_m3 = std::f64::consts::PI * radius_m * radius_m * depth;
+        let largest = sigma * log_between(rng, 10.0, 60.0);
+        let runs = if leaks { whole(rng, 3, 6) } else { whole(rng, 2, 6) };
+        let starts = (0..runs)
+            .map(|_| Start {
+                amplitude: largest * between(rng, 0.5, 1.0),
+                phases_rad: std::array::from_fn(|_| between(rng, 0.0, TAU)),
+                reading: between(rng, -1.0, 1.0),
+            })
+            .collect();
+        let rate_hz = [50.0, 100.0, 125.0][whole(rng, 0, 2)];
+        let duration_s = between(rng, 5.0, 10.0);
+        let world = WaveWorld {
+            radius_m,
+            mass_kg: volume_m3 * between(rng, 780.0, 1300.0),
+            volume_m3,
+            viscosity_m2_s: log_between(rng, 8e-7, 3e-5),
+            starts,
+            rows: (duration_s * rate_hz) as usize,
+            rate_hz,
+            effects: Effects::default(),
+        };
+        let mode = |root: f64| world.omega_rad_s(root, world.depth_m());
+        // An arm's frequency is its own: far from the first three modes.
+        let modes = [mode(ROOTS[0]), mode(ROOTS[1]), mode(8.536)];
+        let arm = loop {
+            let omega = log_between(rng, 28.0, 110.0);
+            if modes.iter().all(|m| (omega / m - 1.0).abs() > 0.12) {
+                break omega;
+            }
+        };
+        let rings = [[modes[1], log_between(rng, 0.004, 0.03)], [arm, log_between(rng, 0.003, 0.03)]];
+        let hardens = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
+        let machine = [modes[0] * between(rng, 1.15, 1.8), duration_s * between(rng, 0.2, 0.6)];
+        let slip_s = duration_s * between(rng, 0.2, 0.8);
+        Self {
+            sigma: draw::sigma(&noise),
+            noise,
+            least_tension_n_m: log_between(rng, 0.015, 0.05),
+            lag_s: log_between(rng, 0.015, 0.15),
+            world,
+            sideways,
+            rings,
+            hardens,
+            machine,
+            slip_s,
+        }
+    }
+
+    fn largest(&self) -> f64 {
+        self.world.starts.iter().map(|s| s.amplitude).fold(0.0, f64::max)
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng as _;
+
     use super::*;
+    use crate::set_up::tests::every_effect_shows;
 
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
         for seed in 0..3 {
-            let set_up = SetUp::draw(true, &mut ChaCha8Rng::seed_from_u64(seed));
-            let plain = set_up.basis();
-            let left = |e: Effects| plain.left(&set_up.change(e));
-            for listed in 0..LISTED {
-                let strong = |size: f64| {
-                    let mut e = Effects::default();
-                    set_up.set(&mut e, listed, size);
-                    left(e)
-                };
-                let [low, high] = set_up.bounds(listed);
-                assert!(strong(high) > 1.3 * strong(low) && strong(high) > 3.0, "{listed}: {}", strong(high));
-            }
-            for which in 0..UNLISTED {
-                let [_, high] = set_up.unlisted_bounds(which);
-                assert!(left(set_up.unlisted(which, 1.0, high)) > 5.0, "{which}");
-            }
-            assert!(left(Effects::default()) < 1e-9);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let bottle = Bottle::drawn(true, &mut rng);
+            every_effect_shows(&bottle, UNLISTED, 1.3, [3.0, 5.0]);
         }
     }
 
     /// Another amplitude, phase and viscosity are nothing new.
     #[test]
     fn nuisances_are_taken_whole() {
-        let set_up = SetUp::draw(false, &mut ChaCha8Rng::seed_from_u64(5));
-        let mut other = set_up.world.clone();
+        let bottle = Bottle::drawn(false, &mut ChaCha8Rng::seed_from_u64(5));
+        let mut other = bottle.world.clone();
         other.starts[0].phases_rad[0] += 0.7;
         other.starts[1].amplitude *= 1.2;
         other.viscosity_m2_s *= 1.01;
-        let moved = change(&set_up.world.readings(), &other.readings());
-        let moved: Vec<f64> = moved.iter().map(|x| x / set_up.sigma).collect();
+        let moved = change(&bottle.world.readings(), &other.readings());
+        let moved: Vec<f64> = moved.iter().map(|x| x / bottle.sigma).collect();
         let whole = moved.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let left = set_up.basis().left(&moved);
+        let left = bottle.basis().left(&moved);
         assert!(whole > 30.0 && left < 0.01 * whole, "{left} of {whole}");
     }
 }

@@ -16,6 +16,9 @@ use missing_physics::model::{Experiment, Model, Spec};
 
 use crate::recording::{Header, ReadError};
 
+/// Standard gravity, m/s^2 (CGPM 1901).
+const GRAVITY_M_S2: f64 = 9.80665;
+
 /// A recording that was read, with the model of its set-up.
 pub struct Loaded {
     /// The data.

@@ -23,7 +23,7 @@ fn bend(column: &[f64], at: usize) -> f64 {
 fn a_vacuum_gives_parabolas() {
     let world = FlightWorld { noise: Noise::white(0.0), ..FlightWorld::thrown(Seen::Space) };
     for run in world.draw(1).runs {
-        for (column, g) in run.channels.iter().zip([0.0, 0.0, G]) {
+        for (column, g) in run.channels.iter().zip([0.0, 0.0, GRAVITY_M_S2]) {
             for i in 2..column.len() {
                 let bend = column[i] - 2.0 * column[i - 1] + column[i - 2];
                 assert_abs_diff_eq!(bend, -g / 3600.0, epsilon = 1e-12);
@@ -44,7 +44,7 @@ fn a_drop_under_quadratic_drag_follows_the_closed_form() {
     };
     let run = &still.draw(2).runs[0];
     for (t, z) in run.t_s.iter().zip(&run.channels[0]) {
-        let fallen = ((G * 0.03_f64).sqrt() * t).cosh().ln() / 0.03;
+        let fallen = ((GRAVITY_M_S2 * 0.03_f64).sqrt() * t).cosh().ln() / 0.03;
         assert_abs_diff_eq!(run.channels[0][0] - z, fallen, epsilon = 1e-9);
     }
 }
@@ -57,7 +57,7 @@ fn the_integration_is_of_fourth_order() {
     let (t, _) = world.fly([0.0; 6], 12, 0.0, 1);
     let error = |steps| {
         let (_, channels) = world.fly([0.0; 6], 12, 0.0, steps);
-        let fallen = |t: f64| ((G * 0.3_f64).sqrt() * t).cosh().ln() / 0.3;
+        let fallen = |t: f64| ((GRAVITY_M_S2 * 0.3_f64).sqrt() * t).cosh().ln() / 0.3;
         t.iter().zip(&channels[0]).map(|(t, z)| (z + fallen(*t)).abs()).fold(0.0, f64::max)
     };
     for steps in [2, 4, 8] {
@@ -72,7 +72,7 @@ fn linear_drag_in_wind_with_lift_follows_the_closed_form() {
     let (r, wind, lift) = (0.4, [1.5, -0.7], 0.3);
     let (t_s, seen) =
         flight(Effects { linear_per_s: r, wind_m_s: wind, lift_m_s2: lift, ..Effects::default() });
-    let last = [wind[0], wind[1], (lift - G) / r];
+    let last = [wind[0], wind[1], (lift - GRAVITY_M_S2) / r];
     for (i, t) in t_s.iter().enumerate() {
         for c in 0..3 {
             let expected = START[c] + last[c] * t - (START[3 + c] - last[c]) * (-r * t).exp_m1() / r;
@@ -103,10 +103,10 @@ fn wind_carries_a_flight_with_it() {
 fn magnus_lift_draws_a_cycloid() {
     let l = 0.8;
     let (t_s, seen) = flight(Effects { magnus_per_s: [0.0, l, 0.0], ..Effects::default() });
-    let (u, w) = (START[3] + G / l, START[5]);
+    let (u, w) = (START[3] + GRAVITY_M_S2 / l, START[5]);
     for (i, t) in t_s.iter().enumerate() {
         let (sin, cos) = (l * t).sin_cos();
-        let x = START[0] - G / l * t + (u * sin + w * (1.0 - cos)) / l;
+        let x = START[0] - GRAVITY_M_S2 / l * t + (u * sin + w * (1.0 - cos)) / l;
         let z = START[2] + (w * sin - u * (1.0 - cos)) / l;
         assert_abs_diff_eq!(seen[0][i], x, epsilon = 1e-9);
         assert_abs_diff_eq!(seen[1][i], START[1] + START[4] * t, epsilon = 1e-9);
@@ -122,12 +122,12 @@ fn magnus_lift_is_across_both_vectors() {
     let along = |v: [f64; 3]| v[0] * l[0] + v[1] * l[1] + v[2] * l[2];
     for (i, t) in t_s.iter().enumerate() {
         let expected = along([START[0], START[1], START[2]]) + along([START[3], START[4], START[5]]) * t
-            - 0.5 * G * l[2] * t * t;
+            - 0.5 * GRAVITY_M_S2 * l[2] * t * t;
         assert_abs_diff_eq!(along([seen[0][i], seen[1][i], seen[2][i]]), expected, epsilon = 1e-10);
     }
     // The middle of the three rows is 1/30 s after the start.
-    let [u, v, w] = [START[3], START[4], START[5] - G / 30.0];
-    let cross = [l[1] * w - l[2] * v, l[2] * u - l[0] * w, l[0] * v - l[1] * u - G];
+    let [u, v, w] = [START[3], START[4], START[5] - GRAVITY_M_S2 / 30.0];
+    let cross = [l[1] * w - l[2] * v, l[2] * u - l[0] * w, l[0] * v - l[1] * u - GRAVITY_M_S2];
     for c in 0..3 {
         assert_abs_diff_eq!(bend(&seen[c], 0), cross[c], epsilon = 0.002);
     }
@@ -141,7 +141,7 @@ fn a_cord_swings_about_its_rest() {
     for (i, t) in t_s.iter().enumerate() {
         let (sin, cos) = (omega * t).sin_cos();
         assert_abs_diff_eq!(seen[0][i], START[0] + START[3] / omega * sin, epsilon = 1e-9);
-        let z = START[2] + START[5] / omega * sin - G / c * (1.0 - cos);
+        let z = START[2] + START[5] / omega * sin - GRAVITY_M_S2 / c * (1.0 - cos);
         assert_abs_diff_eq!(seen[2][i], z, epsilon = 1e-9);
     }
 }
@@ -190,7 +190,8 @@ fn a_gust_acts_within_its_window() {
 fn a_tilted_camera_sees_gravity_lean() {
     let (a, b) = (0.02, -0.03);
     let (_, seen) = flight(Effects { camera_tilt_rad: [a, b], ..Effects::default() });
-    let expected = [-G * a.cos() * b.sin(), G * a.sin(), -G * a.cos() * b.cos()];
+    let expected =
+        [-GRAVITY_M_S2 * a.cos() * b.sin(), GRAVITY_M_S2 * a.sin(), -GRAVITY_M_S2 * a.cos() * b.cos()];
     for at in [0, 20, 40] {
         for c in 0..3 {
             assert_abs_diff_eq!(bend(&seen[c], at), expected[c], epsilon = 1e-9);
@@ -206,10 +207,10 @@ fn a_tilted_camera_sees_gravity_lean() {
 #[test]
 fn scale_and_clock_change_the_gravity_that_is_seen() {
     let (_, seen) = flight(Effects { camera_scale: 0.02, ..Effects::default() });
-    assert_abs_diff_eq!(bend(&seen[2], 7), -G * 1.02, epsilon = 1e-9);
+    assert_abs_diff_eq!(bend(&seen[2], 7), -GRAVITY_M_S2 * 1.02, epsilon = 1e-9);
     assert_abs_diff_eq!(seen[0][0], START[0] * 1.02, epsilon = 1e-15);
     let (t_s, seen) = flight(Effects { clock_rate: 0.02, ..Effects::default() });
-    assert_abs_diff_eq!(bend(&seen[2], 7), -G / (1.02 * 1.02), epsilon = 1e-9);
+    assert_abs_diff_eq!(bend(&seen[2], 7), -GRAVITY_M_S2 / (1.02 * 1.02), epsilon = 1e-9);
     assert_abs_diff_eq!(t_s[30], 1.0, epsilon = 1e-12);
 }
 
@@ -238,7 +239,7 @@ fn on_board_only_what_is_not_gravity_is_felt() {
     let effects = Effects { linear_per_s: r, ..Effects::default() };
     let (t_s, felt) = quiet(Seen::Felt, effects).fly(START, ROWS, 1.0, STEPS);
     for (t, a) in t_s.iter().zip(&felt[0]) {
-        let speed = (START[5] + G / r) * (-r * t).exp() - G / r;
+        let speed = (START[5] + GRAVITY_M_S2 / r) * (-r * t).exp() - GRAVITY_M_S2 / r;
         assert_abs_diff_eq!(a - free[0], -r * speed, epsilon = 1e-9);
     }
 }

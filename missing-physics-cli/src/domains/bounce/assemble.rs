@@ -7,7 +7,7 @@ use missing_physics::model::Quantity;
 use super::array::Microphones;
 use super::drop::{Drop, Effects};
 use super::experiments::{experiments, of_times};
-use super::model::{BounceModel, Setup};
+use super::model::{BounceModel, COPIES, Setup};
 use super::read::{Heard, Rig};
 use super::spread::{Known, judge};
 use super::times::TimesModel;
@@ -85,12 +85,13 @@ fn placed(
         let label = crate::recording::quoted(&h.label);
         (h.row, format!("times and places of a bouncing ball in run {label}"))
     };
-    let (spread, linear) =
+    let judged =
         judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
-    let mut model = BounceModel::new(setup, nominal, spread, microphones.clone());
+    let kappa = judged.spread.kappa;
+    let mut model = BounceModel::new(setup, nominal, (judged.spread, judged.plausible), microphones.clone());
     let mut runs = Vec::new();
-    for (h, linear) in heard.iter().zip(linear) {
-        runs.push(model.run(&h.label, linear, &h.drop, &h.numbers).ok_or_else(|| senseless(h))?);
+    for (h, linear) in heard.iter().zip(judged.drops) {
+        runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, COPIES).ok_or_else(|| senseless(h))?);
     }
     let mut channels = vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")];
     channels.extend((0..microphones.spare()).map(|k| {
@@ -117,7 +118,7 @@ fn placed(
     let mut undetermined = vec![format!(
         "how a direction was scattered and how a place was misheard are told apart by the lengths of the flights alone \
          (here: kappa about {:.0})",
-        spread.kappa
+        kappa
     )];
     if !setup.dropped {
         undetermined.push(UNTIED.into());

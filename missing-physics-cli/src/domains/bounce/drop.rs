@@ -144,6 +144,31 @@ impl Drop {
         }
     }
 
+    /// The same drop with its places on the straight line nearest to them, along which each flight gets as far as the square of
+    /// its duration: restitution shortens the speed along the table and that across it alike.
+    pub(super) fn straight(&self) -> Self {
+        let far: Vec<f64> = std::iter::once(0.0)
+            .chain(self.times_s.windows(2).scan(0.0, |far, w| {
+                *far += (w[1] - w[0]).powi(2);
+                Some(*far)
+            }))
+            .collect();
+        let n = self.places_m.len().max(1) as f64;
+        let middle = far.iter().sum::<f64>() / n;
+        let square: f64 = far.iter().map(|s| (s - middle).powi(2)).sum();
+        let mut drop = self.clone();
+        for axis in 0..2 {
+            let mean = self.places_m.iter().map(|p| p[axis]).sum::<f64>() / n;
+            let along = |(s, p): (&f64, &[f64; 2])| (s - middle) * (p[axis] - mean);
+            let slope = far.iter().zip(&self.places_m).map(along).sum::<f64>() / square;
+            if slope.is_finite() {
+                let line = drop.places_m.iter_mut().zip(&far);
+                line.for_each(|(p, s)| p[axis] = mean + slope * (s - middle));
+            }
+        }
+        drop
+    }
+
     fn place(&self, impact: usize) -> [f64; 2] {
         self.places_m.get(impact).copied().unwrap_or_default()
     }
@@ -218,6 +243,11 @@ impl Drop {
     /// How many impacts went unheard within a flight.
     fn hidden(&self, flight: usize) -> usize {
         self.unheard.get(flight + 1).copied().unwrap_or(0)
+    }
+
+    /// Speed at which the ball leaves the first impact, m/s.
+    pub(super) fn leaves_m_s(&self, effects: &Effects) -> f64 {
+        speed(&self.flight(0, effects, self.hidden(0), Part::First).0)
     }
 
     /// Where the ball heads after an impact.

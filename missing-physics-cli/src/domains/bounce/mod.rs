@@ -5,6 +5,7 @@
 
 mod array;
 mod assemble;
+mod chance;
 mod drop;
 mod experiments;
 mod model;
@@ -22,7 +23,7 @@ use self::model::Setup;
 use self::read::{Rig, heard};
 use self::spread::Known;
 use super::reading::number;
-use super::{Domain, Loaded, Template};
+use super::{Domain, GRAVITY_M_S2, Loaded, Template};
 use crate::recording::{Column, Header, ReadError};
 
 const COLUMNS: [Column; 5] = [
@@ -33,7 +34,6 @@ const COLUMNS: [Column; 5] = [
     number("y_m", "place in metres"),
 ];
 const THREE_MICROPHONES: &str = "with three microphones a wrong place of one, or a wrong speed of sound, leaves no trace: a fourth would show it";
-const GRAVITY_M_S2: f64 = 9.80665;
 
 /// The domain.
 #[derive(Debug, Clone, Copy)]

@@ -4,8 +4,12 @@ use std::collections::HashMap;
 
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
 
 use super::array::{Microphones, Wrong};
+use super::chance::errors_by_chance;
 use super::drop::{Drop, Effects, PER_IMPACT};
 use super::spec::{Places, build};
 use super::weights::{Linear, Spread, Weights};
@@ -34,7 +38,12 @@ struct Known {
     shown: Vec<f64>,
     /// Where each impact was heard, and when by each microphone.
     arrivals: Vec<([f64; 2], Vec<f64>)>,
+    /// What chance alone may do to it, in sigmas, `[world][copy][channel][impact]`.
+    by_chance: Vec<Vec<Vec<Vec<f64>>>>,
 }
+
+/// Simulated drops for each measured one and each plausible spread.
+pub(super) const COPIES: usize = 5;
 
 /// The model of the domain `bounce`.
 #[derive(Debug)]
@@ -43,15 +52,31 @@ pub(super) struct BounceModel {
     spec: Spec,
     places: Places,
     spread: Spread,
+    /// Other spreads that the drops leave possible.
+    plausible: Vec<Spread>,
     nominal: Effects,
     microphones: Microphones,
     drops: HashMap<String, Known>,
 }
 
 impl BounceModel {
-    pub(super) fn new(setup: Setup, nominal: Effects, spread: Spread, microphones: Microphones) -> Self {
+    pub(super) fn new(
+        setup: Setup,
+        nominal: Effects,
+        (spread, plausible): (Spread, Vec<Spread>),
+        microphones: Microphones,
+    ) -> Self {
         let (builder, places) = build(&setup, nominal.restitution);
-        Self { setup, spec: builder.spec, places, spread, microphones, nominal, drops: HashMap::new() }
+        Self {
+            setup,
+            spec: builder.spec,
+            places,
+            spread,
+            plausible,
+            microphones,
+            nominal,
+            drops: HashMap::new(),
+        }
     }
 
     pub(super) fn setup(&self) -> &Setup {
@@ -65,14 +90,23 @@ impl BounceModel {
     /// A drop that was not measured, about itself.
     pub(super) fn imagined(&mut self, label: &str, drop: &Drop, numbers: &[f64]) -> Option<Run> {
         let linear = Linear::new(drop, &self.nominal);
-        self.run(label, linear, drop, numbers)
+        self.run(label, linear, drop, numbers, 0)
     }
 
     /// The run of a drop: what is known of each of its impacts, and their errors. `None` where the drop makes no sense.
-    pub(super) fn run(&mut self, label: &str, linear: Linear, drop: &Drop, numbers: &[f64]) -> Option<Run> {
+    /// Chance is asked `copies` times what it would have done in its place.
+    pub(super) fn run(
+        &mut self,
+        label: &str,
+        linear: Linear,
+        drop: &Drop,
+        numbers: &[f64],
+        copies: usize,
+    ) -> Option<Run> {
         let (n, first) = (drop.impacts(), drop.first());
         let speeds = linear.drop.speeds(&self.nominal);
         let places = linear.drop.places_m.clone();
+        let by_chance = self.by_chance(&linear, drop, copies);
         let weights = Weights::new(linear, self.spread)?;
         let shown = weights.errors(&self.nominal)?.as_slice().to_vec();
         if shown.iter().any(|v| !v.is_finite()) {
@@ -93,8 +127,29 @@ impl BounceModel {
             };
             (0..n).map(heard).collect::<Vec<f64>>()
         }));
-        self.drops.insert(label.to_owned(), Known { weights, shown, arrivals });
+        self.drops.insert(label.to_owned(), Known { weights, shown, arrivals, by_chance });
         Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
+    }
+
+    fn by_chance(&self, likely: &Linear, drop: &Drop, copies: usize) -> Vec<Vec<Vec<Vec<f64>>>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(0xba11);
+        rng.set_stream(self.drops.len() as u64);
+        let sigmas = self.spread.of_channels();
+        let mut world = |truth: &Spread| {
+            let errors = errors_by_chance(likely, &self.nominal, [truth, &self.spread], copies, &mut rng);
+            let mut shaped = |errors: Vec<f64>| {
+                let of = |k: usize| (0..drop.impacts()).map(move |i| drop.row(i, k));
+                let mut channels: Vec<Vec<f64>> =
+                    (0..PER_IMPACT).map(|k| of(k).map(|row| errors[row] / sigmas[k]).collect()).collect();
+                let mut white = || (0..drop.impacts()).map(|_| StandardNormal.sample(&mut rng)).collect();
+                channels.extend((0..self.microphones.spare()).map(|_| white()));
+                channels
+            };
+            errors.into_iter().map(&mut shaped).collect::<Vec<_>>()
+        };
+        let worlds: Vec<_> = self.plausible.iter().map(&mut world).collect();
+        // A drop that can hardly be simulated has no law of its own.
+        if worlds.iter().all(|copies| !copies.is_empty()) { worlds } else { Vec::new() }
     }
 
     fn wrong(&self, shared: &[f64]) -> Wrong {
@@ -140,6 +195,10 @@ impl Model for BounceModel {
 
     fn prediction_is_clean(&self) -> bool {
         false
+    }
+
+    fn by_chance(&self, run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
+        self.drops.get(&run.label).map_or(&[], |known| &known.by_chance)
     }
 
     /// Errors come apart by their own covariance.

@@ -2,8 +2,8 @@
 
 use bounce_audio::flight::drag_per_m;
 
-use super::GRAVITY_M_S2;
 use super::drop::Drop;
+use crate::domains::GRAVITY_M_S2;
 use crate::domains::reading::check_runs;
 use crate::recording::{Header, ReadError, Table};
 

@@ -3,6 +3,9 @@
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
 
 use super::drop::{Drop, Effects};
 use super::weights::{Linear, Spread};
@@ -70,6 +73,44 @@ impl Likelihood<'_> {
         list
     }
 
+    /// Spreads about the start, which is the best one, drawn from the normal law that the likelihood's curvature gives; what it
+    /// does not tell is left open by a factor of some e-folds.
+    fn plausible(&self) -> Vec<Spread> {
+        const STEP: f64 = 0.3;
+        const OPEN: f64 = 1.5;
+        let n = self.unknowns().len();
+        let at = |moves: &[(usize, f64)]| {
+            let mut logs = vec![0.0; n];
+            moves.iter().for_each(|&(k, by)| logs[k] += by);
+            self.value(&self.spread(&logs)).map_or(f64::INFINITY, |v| v.0)
+        };
+        let centre = at(&[]);
+        let mut information = DMatrix::identity(n, n) / (OPEN * OPEN);
+        for i in 0..n {
+            for j in 0..n {
+                let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+                let bend: f64 = if i == j {
+                    0.5 * (at(&[(i, STEP)]) + at(&[(i, -STEP)]) - 2.0 * centre)
+                } else {
+                    corners.iter().map(|(a, b)| 0.125 * a * b * at(&[(i, a * STEP), (j, b * STEP)])).sum()
+                };
+                information[(i, j)] += if bend.is_finite() { bend / (STEP * STEP) } else { 0.0 };
+            }
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(0x5eed);
+        let root = information.cholesky().map(|factor| factor.l().transpose());
+        (0..PLAUSIBLE)
+            .map(|_| {
+                let mut logs = DVector::from_fn(n, |_, _| StandardNormal.sample(&mut rng));
+                match &root {
+                    Some(root) => drop(root.solve_upper_triangular_mut(&mut logs)),
+                    None => logs.fill(0.0),
+                }
+                self.spread(logs.as_slice())
+            })
+            .collect()
+    }
+
     /// Minus twice the logarithm, up to a constant, and the nuisances' best values.
     fn value(&self, spread: &Spread) -> Option<(f64, DVector<f64>)> {
         let columns = NUISANCES.len();
@@ -104,9 +145,24 @@ impl CostFunction for Likelihood<'_> {
     }
 }
 
+/// How often a drop is linearised anew about a likelier course.
+pub(super) const ROUNDS: usize = 3;
+
+/// What is judged of a set of drops.
+pub(super) struct Judged {
+    /// The likeliest spread of all drops.
+    pub(super) spread: Spread,
+    /// Spreads that are as likely as not, drawn by their probability.
+    pub(super) plausible: Vec<Spread>,
+    /// Each drop about its likely course.
+    pub(super) drops: Vec<Linear>,
+}
+
+/// How many plausible spreads are drawn.
+const PLAUSIBLE: usize = 16;
+
 /// The spread of all drops and each drop about its likely course; `None` where a drop makes no sense.
-pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<(Spread, Vec<Linear>)> {
-    const ROUNDS: usize = 3;
+pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<Judged> {
     let [x, y] = known.place_m;
     let mut spread = Spread {
         time_s: known.time_s.unwrap_or(1e-4),
@@ -115,19 +171,21 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<(
         came_rad: 0.03,
         restitution: if known.time_s.is_some() { 0.0 } else { 1e-3 },
     };
-    let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::new(d, effects)).collect();
+    let mut plausible = vec![spread; PLAUSIBLE];
+    let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::about_straight(d, effects)).collect();
     for _ in 0..ROUNDS {
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, effects)).collect();
         let likelihood = Likelihood { drops: &parts, known, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);
         let (_, moved) = likelihood.value(&spread)?;
+        plausible = Likelihood { start: spread, ..likelihood }.plausible();
         let mut likely = *effects;
         NUISANCES.iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
         likely.friction = 0.0;
         likely.drag_per_m = likely.drag_per_m.max(0.0);
         linear = linear.iter().map(|l| l.likely(&likely, &spread)).collect::<Option<_>>()?;
     }
-    Some((spread, linear))
+    Some(Judged { spread, plausible, drops: linear })
 }
 
 /// A drop with its errors and what the nuisances make of them.

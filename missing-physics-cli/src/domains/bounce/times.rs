@@ -11,7 +11,7 @@ use bounce_audio::impact::{rebound, speed_after_drop};
 use super::drop::Drop;
 use super::model::Setup;
 use super::spec::{Places, build};
-use crate::domains::builder::At;
+use crate::domains::builder::{ANY, At};
 
 /// The model of times alone.
 #[derive(Debug)]
@@ -117,8 +117,7 @@ impl TimesModel {
 
 fn build_times(setup: &Setup, restitution: f64) -> (Spec, Places, At, Option<At>) {
     let (mut b, places) = build(setup, restitution);
-    let any = [f64::NEG_INFINITY, f64::INFINITY];
-    let begins = b.own("first_impact_s", "s", any, 0.1);
+    let begins = b.own("first_impact_s", "s", ANY, 0.1);
     let leaves = (!setup.dropped).then(|| b.own("leaves_m_s", "m/s", [0.0, 1e3], 0.5));
     (b.spec, places, begins, leaves)
 }

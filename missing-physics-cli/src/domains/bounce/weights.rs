@@ -6,7 +6,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::drop::{Drop, Effects, Measured};
+use super::drop::{Drop, Effects, Measured, PER_IMPACT};
 
 /// Sigmas of what is measured, and the spread of directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +19,13 @@ pub(super) struct Spread {
     pub(super) came_rad: f64,
     /// Scatter of the restitution's logarithm from impact to impact; zero where the clock's sigma is known.
     pub(super) restitution: f64,
+}
+
+impl Spread {
+    /// One sigma of a whitened error in each channel: its unit is that of what was measured.
+    pub(super) fn of_channels(&self) -> [f64; PER_IMPACT] {
+        [self.time_s, self.place_m[0], self.place_m[1]]
+    }
 }
 
 /// A drop whose errors are linear in what is measured, about a likely drop near the measured one.
@@ -42,6 +49,14 @@ impl Linear {
     /// About the measured drop itself.
     pub(super) fn new(measured: &Drop, effects: &Effects) -> Self {
         Self::about(measured, measured.clone(), effects)
+    }
+
+    /// About a drop that keeps its first heading, as near to the measured places as such a one comes.
+    ///
+    /// Late flights are so short that an ear's error exceeds them: headings read from them point anywhere, and a linearisation
+    /// that begins there stays there.
+    pub(super) fn about_straight(measured: &Drop, effects: &Effects) -> Self {
+        Self::about(measured, measured.straight(), effects)
     }
 
     fn about(measured: &Drop, drop: Drop, effects: &Effects) -> Self {
@@ -227,7 +242,7 @@ impl Weights {
         let drop = &self.linear.drop;
         let rows = |channel: usize| (0..drop.impacts()).map(move |impact| drop.row(impact, channel));
         let mut white = self.linear.errors(effects);
-        let mut scale = [self.spread.time_s, self.spread.place_m[0], self.spread.place_m[1]];
+        let mut scale = self.spread.of_channels();
         if effects.friction == 0.0 {
             self.factor.l_dirty().solve_lower_triangular_mut(&mut white).then_some(())?;
         } else {

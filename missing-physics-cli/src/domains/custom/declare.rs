@@ -6,11 +6,8 @@ use std::time::Duration;
 use missing_physics::model::Scope;
 
 use super::process::Start;
-use crate::domains::builder::{At, Builder};
+use crate::domains::builder::{ANY, At, Builder};
 use crate::recording::{Header, ReadError, Section, quoted};
-
-/// Any number.
-const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// The program, where the recording names one, and the step of derivatives.
 pub(super) fn program(header: &Header) -> Result<(Option<Start>, f64), ReadError> {

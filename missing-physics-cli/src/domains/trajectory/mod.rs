@@ -8,7 +8,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Quantity, Spec};
 
 use super::reading::{calibration, check_runs, number, resolution};
-use super::{Domain, Loaded, Template};
+use super::{Domain, GRAVITY_M_S2, Loaded, Template};
 use crate::recording::{Column, Header, ReadError, Table};
 use model::{Axes, Setup, TrajectoryModel};
 
@@ -61,7 +61,7 @@ impl Domain for Trajectory {
             axes: Axes::Space,
             mass_kg: Some(1.0),
             diameter_m: Some(1.0),
-            gravity_m_s2: 9.80665,
+            gravity_m_s2: GRAVITY_M_S2,
             air_density_kg_m3: 1.2,
             spin: false,
         };
@@ -76,7 +76,7 @@ impl Domain for Trajectory {
         let rig = header.section("rig")?;
         let mass_kg = rig.number("mass_kg", 1e-9, 1e6)?;
         let diameter_m = rig.number("diameter_m", 1e-6, 1e3)?;
-        let gravity_m_s2 = rig.number("gravity_m_s2", 0.0, 100.0)?.unwrap_or(9.80665);
+        let gravity_m_s2 = rig.number("gravity_m_s2", 0.0, 100.0)?.unwrap_or(GRAVITY_M_S2);
         let air_density_kg_m3 = rig.number("air_density_kg_m3", 0.0, 2e3)?.unwrap_or(1.2);
         let table = header.table("data", &COLUMNS)?;
         let labels = table.labels("run", "the label of each row's run")?;

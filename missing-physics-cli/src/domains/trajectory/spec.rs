@@ -2,54 +2,21 @@
 
 use std::sync::Arc;
 
-use missing_physics::model::{Derived, Mechanism, Parameter, Quantity, Scope, Spec, Term};
+use missing_physics::model::{Derived, Quantity, Spec, Term};
 
 use super::model::{Axes, Role, Setup};
+use crate::domains::builder::{ANY, At, Builder};
 
-/// Builds up a specification.
-struct Builder {
-    spec: Spec,
+/// A specification in the making, with the meaning of each shared parameter, in order.
+struct Flying {
+    b: Builder,
     roles: Vec<Role>,
 }
 
-impl Builder {
-    fn shared(&mut self, role: Role, name: &str, unit: &str, [lower, upper]: [f64; 2], scale: f64) -> usize {
+impl Flying {
+    fn shared(&mut self, role: Role, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> At {
         self.roles.push(role);
-        self.parameter(name, unit, Scope::Shared, [lower, upper], scale)
-    }
-
-    fn parameter(&mut self, name: &str, unit: &str, scope: Scope, bounds: [f64; 2], scale: f64) -> usize {
-        self.spec.parameters.push(Parameter {
-            name: name.into(),
-            unit: unit.into(),
-            scope,
-            start: 0.0,
-            lower: bounds[0],
-            upper: bounds[1],
-            scale,
-        });
-        self.spec.parameters.len() - 1
-    }
-
-    fn mechanism(
-        &mut self,
-        id: &str,
-        parameters: Vec<usize>,
-        text: [&str; 4],
-        confused: &[&str],
-    ) -> &mut Mechanism {
-        let at = self.spec.mechanisms.len();
-        self.spec.mechanisms.push(Mechanism {
-            id: id.into(),
-            name: text[0].into(),
-            explanation: text[1].into(),
-            equation: text[2].into(),
-            reference: text[3].into(),
-            confused_with: confused.iter().map(|s| (*s).to_owned()).collect(),
-            parameters,
-            ..Mechanism::default()
-        });
-        &mut self.spec.mechanisms[at]
+        self.b.shared(name, unit, 0.0, bounds, scale)
     }
 
     fn term(
@@ -61,8 +28,8 @@ impl Builder {
         formula: &str,
         variables: &[&str],
     ) {
-        let parameter = self.shared(role, name, unit, [lower, f64::INFINITY], scale);
-        self.spec.terms.push(Term {
+        let parameter = self.shared(role, name, unit, [lower, f64::INFINITY], scale).index;
+        self.b.spec.terms.push(Term {
             parameter,
             formula: formula.into(),
             adds_to: Quantity::new("acceleration", "m/s^2"),
@@ -73,10 +40,11 @@ impl Builder {
 
 /// The specification of a set-up and the meaning of each shared parameter, in order.
 pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
-    let mut b = Builder { spec: Spec::default(), roles: Vec::new() };
+    let mut flying = Flying { b: Builder::default(), roles: Vec::new() };
+    let b = &mut flying;
     let (space, felt) = (setup.axes == Axes::Space, setup.axes == Axes::Accelerometer);
     let sized = setup.mass_kg.is_some() && setup.diameter_m.is_some();
-    b.spec.baseline = if felt {
+    b.b.spec.baseline = if felt {
         "free fall: an accelerometer on board reads its offset and nothing else".into()
     } else {
         "ballistic flight under gravity alone, seen by a true camera; every run has its own start".into()
@@ -93,12 +61,12 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
         "Clift, Grace and Weber 1978, Bubbles, Drops, and Particles; de Silva et al. 2020, doi:10.3389/frai.2020.00025",
     ];
     let mechanism =
-        b.mechanism("quadratic-drag", vec![drag], text, &["linear-drag", "buoyancy", "camera-scale"]);
+        b.b.mechanism("quadratic-drag", &[drag], text, &["linear-drag", "buoyancy", "camera-scale"]);
     if sized {
         mechanism.derived.push(Derived {
             name: "k_per_m".into(),
             unit: "1/m".into(),
-            value: Arc::new(move |shared| drag_unit * shared[0]),
+            value: Arc::new(move |shared| drag_unit * shared[drag.slot]),
         });
     }
     let rate = b.shared(Role::Linear, "rate_per_s", "1/s", [0.0, 20.0], 0.1);
@@ -108,14 +76,13 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
         "a = -r (v - w)",
         "Stokes 1851; de Silva et al. 2020, doi:10.3389/frai.2020.00025",
     ];
-    b.mechanism("linear-drag", vec![rate], text, &["quadratic-drag", "buoyancy", "camera-scale"]);
+    b.b.mechanism("linear-drag", &[rate], text, &["quadratic-drag", "buoyancy", "camera-scale"]);
     if !felt {
-        camera_and_gravity(&mut b);
+        camera_and_gravity(b);
     }
     if space {
-        in_space(&mut b, setup.spin, drag);
+        in_space(b, setup.spin, drag);
     }
-    let inf = [f64::NEG_INFINITY, f64::INFINITY];
     b.term(Role::Cubic, ("cubic_drag_s_per_m2", "s/m^2"), 0.0, 1e-3, "-|v|^2 v", &["v"]);
     if !felt {
         b.term(
@@ -149,27 +116,27 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
     }
     match setup.axes {
         Axes::Height => {
-            b.parameter("z0_m", "m", Scope::PerRun, inf, 1.0);
-            b.parameter("vz0_m_s", "m/s", Scope::PerRun, inf, 1.0);
+            b.b.own("z0_m", "m", ANY, 1.0);
+            b.b.own("vz0_m_s", "m/s", ANY, 1.0);
         }
         Axes::Space => {
             for name in ["x0_m", "y0_m", "z0_m"] {
-                b.parameter(name, "m", Scope::PerRun, inf, 1.0);
+                b.b.own(name, "m", ANY, 1.0);
             }
             for name in ["vx0_m_s", "vy0_m_s", "vz0_m_s"] {
-                b.parameter(name, "m/s", Scope::PerRun, inf, 1.0);
+                b.b.own(name, "m/s", ANY, 1.0);
             }
         }
         Axes::Accelerometer => {
-            b.parameter("offset_m_s2", "m/s^2", Scope::PerRun, inf, 1.0);
-            b.parameter("vz0_m_s", "m/s", Scope::PerRun, [-100.0, 100.0], 0.01);
+            b.b.own("offset_m_s2", "m/s^2", ANY, 1.0);
+            b.b.own("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
         }
     }
-    (b.spec, b.roles)
+    (flying.b.spec, flying.roles)
 }
 
 /// Effects that a height alone shows.
-fn camera_and_gravity(b: &mut Builder) {
+fn camera_and_gravity(b: &mut Flying) {
     // Beyond 0.5 m/s^2 it is not physics: nowhere on Earth is g that different, and air is not that dense.
     let lift = b.shared(Role::Buoyancy, "acceleration_m_s2", "m/s^2", [-0.5, 0.5], 0.2);
     let text = [
@@ -178,7 +145,7 @@ fn camera_and_gravity(b: &mut Builder) {
         "a = b e_z, |b| <= 0.5 m/s^2",
         "Archimedes' principle: b = g rho V / m; Moritz 1980, Geodetic Reference System, for the range of g",
     ];
-    b.mechanism("buoyancy", vec![lift], text, &["camera-scale", "clock-rate", "linear-drag"]);
+    b.b.mechanism("buoyancy", &[lift], text, &["camera-scale", "clock-rate", "linear-drag"]);
     // A scale error above a tenth, or the matching error of the clock, is seen by eye: the ball has the wrong size.
     let scale = b.shared(Role::CameraScale, "scale", "", [-0.1, 0.1], 0.01);
     let text = [
@@ -187,7 +154,7 @@ fn camera_and_gravity(b: &mut Builder) {
         "measured = (1 + s) true, |s| <= 0.1",
         "Hartley and Zisserman 2004, doi:10.1017/CBO9780511811685, ch. 7 (calibration)",
     ];
-    b.mechanism("camera-scale", vec![scale], text, &["clock-rate", "buoyancy"]);
+    b.b.mechanism("camera-scale", &[scale], text, &["clock-rate", "buoyancy"]);
     let clock = b.shared(Role::ClockRate, "rate", "", [-0.05, 0.05], 0.005);
     let text = [
         "clock rate",
@@ -195,11 +162,11 @@ fn camera_and_gravity(b: &mut Builder) {
         "stated time = (1 + rate) true time, |rate| <= 0.05",
         "Olson 2010, doi:10.1109/IROS.2010.5650579 (clocks of sensors)",
     ];
-    b.mechanism("clock-rate", vec![clock], text, &["camera-scale", "buoyancy"]);
+    b.b.mechanism("clock-rate", &[clock], text, &["camera-scale", "buoyancy"]);
 }
 
 /// Effects that need all three coordinates.
-fn in_space(b: &mut Builder, spin: bool, drag: usize) {
+fn in_space(b: &mut Flying, spin: bool, drag: At) {
     let (parameters, equation) = if spin {
         let c = b.shared(Role::LiftCoefficient, "lift_coefficient", "", [-20.0, 20.0], 0.01);
         (vec![c], "a = c spin x v")
@@ -216,7 +183,7 @@ fn in_space(b: &mut Builder, spin: bool, drag: usize) {
         equation,
         "Mehta 1985, doi:10.1146/annurev.fl.17.010185.001055",
     ];
-    b.mechanism("magnus-lift", parameters, text, &["wind", "camera-tilt"]);
+    b.b.mechanism("magnus-lift", &parameters, text, &["wind", "camera-tilt"]);
     let wx = b.shared(Role::WindX, "wind_x_m_s", "m/s", [-40.0, 40.0], 2.0);
     let wy = b.shared(Role::WindY, "wind_y_m_s", "m/s", [-40.0, 40.0], 2.0);
     let text = [
@@ -225,22 +192,21 @@ fn in_space(b: &mut Builder, spin: bool, drag: usize) {
         "u = v - w in every drag",
         "Clift, Grace and Weber 1978, Bubbles, Drops, and Particles",
     ];
-    let wind = b.mechanism("wind", vec![wx, wy], text, &["quadratic-drag", "magnus-lift", "camera-tilt"]);
-    wind.companions = vec![drag];
+    let wind = b.b.mechanism("wind", &[wx, wy], text, &["quadratic-drag", "magnus-lift", "camera-tilt"]);
+    wind.companions = vec![drag.index];
     wind.companions_unless = vec!["quadratic-drag".into(), "linear-drag".into()];
     let tx = b.shared(Role::TiltX, "about_x_rad", "rad", [-0.5, 0.5], 0.01);
     let ty = b.shared(Role::TiltY, "about_y_rad", "rad", [-0.5, 0.5], 0.01);
-    let slots = [b.roles.len() - 2, b.roles.len() - 1];
     let text = [
         "camera tilt",
         "The camera's vertical is not gravity's.",
         "measured = R_y(about_y) R_x(about_x) true",
         "Hartley and Zisserman 2004, doi:10.1017/CBO9780511811685, ch. 2",
     ];
-    let tilt = b.mechanism("camera-tilt", vec![tx, ty], text, &["wind", "magnus-lift"]);
+    let tilt = b.b.mechanism("camera-tilt", &[tx, ty], text, &["wind", "magnus-lift"]);
     tilt.derived.push(Derived {
         name: "angle_rad".into(),
         unit: "rad".into(),
-        value: Arc::new(move |shared| shared[slots[0]].hypot(shared[slots[1]])),
+        value: Arc::new(move |shared| shared[tx.slot].hypot(shared[ty.slot])),
     });
 }
