@@ -1,8 +1,8 @@
 //! Where impacts are heard: 200 places on a table in a room that echoes, offline and streamed, beside the thesis's 6.7 and 7.9 mm.
 //!
 //! ```text
-//! cargo run --release -p examples --example 14_hearing -- --small              20 places
-//! cargo run --release -p examples --example 14_hearing -- --picture FILE.svg   200 places, four rooms
+//! cargo run --release -p examples --example 13_hearing -- --small              20 places
+//! cargo run --release -p examples --example 13_hearing -- --picture FILE.svg   200 places, four rooms
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 

@@ -1,8 +1,8 @@
 //! What three impacts of a dropped ball tell about its restitution and the chance in its directions: figure 4.5, beside the exact posterior.
 //!
 //! ```text
-//! cargo run --release -p examples --example 13_drop_posteriors -- --small            800 simulations: seconds
-//! cargo run --release -p examples --example 13_drop_posteriors -- --picture FILE.svg   6,000 simulations, 1,000 tests
+//! cargo run --release -p examples --example 12_drop_posteriors -- --small            800 simulations: seconds
+//! cargo run --release -p examples --example 12_drop_posteriors -- --picture FILE.svg   6,000 simulations, 1,000 tests
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 

@@ -2,8 +2,8 @@
 //! sound's times and places of a hundred drops, and then tried on the balls themselves.
 //!
 //! ```text
-//! cargo run --release -p examples --example 16_cup -- --small              a coarse map, few drops
-//! cargo run --release -p examples --example 16_cup -- --picture FILE.svg
+//! cargo run --release -p examples --example 15_cup -- --small              a coarse map, few drops
+//! cargo run --release -p examples --example 15_cup -- --picture FILE.svg
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 
@@ -22,7 +22,7 @@ use std::error::Error;
 
 type Failure = Box<dyn Error>;
 
-/// How well impacts are heard (example 14).
+/// How well impacts are heard (example 13).
 const HEARING: Hearing = Hearing { time_sigma_s: 20e-6, position_sigma_m: 0.7e-3 };
 
 struct Real {

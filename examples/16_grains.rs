@@ -1,6 +1,6 @@
 //! Chapter 3 on a simulated rig: what grains are from one depth picture, the height for a wanted ring, what a bowl will spill.
 //!
-//! `cargo run --release -p examples --example 15_grains` (`--small`: fewer heaps, no pattern); draws `grains.svg` into the temporary
+//! `cargo run --release -p examples --example 16_grains` (`--small`: fewer heaps, no pattern); draws `grains.svg` into the temporary
 //! folder
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 

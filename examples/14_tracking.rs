@@ -1,8 +1,8 @@
 //! A paddle meets a ball that it only hears: figure 4.7, the straight-line baseline against predictions with chance, three balls.
 //!
 //! ```text
-//! cargo run --release -p examples --example 15_tracking -- --small              4 throws a ball
-//! cargo run --release -p examples --example 15_tracking -- --picture FILE.svg   30 throws a ball, and the same with phase correlation
+//! cargo run --release -p examples --example 14_tracking -- --small              4 throws a ball
+//! cargo run --release -p examples --example 14_tracking -- --picture FILE.svg   30 throws a ball, and the same with phase correlation
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 
