@@ -29,6 +29,8 @@ use rayon::prelude::*;
 const HEIGHT_M: f64 = 0.12;
 /// One pour in so many is held out.
 const HELD_OUT: usize = 10;
+/// Calibration is checked on so many unseen pours or more.
+const LEAST: usize = 50;
 /// Unseen heaps that are poured again with what was inferred.
 const AGAIN: usize = 50;
 
@@ -76,6 +78,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     row("thesis", &[(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148)]);
     row("here", &errors(&posterior, &tests)?);
     row("of the prior", &of_prior(&posterior, &tests));
+    if tests.len() < LEAST {
+        println!("fewer than {LEAST} unseen pours: no calibration, nothing poured again, no sensitivity");
+        return Ok(());
+    }
     calibration(&posterior, &tests)?;
     again(&posterior, &scene, &view, &tests)?;
 
