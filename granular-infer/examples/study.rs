@@ -29,7 +29,7 @@ use rayon::prelude::*;
 const HEIGHT_M: f64 = 0.12;
 /// One pour in so many is held out.
 const HELD_OUT: usize = 10;
-/// Calibration is checked on so many unseen pours or more.
+/// The posterior is measured on so many unseen pours or more.
 const LEAST: usize = 50;
 /// Unseen heaps that are poured again with what was inferred.
 const AGAIN: usize = 50;
@@ -70,6 +70,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::write(out.join("posterior.json.gz"), &bytes)?;
     println!("trained on {} pictures, {} kB", simulations.len(), bytes.len() / 1000);
 
+    if unseen.records.len() < LEAST {
+        println!("fewer than {LEAST} unseen pours: nothing is measured");
+        return Ok(());
+    }
     let tests = seen(&unseen, &scene, &view, 1)?.simulations;
     println!(
         "\nmean and spread of what is inferred less the truth, root mean square, over {} unseen pours",
@@ -78,10 +82,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     row("thesis", &[(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148)]);
     row("here", &errors(&posterior, &tests)?);
     row("of the prior", &of_prior(&posterior, &tests));
-    if tests.len() < LEAST {
-        println!("fewer than {LEAST} unseen pours: no calibration, nothing poured again, no sensitivity");
-        return Ok(());
-    }
     calibration(&posterior, &tests)?;
     again(&posterior, &scene, &view, &tests)?;
 
