@@ -78,24 +78,18 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
     let mut radius = (x[3] + centre.norm_squared()).max(1e-12).sqrt();
     let mut result = (f64::INFINITY, f64::INFINITY);
     for _ in 0..30 {
-        let off: Vec<f64> = own.iter().map(|p| (p - centre).norm() - radius).collect();
-        let scatter = spread(&off);
-        let cut = TUKEY * scatter.max(1e-9);
-        let (mut gram, mut right, mut weight, mut square) = (Matrix4::zeros(), Vector4::zeros(), 0.0, 0.0);
-        for (p, r) in own.iter().zip(&off) {
-            let w = (1.0 - (r / cut).powi(2)).max(0.0).powi(2);
-            let d = (p - centre) / (p - centre).norm().max(1e-12);
-            let row = Vector4::new(-d[0], -d[1], -d[2], -1.0);
-            gram += w * row * row.transpose();
-            right -= w * r * row;
-            weight += w;
-            square += w * r * r;
-        }
-        let Some(inverse) = gram.try_inverse() else { return Err(flat) };
-        let step = inverse * right;
+        let rows: Vec<(f64, Vector4<f64>)> = own
+            .iter()
+            .map(|p| {
+                let (d, size) = (p - centre, (p - centre).norm());
+                let d = d / size.max(1e-12);
+                (size - radius, Vector4::new(d[0], d[1], d[2], 1.0))
+            })
+            .collect();
+        let Some(Robust { step, sigma, scatter }) = robust_step(&rows) else { return Err(flat) };
         centre += step.fixed_rows::<3>(0);
         radius += step[3];
-        result = (scatter, (inverse[(3, 3)] * square / (weight - 4.0).max(1.0)).max(0.0).sqrt());
+        result = (scatter, sigma[3]);
         if !(radius.is_finite() && radius.abs() < 1e6) {
             return Err(flat);
         }
@@ -110,6 +104,33 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
     }
     let centre = centre * scale + middle;
     Ok(Ball { centre_m: centre.into(), radius_m, radius_sigma_m: sigma_m, scatter_m: result.0 * scale })
+}
+
+/// A step of Gauss-Newton, the standard deviations that it leaves, and the robust one of the residuals.
+struct Robust<const N: usize> {
+    step: SVector<f64, N>,
+    sigma: SVector<f64, N>,
+    scatter: f64,
+}
+
+/// One step on residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights.
+fn robust_step<const N: usize>(rows: &[(f64, SVector<f64, N>)]) -> Option<Robust<N>> {
+    let off: Vec<f64> = rows.iter().map(|r| r.0).collect();
+    let scatter = spread(&off);
+    let cut = TUKEY * scatter.max(1e-9);
+    let (mut gram, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
+    let (mut weight, mut square) = (0.0, 0.0);
+    for (r, slope) in rows {
+        let w = (1.0 - (r / cut).powi(2)).max(0.0).powi(2);
+        gram += w * slope * slope.transpose();
+        right += w * *r * slope;
+        weight += w;
+        square += w * r * r;
+    }
+    let inverse = gram.try_inverse()?;
+    let variance = square / (weight - N as f64).max(1.0);
+    let sigma = inverse.diagonal().map(|v| (v * variance).max(0.0).sqrt());
+    Some(Robust { step: inverse * right, sigma, scatter })
 }
 
 /// A face.
@@ -233,20 +254,7 @@ impl Cap {
                     (p[2] - z, slope)
                 })
                 .collect();
-            let off: Vec<f64> = rows.iter().map(|r| r.0).collect();
-            let scatter_m = spread(&off);
-            let cut = TUKEY * scatter_m.max(1e-9);
-            let (mut gram, mut right) = (SMatrix::<f64, 7, 7>::zeros(), SVector::<f64, 7>::zeros());
-            let (mut weight, mut square) = (0.0, 0.0);
-            for (r, slope) in &rows {
-                let w = (1.0 - (r / cut).powi(2)).max(0.0).powi(2);
-                gram += w * slope * slope.transpose();
-                right += w * *r * slope;
-                weight += w;
-                square += w * r * r;
-            }
-            let inverse = gram.try_inverse()?;
-            let step = inverse * right;
+            let Robust { step, sigma, scatter } = robust_step(&rows)?;
             // Radius and edge by a quarter at most, so that the edge stays inside the ball.
             let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(1.0, f64::min);
             self.0 += part * step;
@@ -255,7 +263,7 @@ impl Cap {
                 return None;
             }
             if step.fixed_rows::<5>(0).norm() < 1e-8 * radius_m {
-                let radius_sigma_m = (inverse[(3, 3)] * square / (weight - 7.0).max(1.0)).sqrt();
+                let (radius_sigma_m, scatter_m) = (sigma[3], scatter);
                 let settled = radius_m > 3.0 * radius_sigma_m;
                 let centre_m = [x, y, top + radius_m];
                 return settled.then_some(Ball { centre_m, radius_m, radius_sigma_m, scatter_m });
