@@ -67,18 +67,7 @@ fn placed(
     known: Known,
     microphones: &Microphones,
 ) -> Result<Loaded, (usize, String)> {
-    let nominal = Effects {
-        gravity_m_s2: setup.gravity_m_s2,
-        restitution,
-        slope_s_m: 0.0,
-        drag_per_m: 0.0,
-        table: [0.0; 2],
-        friction: 0.0,
-        clock_rate: 0.0,
-        position_scale: 0.0,
-        unheard: 0.0,
-        terms: [0.0; 3],
-    };
+    let nominal = Effects::none(setup.gravity_m_s2, restitution);
     let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
     expect_first(&mut drops, &nominal);
     let senseless = |h: &Heard| {

@@ -98,18 +98,7 @@ mod tests {
 
     use super::*;
 
-    const EFFECTS: Effects = Effects {
-        gravity_m_s2: 9.81,
-        restitution: 0.8,
-        slope_s_m: 0.0,
-        drag_per_m: 0.0,
-        table: [0.0; 2],
-        friction: 0.0,
-        clock_rate: 0.0,
-        position_scale: 0.0,
-        unheard: 1.0,
-        terms: [0.0; 3],
-    };
+    const EFFECTS: Effects = Effects { unheard: 1.0, ..Effects::none(9.81, 0.8) };
 
     /// A ball that drifts a little along x on its six impacts.
     fn drop() -> Drop {

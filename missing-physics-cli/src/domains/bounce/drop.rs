@@ -29,6 +29,22 @@ pub(super) struct Effects {
 const LEAST: f64 = 1e-3;
 
 impl Effects {
+    /// The baseline: gravity and a constant restitution.
+    pub(super) const fn none(gravity_m_s2: f64, restitution: f64) -> Self {
+        Self {
+            gravity_m_s2,
+            restitution,
+            slope_s_m: 0.0,
+            drag_per_m: 0.0,
+            table: [0.0; 2],
+            friction: 0.0,
+            clock_rate: 0.0,
+            position_scale: 0.0,
+            unheard: 0.0,
+            terms: [0.0; 3],
+        }
+    }
+
     /// Logarithm of the restitution of an impact at a place and a speed.
     fn log_restitution(&self, place: [f64; 2], speed_m_s: f64) -> f64 {
         let [x, y, squared] = self.terms;
