@@ -76,12 +76,19 @@ impl Rig for Contact {
         Press { depth_m: 1e-3, duration_s: 1.0, hold_s: 0.0 }
     }
 
-    fn actions() -> Vec<Press> {
-        let first = Self::first();
-        let deep = [0.3e-3, 1.5e-3, 2e-3, 4e-3].map(|depth_m| Press { depth_m, ..first });
-        let slow = [0.1, 10.0].map(|duration_s| Press { duration_s, ..first });
-        let held = Press { duration_s: 0.3, hold_s: 3.0, ..first };
-        deep.into_iter().chain(slow).chain([held]).collect()
+    fn random(rng: &mut ChaCha8Rng) -> Press {
+        let [fastest, slowest] = DURATION_S.map(f64::ln);
+        let held = rng.random::<bool>();
+        Press {
+            depth_m: rng.random_range(0.1..1.0) * DEEPEST_M,
+            duration_s: rng.random_range(fastest..slowest).exp(),
+            hold_s: if held { rng.random_range(fastest..slowest).exp() } else { 0.0 },
+        }
+    }
+
+    fn grid() -> Vec<Press> {
+        let press = |share: f64, duration_s| Press { depth_m: share * DEEPEST_M, duration_s, hold_s: 0.0 };
+        [0.25, 0.5, 0.75, 1.0].iter().flat_map(|share| [0.1, 1.0, 10.0].map(|s| press(*share, s))).collect()
     }
 
     fn proposed(before: Press, value: &dyn Fn(&str) -> Option<f64>) -> Option<Press> {

@@ -58,10 +58,10 @@ impl Rig for Liquid {
         let size = rng.random_range(0.6..1.6);
         let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
         match rng.random_range(0..4) {
-            0 => Hidden::Wall(0.0008 * size),
-            1 => Hidden::Gain(0.02 * sign * size),
-            2 => Hidden::Grasp(0.002 * sign * size),
-            _ => Hidden::Cap(0.01 * size),
+            0 => Hidden::Wall(0.0004 * size),
+            1 => Hidden::Gain(0.01 * sign * size),
+            2 => Hidden::Grasp(0.001 * sign * size),
+            _ => Hidden::Cap(0.005 * size),
         }
     }
 
@@ -78,18 +78,18 @@ impl Rig for Liquid {
         Tilt { from_rad: 0.0, to_rad: 0.25 * PI, volume_m3: 0.25 * capacity_m3() }
     }
 
-    fn actions() -> Vec<Tilt> {
-        let whole = [0.0, 0.1, 0.25, 0.5, 0.75, 0.9].map(|share| Tilt {
-            from_rad: 0.0,
-            to_rad: PI,
-            volume_m3: share * capacity_m3(),
-        });
-        let halves = [(0.0, 0.5 * PI), (0.5 * PI, PI)].map(|(from_rad, to_rad)| Tilt {
-            from_rad,
-            to_rad,
-            volume_m3: 0.5 * capacity_m3(),
-        });
-        whole.into_iter().chain(halves).collect()
+    /// An eighth of a turn at least.
+    fn random(rng: &mut ChaCha8Rng) -> Tilt {
+        let span = rng.random_range(0.25 * PI..PI);
+        let from_rad = rng.random_range(0.0..PI - span);
+        Tilt { from_rad, to_rad: from_rad + span, volume_m3: rng.random_range(0.0..0.95) * capacity_m3() }
+    }
+
+    fn grid() -> Vec<Tilt> {
+        let quarter = |k: u8| (0.25 * PI * f64::from(k), 0.25 * PI * f64::from(k + 1));
+        let tilt =
+            |share: f64, (from_rad, to_rad)| Tilt { from_rad, to_rad, volume_m3: share * capacity_m3() };
+        [0.1, 0.5, 0.9].iter().flat_map(|share| (0..4).map(move |k| tilt(*share, quarter(k)))).collect()
     }
 
     fn proposed(_before: Tilt, value: &dyn Fn(&str) -> Option<f64>) -> Option<Tilt> {

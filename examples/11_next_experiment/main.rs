@@ -12,7 +12,7 @@ use std::error::Error;
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use rand::{RngExt as _, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
@@ -42,8 +42,10 @@ trait Rig {
     fn id(hidden: Self::Hidden) -> &'static str;
     /// What is done at first.
     fn first() -> Self::Action;
-    /// What can be done then; the tool proposes out of the like.
-    fn actions() -> Vec<Self::Action>;
+    /// Anything that the rig can do, drawn.
+    fn random(rng: &mut ChaCha8Rng) -> Self::Action;
+    /// An even grid of what the rig can do.
+    fn grid() -> Vec<Self::Action>;
     /// A proposal's values as an action of this rig.
     fn proposed(before: Self::Action, value: &dyn Fn(&str) -> Option<f64>) -> Option<Self::Action>;
     /// Rows of the recording of one action, done through the rig's traits.
@@ -114,7 +116,7 @@ impl<R: Rig> World<R> {
     /// Experiments until the tool is sure of the truth ([`patience`] where it never was).
     fn until_sure(mut self, policy: Policy, told: bool) -> Outcome<usize> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0xdead);
-        let all = R::actions();
+        let grid = R::grid();
         while self.done < patience() {
             let sure = self.belief() >= SURE;
             if told {
@@ -123,11 +125,10 @@ impl<R: Rig> World<R> {
             if sure {
                 break;
             }
-            let any = all[rng.random_range(0..all.len())];
             let action = match policy {
-                Policy::Proposed => self.proposed().unwrap_or(any),
-                Policy::Random => any,
-                Policy::Grid => all[self.done % all.len()],
+                Policy::Proposed => self.proposed().unwrap_or_else(|| R::random(&mut rng)),
+                Policy::Random => R::random(&mut rng),
+                Policy::Grid => grid[self.done % grid.len()],
             };
             self.act(action)?;
         }

@@ -3,9 +3,10 @@
 use nalgebra::DMatrix;
 
 use crate::data::Run;
-use crate::linalg::{RANK_FLOOR, backward, cholesky, determined, dot, forward, log_determinant};
+use crate::linalg::{backward, cholesky, determined, dot, forward, log_determinant};
 use crate::model::{Model, PredictError};
 use crate::problem::{Problem, Selection};
+use crate::step::{Eliminated, Linearised, Step, reduce};
 
 /// Central differences of a prediction (one-sided at a bound), the default of [`Model::jacobian`].
 ///
@@ -32,6 +33,10 @@ pub fn finite_differences<M: Model + ?Sized>(
     let own_info: Vec<_> = parameters(Scope::PerRun).collect();
     let free = shared_free.iter().map(|&s| (true, s)).chain(own_free.iter().map(|&s| (false, s)));
     for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(rows.max(1))) {
+        if is_shared && !model.acts_on(run, slot) {
+            column.fill(0.0);
+            continue;
+        }
         let info = if is_shared { shared_info[slot] } else { own_info[slot] };
         let value = if is_shared { shared[slot] } else { own[slot] };
         let step = model.relative_step() * info.scale.max(1e-3 * value.abs());
@@ -98,11 +103,6 @@ pub(crate) fn own_prior_width(problem: &Problem<'_>, selection: &Selection, i: u
 
 const MAX_ITERATIONS: usize = 60;
 
-/// Normal equations of one run: free own parameters first, then free shared ones, then the residual.
-struct RunNormal {
-    gram: DMatrix<f64>,
-}
-
 /// Whitened columns of one run: Jacobian by own, by shared, and the residual; channels one after the other.
 pub(crate) fn whitened_columns(
     problem: &Problem<'_>,
@@ -155,60 +155,6 @@ fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
     gram
 }
 
-/// A run's own parameters eliminated from its normal equations.
-struct Eliminated {
-    factor: DMatrix<f64>,
-    kept: Vec<bool>,
-    /// Forward-solved columns: own-by-(shared and residual).
-    border: Vec<Vec<f64>>,
-    log_determinant: f64,
-}
-
-fn eliminate(normal: &RunNormal, own: usize, damping: f64) -> Eliminated {
-    let total = normal.gram.nrows();
-    let mut factor = normal.gram.view((0, 0), (own, own)).into_owned();
-    for i in 0..own {
-        factor[(i, i)] *= 1.0 + damping;
-    }
-    let kept = cholesky(&mut factor, RANK_FLOOR);
-    let border = (own..total)
-        .map(|j| {
-            let mut column: Vec<f64> = (0..own).map(|i| normal.gram[(i, j)]).collect();
-            forward(&factor, &kept, &mut column);
-            column
-        })
-        .collect();
-    let log_determinant = log_determinant(&factor, &kept);
-    Eliminated { factor, kept, border, log_determinant }
-}
-
-impl Eliminated {
-    fn told(&self, n_shared: usize) -> OwnTold {
-        let n = self.kept.len();
-        let error = (0..n)
-            .map(|i| {
-                let mut unit = vec![0.0; n];
-                unit[i] = 1.0;
-                forward(&self.factor, &self.kept, &mut unit);
-                if self.kept[i] { dot(&unit, &unit).sqrt() } else { f64::INFINITY }
-            })
-            .collect();
-        let mut slope = vec![vec![0.0; n_shared]; n];
-        for (j, border) in self.border.iter().take(n_shared).enumerate() {
-            let mut column = border.clone();
-            backward(&self.factor, &self.kept, &mut column);
-            slope.iter_mut().zip(column).for_each(|(row, value)| row[j] = -value);
-        }
-        OwnTold { error, slope }
-    }
-}
-
-struct Linearised {
-    normals: Vec<RunNormal>,
-    /// Sum of squares, the own parameters' prior included.
-    chi2: f64,
-}
-
 /// Normal equations of one run with the prior of its own parameters, which come first, then the shared ones, then the residual.
 pub(crate) fn own_normal(
     problem: &Problem<'_>,
@@ -244,34 +190,9 @@ fn linearise(
         let gram = own_normal(problem, selection, noise, run, shared, values)?;
         let last = gram.nrows() - 1;
         chi2 += gram[(last, last)];
-        normals.push(RunNormal { gram });
+        normals.push(gram);
     }
     Ok(Linearised { normals, chi2 })
-}
-
-/// Schur complement over all runs: information of the shared parameters and their gradient.
-fn reduce(
-    linear: &Linearised,
-    eliminated: &[Eliminated],
-    own: usize,
-    shared: usize,
-) -> (DMatrix<f64>, Vec<f64>) {
-    let mut information = DMatrix::zeros(shared, shared);
-    let mut gradient = vec![0.0; shared];
-    for (normal, e) in linear.normals.iter().zip(eliminated) {
-        for i in 0..shared {
-            for j in 0..=i {
-                information[(i, j)] += normal.gram[(own + i, own + j)] - dot(&e.border[i], &e.border[j]);
-            }
-            gradient[i] += normal.gram[(own + i, own + shared)] - dot(&e.border[i], &e.border[shared]);
-        }
-    }
-    for i in 0..shared {
-        for j in 0..i {
-            information[(j, i)] = information[(i, j)];
-        }
-    }
-    (information, gradient)
 }
 
 /// Fits the free parameters for a given noise, from a given start.
@@ -287,55 +208,19 @@ pub(crate) fn solve(
     let mut linear = linearise(problem, selection, noise, &shared, &own)?;
     let mut damping = 0.0;
     let mut converged = false;
-    let mut fixed = vec![false; n_shared];
+    let mut held = vec![false; n_shared];
     for _ in 0..MAX_ITERATIONS {
-        let eliminated: Vec<Eliminated> =
-            linear.normals.iter().map(|n| eliminate(n, n_own, damping)).collect();
-        let (mut information, mut step) = reduce(&linear, &eliminated, n_own, n_shared);
-        for (i, &slot) in selection.shared.iter().enumerate() {
-            let (table, x) = (&problem.shared, shared[slot]);
-            fixed[i] = (x <= table.lower[slot] && step[i] < 0.0) || (x >= table.upper[slot] && step[i] > 0.0);
-            information[(i, i)] = information[(i, i)] * (1.0 + damping) + 1e-12 / table.scale[slot].powi(2);
-            if fixed[i] {
-                step[i] = 0.0;
-                for j in 0..n_shared {
-                    information[(i, j)] = 0.0;
-                    information[(j, i)] = 0.0;
-                }
-            }
-        }
-        let gradient = step.clone();
-        let kept = cholesky(&mut information, RANK_FLOOR);
-        forward(&information, &kept, &mut step);
-        backward(&information, &kept, &mut step);
-        let mut predicted = dot(&gradient, &step);
-        let mut trial_shared = shared.clone();
-        for (i, &slot) in selection.shared.iter().enumerate() {
-            trial_shared[slot] =
-                (shared[slot] + step[i]).clamp(problem.shared.lower[slot], problem.shared.upper[slot]);
-        }
-        let mut trial_own = own.clone();
-        for ((e, values), normal) in eliminated.iter().zip(&mut trial_own).zip(&linear.normals) {
-            let mut right = e.border[n_shared].clone();
-            predicted += dot(&right, &right);
-            for (border, s) in e.border.iter().zip(&step) {
-                right.iter_mut().zip(border).for_each(|(r, b)| *r -= s * b);
-            }
-            backward(&e.factor, &e.kept, &mut right);
-            for (i, &slot) in selection.own.iter().enumerate() {
-                values[slot] =
-                    (values[slot] + right[i]).clamp(problem.own.lower[slot], problem.own.upper[slot]);
-            }
-            debug_assert_eq!(normal.gram.nrows(), n_own + n_shared + 1);
-        }
+        let step = Step::new(problem, selection, &linear, (&shared, &own), damping);
+        let predicted = step.predicted;
+        held = step.held;
         if !(predicted > 1e-9 * (1.0 + 1e-6 * linear.chi2)) {
             converged = true;
             break;
         }
-        match linearise(problem, selection, noise, &trial_shared, &trial_own) {
+        match linearise(problem, selection, noise, &step.shared, &step.own) {
             Ok(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
                 let gained = linear.chi2 - next.chi2;
-                (shared, own, linear) = (trial_shared, trial_own, next);
+                (shared, own, linear) = (step.shared, step.own, next);
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
                 if gained < 1e-7 && predicted < 1e-5 {
                     converged = true;
@@ -350,7 +235,8 @@ pub(crate) fn solve(
             _ => damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 },
         }
     }
-    let eliminated: Vec<Eliminated> = linear.normals.iter().map(|n| eliminate(n, n_own, 0.0)).collect();
+    let free = vec![false; n_own];
+    let eliminated: Vec<Eliminated> = linear.normals.iter().map(|n| Eliminated::new(n, &free, 0.0)).collect();
     let (information, _) = reduce(&linear, &eliminated, n_own, n_shared);
     let mut log_likelihood = -0.5 * linear.chi2;
     for e in &eliminated {
@@ -363,7 +249,7 @@ pub(crate) fn solve(
         }
     }
     let own_told = eliminated.iter().map(|e| e.told(n_shared)).collect();
-    let at_bound = (0..n_shared).filter(|&i| fixed[i]).map(|i| selection.shared[i]).collect();
+    let at_bound = (0..n_shared).filter(|&i| held[i]).map(|i| selection.shared[i]).collect();
     Ok(Fit {
         shared,
         own,

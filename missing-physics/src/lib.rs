@@ -20,5 +20,6 @@ mod outliers;
 mod own_prior;
 mod problem;
 pub mod repaired;
+mod step;
 pub mod synthetic;
 pub mod told;

@@ -14,16 +14,128 @@ const BINS: usize = 24;
 /// A later variable has to hold so much more of the misfit than an earlier one.
 const EARLIER: f64 = 1.2;
 
-/// Rows of one run, whitened as white noise, with the bin of each along one variable (`usize::MAX`: another channel).
+/// An interval may hold a smooth departure of so many coefficients (a parabola along the variable).
+const SMOOTH: usize = 3;
+
+/// What one run's rows of a channel say, whitened as white noise: Gram matrices of own and shared columns, of the departure's, and of
+/// the residual.
 struct Normals {
-    /// `[bin]` Gram matrices of (own, shared, residual) over the channel's rows.
+    /// By bin along the variable.
     binned: Vec<DMatrix<f64>>,
     /// The other channels' rows.
     others: DMatrix<f64>,
 }
 
-/// The best interval so far: what it is worth, its gain, the variable, the bins and their edges.
-type Best = (f64, f64, Option<usize>, (usize, usize), Vec<f64>);
+/// A channel along one variable.
+struct Scan {
+    variable: Option<usize>,
+    edges: Vec<f64>,
+    /// By run.
+    normals: Vec<Normals>,
+    /// Rows in each bin.
+    rows: Vec<f64>,
+    n_own: usize,
+    n_shared: usize,
+    /// Sum of squares that the baseline leaves of all rows.
+    whole: f64,
+}
+
+/// An interval of bins: what it is worth, and by how much the misfit falls without it.
+#[derive(Clone, Copy)]
+struct Interval {
+    worth: f64,
+    gain: f64,
+    bins: (usize, usize),
+}
+
+impl Scan {
+    fn new(
+        problem: &Problem<'_>,
+        columns: &[Vec<Vec<f64>>],
+        (n_own, n_shared): (usize, usize),
+        channel: usize,
+        variable: Option<usize>,
+    ) -> Option<Self> {
+        let edges = edges(problem, channel, variable);
+        if edges.len() < 3 {
+            return None;
+        }
+        let normals = normals(problem, columns, channel, variable, &edges);
+        let mut rows = vec![0.0; edges.len() - 1];
+        for (r, run) in problem.rows.iter().enumerate() {
+            for &i in &run.valid[channel] {
+                rows[bin(value(problem, variable, r, i), &edges)] += 1.0;
+            }
+        }
+        let mut scan = Self { variable, edges, normals, rows, n_own, n_shared, whole: 0.0 };
+        scan.whole = scan.outside((0, 0)).0;
+        Some(scan)
+    }
+
+    /// The interval that is worth most.
+    fn best(&self) -> Option<Interval> {
+        let mut best: Option<Interval> = None;
+        for from in 0..self.rows.len() {
+            for to in from + 1..=self.rows.len() {
+                if let Some(here) = self.judge((from, to))
+                    && best.is_none_or(|b| here.worth > b.worth)
+                {
+                    best = Some(here);
+                }
+            }
+        }
+        best
+    }
+
+    /// An interval holds the misfit if the baseline is right without its rows, or right up to a smooth departure there. Freed rows
+    /// have to miss by more than noise does twice over; a departure's coefficients pay as in Schwarz's criterion.
+    fn judge(&self, bins: (usize, usize)) -> Option<Interval> {
+        let dropped: f64 = self.rows[bins.0..bins.1].iter().sum();
+        if dropped < 1.0 {
+            return None;
+        }
+        let gain = self.whole - self.outside(bins).0 - dropped;
+        let freed = Interval { worth: gain - dropped, gain, bins };
+        let gain = self.whole - self.departing(bins);
+        let price = SMOOTH as f64 * self.rows.iter().sum::<f64>().ln();
+        let smooth = Interval { worth: gain - price, gain: gain - SMOOTH as f64, bins };
+        Some(if smooth.worth > freed.worth { smooth } else { freed })
+    }
+
+    /// Fits the linearised baseline to the rows outside the bins: sum of squares there, and each run's coefficients.
+    fn outside(&self, (from, to): (usize, usize)) -> (f64, Vec<Vec<f64>>) {
+        let gram = |run: &Normals| {
+            let mut gram = run.others.clone();
+            for (_, g) in run.binned.iter().enumerate().filter(|(b, _)| *b < from || *b >= to) {
+                gram += g;
+            }
+            gram
+        };
+        solve(self.normals.iter().map(gram), self.n_own, self.n_shared)
+    }
+
+    /// Fits the linearised baseline and a smooth departure inside the bins to all rows: sum of squares.
+    fn departing(&self, (from, to): (usize, usize)) -> f64 {
+        let first = self.n_own + self.n_shared;
+        let gram = |run: &Normals| {
+            let mut gram = run.others.clone();
+            for (b, g) in run.binned.iter().enumerate() {
+                if b >= from && b < to {
+                    gram += g;
+                    continue;
+                }
+                let known = || (0..g.ncols()).filter(|k| !(first..first + SMOOTH).contains(k));
+                for column in known() {
+                    for row in known().filter(|row| *row >= column) {
+                        gram[(row, column)] += g[(row, column)];
+                    }
+                }
+            }
+            gram
+        };
+        solve(self.normals.iter().map(gram), self.n_own, self.n_shared + SMOOTH).0
+    }
+}
 
 /// Finds the places where the baseline misses, largest share first.
 pub(crate) fn locate(
@@ -36,98 +148,22 @@ pub(crate) fn locate(
     let columns: Vec<Vec<Vec<f64>>> = (0..problem.rows.len())
         .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.own[r]))
         .collect::<Result<_, _>>()?;
-    let (n_own, n_shared) = (selection.own.len(), selection.shared.len());
-    let width = n_own + n_shared + 1;
+    let sizes = (selection.own.len(), selection.shared.len());
     let mut found: Vec<(f64, Location)> = Vec::new();
-    for (channel, quantity) in problem.recording.channels.iter().enumerate() {
-        let mut best: Option<Best> = None;
+    for channel in 0..problem.channels() {
+        let mut best: Option<(Scan, Interval)> = None;
         for variable in variables(problem) {
-            let edges = edges(problem, channel, variable);
-            if edges.len() < 3 {
-                continue;
-            }
-            let normals = normals(problem, &columns, channel, variable, &edges, width);
-            let rows: Vec<f64> = (0..edges.len() - 1)
-                .map(|b| {
-                    let inside = |r: usize, i: usize| bin(value(problem, variable, r, i), &edges) == b;
-                    (0..problem.rows.len())
-                        .map(|r| {
-                            problem.rows[r].valid[channel].iter().filter(|&&i| inside(r, i)).count() as f64
-                        })
-                        .sum()
-                })
-                .collect();
-            let whole = outside(&normals, (0, 0), n_own, n_shared).0;
-            let mut here: Option<Best> = None;
-            for from in 0..rows.len() {
-                for to in from + 1..=rows.len() {
-                    let dropped: f64 = rows[from..to].iter().sum();
-                    if dropped < 1.0 {
-                        continue;
-                    }
-                    let gain = whole - outside(&normals, (from, to), n_own, n_shared).0 - dropped;
-                    // A row belongs to the interval if it misses by more than noise does twice over.
-                    let worth = gain - dropped;
-                    if here.as_ref().is_none_or(|b| worth > b.0 * 1.02 + 1e-9) {
-                        here = Some((worth, gain, variable, (from, to), edges.clone()));
-                    }
-                }
-            }
+            let Some(scan) = Scan::new(problem, &columns, sizes, channel, variable) else { continue };
             // An earlier variable is the more natural one to name.
-            if let Some(here) = here
-                && best.as_ref().is_none_or(|b| here.0 > EARLIER * b.0 + 1e-9)
+            if let Some(here) = scan.best()
+                && best.as_ref().is_none_or(|(_, b)| here.worth > EARLIER * b.worth + 1e-9)
             {
-                best = Some(here);
+                best = Some((scan, here));
             }
         }
-        let Some((_, gain, variable, (from, to), edges)) = best else { continue };
-        if gain <= 0.0 {
-            continue;
+        if let Some((scan, interval)) = best.filter(|(_, interval)| interval.gain > 0.0) {
+            found.push((interval.gain, place(problem, &columns, sigma, channel, &scan, interval)));
         }
-        let normals = normals(problem, &columns, channel, variable, &edges, width);
-        let (_, coefficients) = outside(&normals, (from, to), n_own, n_shared);
-        let mut residuals: Vec<(usize, f64)> = Vec::new();
-        for (r, x) in coefficients.iter().enumerate() {
-            let start: usize = (0..channel).map(|c| problem.rows[r].valid[c].len()).sum();
-            for (k, &i) in problem.rows[r].valid[channel].iter().enumerate() {
-                let b = bin(value(problem, variable, r, i), &edges);
-                if b >= from && b < to {
-                    let fitted: f64 = x.iter().zip(&columns[r]).map(|(x, c)| x * c[start + k]).sum();
-                    residuals.push((r, (columns[r][width - 1][start + k] - fitted) * sigma[channel]));
-                }
-            }
-        }
-        let squares = |r: Option<usize>| -> (f64, f64) {
-            residuals
-                .iter()
-                .filter(|(run, _)| r.is_none_or(|r| r == *run))
-                .fold((0.0, 0.0), |(s, n), (_, v)| (s + (v / sigma[channel]).powi(2), n + 1.0))
-        };
-        // A run shows the misfit where its rows exceed the noise at 1 in 1,000.
-        let runs = (0..problem.rows.len())
-            .filter(|&r| {
-                let (sum, n) = squares(Some(r));
-                n > 0.0 && sum > n + 3.1 * (2.0 * n).sqrt() + 3.0
-            })
-            .map(|r| problem.recording.runs[r].label.clone())
-            .collect();
-        let mean = residuals.iter().map(|(_, v)| v).sum::<f64>() / residuals.len().max(1) as f64;
-        let largest =
-            residuals.iter().map(|(_, v)| *v).fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
-        found.push((
-            gain,
-            Location {
-                channel: quantity.name.clone(),
-                variable: Some(variable_name(problem, variable)),
-                from: edges.get(from).copied(),
-                to: edges.get(to).copied(),
-                runs,
-                share: 0.0,
-                mean_residual: mean,
-                largest_residual: largest,
-                z: gain.sqrt(),
-            },
-        ));
     }
     let total: f64 = found.iter().map(|(gain, _)| gain).sum();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -143,14 +179,64 @@ pub(crate) fn locate(
         .collect())
 }
 
-/// The variables along which an interval may lie: the inputs, or the number of the row.
+/// An interval as a place: what the rows in it miss where the baseline is fitted to the others.
+fn place(
+    problem: &Problem<'_>,
+    columns: &[Vec<Vec<f64>>],
+    sigma: &[f64],
+    channel: usize,
+    scan: &Scan,
+    Interval { gain, bins: (from, to), .. }: Interval,
+) -> Location {
+    let (_, coefficients) = scan.outside((from, to));
+    let mut residuals: Vec<(usize, f64)> = Vec::new();
+    for (r, x) in coefficients.iter().enumerate() {
+        let start: usize = (0..channel).map(|c| problem.rows[r].valid[c].len()).sum();
+        for (k, &i) in problem.rows[r].valid[channel].iter().enumerate() {
+            let b = bin(value(problem, scan.variable, r, i), &scan.edges);
+            if b >= from && b < to {
+                let fitted: f64 = x.iter().zip(&columns[r]).map(|(x, c)| x * c[start + k]).sum();
+                let measured = columns[r].last().map_or(0.0, |c| c[start + k]);
+                residuals.push((r, (measured - fitted) * sigma[channel]));
+            }
+        }
+    }
+    let squares = |r: usize| -> (f64, f64) {
+        residuals
+            .iter()
+            .filter(|(run, _)| r == *run)
+            .fold((0.0, 0.0), |(s, n), (_, v)| (s + (v / sigma[channel]).powi(2), n + 1.0))
+    };
+    // A run shows the misfit where its rows exceed the noise at 1 in 1,000.
+    let runs = (0..problem.rows.len())
+        .filter(|&r| {
+            let (sum, n) = squares(r);
+            n > 0.0 && sum > n + 3.1 * (2.0 * n).sqrt() + 3.0
+        })
+        .map(|r| problem.recording.runs[r].label.clone())
+        .collect();
+    let mean = residuals.iter().map(|(_, v)| v).sum::<f64>() / residuals.len().max(1) as f64;
+    let largest =
+        residuals.iter().map(|(_, v)| *v).fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
+    Location {
+        channel: problem.recording.channels[channel].name.clone(),
+        variable: Some(variable_name(problem, scan.variable)),
+        from: scan.edges.get(from).copied(),
+        to: scan.edges.get(to).copied(),
+        runs,
+        share: 0.0,
+        mean_residual: mean,
+        largest_residual: largest,
+        z: gain.sqrt(),
+    }
+}
+
+/// The variables along which an interval may lie: the inputs, in the order of the recording, or the number of the row.
 fn variables(problem: &Problem<'_>) -> Vec<Option<usize>> {
     if problem.recording.variables.is_empty() {
         return vec![None];
     }
-    let first = problem.recording.noise_along;
-    let others = (0..problem.recording.variables.len()).filter(|v| Some(*v) != first);
-    first.into_iter().chain(others).map(Some).collect()
+    (0..problem.recording.variables.len()).map(Some).collect()
 }
 
 fn variable_name(problem: &Problem<'_>, variable: Option<usize>) -> String {
@@ -181,60 +267,56 @@ fn bin(value: f64, edges: &[f64]) -> usize {
     edges.partition_point(|e| *e <= value).clamp(1, edges.len() - 1) - 1
 }
 
+/// Columns of a run: own, shared, the departure's powers of the variable, the residual.
 fn normals(
     problem: &Problem<'_>,
     columns: &[Vec<Vec<f64>>],
     channel: usize,
     variable: Option<usize>,
     edges: &[f64],
-    width: usize,
 ) -> Vec<Normals> {
-    columns
-        .iter()
-        .enumerate()
-        .map(|(r, columns)| {
-            let mut binned = vec![DMatrix::zeros(width, width); edges.len() - 1];
-            let mut others = DMatrix::zeros(width, width);
-            let mut k = 0;
-            for c in 0..problem.channels() {
-                for &i in &problem.rows[r].valid[c] {
-                    let target = if c == channel {
-                        &mut binned[bin(value(problem, variable, r, i), edges)]
-                    } else {
-                        &mut others
-                    };
-                    for a in 0..width {
-                        for b in 0..=a {
-                            target[(a, b)] += columns[a][k] * columns[b][k];
-                        }
-                    }
-                    k += 1;
+    let (low, high) = (edges[0], edges[edges.len() - 1]);
+    let of_run = |(r, columns): (usize, &Vec<Vec<f64>>)| {
+        let width = columns.len() + SMOOTH;
+        let mut binned = vec![DMatrix::zeros(width, width); edges.len() - 1];
+        let mut others = DMatrix::zeros(width, width);
+        let mut row = vec![0.0; width];
+        let mut k = 0;
+        for c in 0..problem.channels() {
+            for &i in &problem.rows[r].valid[c] {
+                let x = value(problem, variable, r, i);
+                let u = 2.0 * (x - low) / (high - low) - 1.0;
+                let known = columns.len() - 1;
+                for (a, column) in row.iter_mut().zip(&columns[..known]) {
+                    *a = column[k];
                 }
-            }
-            Normals { binned, others }
-        })
-        .collect()
-}
-
-/// Fits the linearised baseline to the rows outside the bins `from..to`: sum of squares there, and each run's coefficients.
-fn outside(
-    normals: &[Normals],
-    (from, to): (usize, usize),
-    n_own: usize,
-    n_shared: usize,
-) -> (f64, Vec<Vec<f64>>) {
-    let mut information = DMatrix::zeros(n_shared, n_shared);
-    let mut right = vec![0.0; n_shared];
-    let mut total = 0.0;
-    let mut parts = Vec::with_capacity(normals.len());
-    let last = n_own + n_shared;
-    for run in normals {
-        let mut gram = run.others.clone();
-        for (b, g) in run.binned.iter().enumerate() {
-            if b < from || b >= to {
-                gram += g;
+                for (power, a) in row[known..known + SMOOTH].iter_mut().enumerate() {
+                    *a = if c == channel { u.powi(power as i32) } else { 0.0 };
+                }
+                row[width - 1] = columns[known][k];
+                let target = if c == channel { &mut binned[bin(x, edges)] } else { &mut others };
+                for a in 0..width {
+                    for b in 0..=a {
+                        target[(a, b)] += row[a] * row[b];
+                    }
+                }
+                k += 1;
             }
         }
+        Normals { binned, others }
+    };
+    columns.iter().enumerate().map(of_run).collect()
+}
+
+/// Least squares over runs from the lower triangles of their Gram matrices: `n_own` columns of each run's own, `n_free` of all, the
+/// residual last. Sum of squares that is left, and each run's coefficients.
+fn solve(grams: impl Iterator<Item = DMatrix<f64>>, n_own: usize, n_free: usize) -> (f64, Vec<Vec<f64>>) {
+    let mut information = DMatrix::zeros(n_free, n_free);
+    let mut right = vec![0.0; n_free];
+    let mut total = 0.0;
+    let mut parts = Vec::new();
+    for gram in grams {
+        let last = gram.ncols() - 1;
         total += gram[(last, last)];
         let mut factor = gram.view((0, 0), (n_own, n_own)).into_owned();
         let kept = cholesky(&mut factor, RANK_FLOOR);
@@ -243,10 +325,10 @@ fn outside(
             forward(&factor, &kept, &mut column);
             column
         };
-        let borders: Vec<Vec<f64>> = (n_own..last).map(border).collect();
+        let borders: Vec<Vec<f64>> = (n_own..n_own + n_free).map(border).collect();
         let reduced = border(last);
         total -= dot(&reduced, &reduced);
-        for i in 0..n_shared {
+        for i in 0..n_free {
             for j in 0..=i {
                 information[(i, j)] += gram[(n_own + i, n_own + j)] - dot(&borders[i], &borders[j]);
             }

@@ -244,6 +244,11 @@ pub trait Model: Sync {
         1e-5
     }
 
+    /// Whether the shared parameter at a slot can change this run at all; where it cannot, its derivative is zero without a prediction.
+    fn acts_on(&self, _run: &Run, _shared_slot: usize) -> bool {
+        true
+    }
+
     /// The derivatives of [`Model::predict`] with respect to the shared parameters at the slots `shared_free` and
     /// the own parameters at the slots `own_free`, one column after the other, each as long as `out`.
     ///

@@ -36,14 +36,29 @@ pub(super) fn moments<T: Number>(x: T) -> (T, T) {
     }
 }
 
-/// A point of the history at which the contact grew.
+/// Where the indenter was, and what the body remembers of its way there.
 #[derive(Debug, Clone, Copy)]
-struct Point<T> {
+struct Place<T> {
     time_s: T,
     depth_m: T,
-    force_n: T,
-    /// `int exp(-(t - s)/tau) d delta(s)` and the same of the elastic force.
+    /// `int exp(-(t - s)/tau) d delta(s)`.
     depth_memory: T,
+}
+
+/// A part of a straight line in time.
+struct Step<T> {
+    way_m: T,
+    /// What is left of an older memory at its end.
+    left: T,
+    /// [`moments`] over it.
+    moments: (T, T),
+}
+
+/// A place with its elastic force and the memory of that.
+#[derive(Debug, Clone, Copy)]
+struct Point<T> {
+    place: Place<T>,
+    force_n: T,
     force_memory: T,
 }
 
@@ -66,25 +81,31 @@ impl<T> Default for Scratch<T> {
     }
 }
 
+impl<T: Number> Place<T> {
+    /// On along a straight line in time to a later time and depth, `part` (0 to 1) of the way; times may be equal: a jump.
+    fn to(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
+        let (lasts, way_m) = ((end.0 - self.time_s) * part, (end.1 - self.depth_m) * part);
+        let x = lasts / tau_s;
+        let step = Step { way_m, left: decay(x), moments: moments(x) };
+        let place = Self {
+            time_s: self.time_s + lasts,
+            depth_m: self.depth_m + way_m,
+            depth_memory: step.left * self.depth_memory + way_m * step.moments.0,
+        };
+        (place, step)
+    }
+}
+
 impl<T: Number> Point<T> {
-    /// On along a straight line in time to a later point, `part` (0 to 1) of the way; times may be equal: a jump.
+    /// As [`Place::to`], with the elastic force as a parabola in time, which the exponential is integrated against exactly.
     fn to<L: Law<T>>(&self, law: &L, tau_s: T, end: (T, T), part: T) -> Self {
-        let (step, way) = ((end.0 - self.time_s) * part, (end.1 - self.depth_m) * part);
-        let depth_m = self.depth_m + way;
-        let x = step / tau_s;
-        let (left, (first, second)) = (decay(x), moments(x));
-        // The elastic force as a parabola in time, which the exponential is integrated against exactly.
-        let force_n = law.force(depth_m);
-        let middle = law.force(self.depth_m + way * 0.5);
+        let (place, Step { way_m, left, moments: (first, second) }) = self.place.to(tau_s, end, part);
+        let force_n = law.force(place.depth_m);
+        let middle = law.force(self.place.depth_m + way_m * 0.5);
         let slope_0 = middle * 4.0 - self.force_n * 3.0 - force_n;
         let slope_1 = self.force_n - middle * 4.0 + force_n * 3.0;
-        Self {
-            time_s: self.time_s + step,
-            depth_m,
-            force_n,
-            depth_memory: left * self.depth_memory + way * first,
-            force_memory: left * self.force_memory + slope_0 * (first - second) + slope_1 * second,
-        }
+        let force_memory = left * self.force_memory + slope_0 * (first - second) + slope_1 * second;
+        Self { place, force_n, force_memory }
     }
 }
 
@@ -123,13 +144,8 @@ impl<T: Number> LinearSolid<T> {
                         Some((t, d)) => T::from(t) + (d / (d - depth)) * (time - t),
                         None => T::from(time),
                     };
-                    let touch = Point {
-                        time_s,
-                        depth_m: zero,
-                        force_n: zero,
-                        depth_memory: zero,
-                        force_memory: zero,
-                    };
+                    let place = Place { time_s, depth_m: zero, depth_memory: zero };
+                    let touch = Point { place, force_n: zero, force_memory: zero };
                     grown.push(touch);
                     touch
                 }
@@ -145,7 +161,7 @@ impl<T: Number> LinearSolid<T> {
                 Contact::Fixed => self.sum(&point, &point),
                 Contact::Shrinks => {
                     let last = grown.len() - 1;
-                    if self.moved(&grown[last], &point).re() >= 0.0 {
+                    if self.moved(&grown[last].place, &point.place).re() >= 0.0 {
                         grown.push(point);
                         at = last + 1;
                         self.sum(&point, &point)
@@ -163,13 +179,13 @@ impl<T: Number> LinearSolid<T> {
 
     /// `int psi(t - s) d f` up to `then`, seen from `now`.
     fn sum(&self, then: &Point<T>, now: &Point<T>) -> T {
-        let left = decay((now.time_s - then.time_s) / self.tau_s);
+        let left = decay((now.place.time_s - then.place.time_s) / self.tau_s);
         (T::from(1.0) - self.relaxed_fraction) * then.force_n
             + self.relaxed_fraction * left * then.force_memory
     }
 
     /// `int psi(t - s) d delta` from `then` to `now`: zero where the contact's radius is the same.
-    fn moved(&self, then: &Point<T>, now: &Point<T>) -> T {
+    fn moved(&self, then: &Place<T>, now: &Place<T>) -> T {
         let left = decay((now.time_s - then.time_s) / self.tau_s);
         (T::from(1.0) - self.relaxed_fraction) * (now.depth_m - then.depth_m)
             + self.relaxed_fraction * (now.depth_memory - left * then.depth_memory)
@@ -177,7 +193,7 @@ impl<T: Number> LinearSolid<T> {
 
     /// The force while the contact is smaller than it was; `at` is the last index at which it was not larger.
     fn shrunk<L: Law<T>>(&self, law: &L, grown: &[Point<T>], at: &mut usize, now: &Point<T>) -> T {
-        let smaller = |i: usize| self.moved(&grown[i], now).re() >= 0.0;
+        let smaller = |i: usize| self.moved(&grown[i].place, &now.place).re() >= 0.0;
         *at = (*at).min(grown.len() - 1);
         while *at + 1 < grown.len() && smaller(*at + 1) {
             *at += 1;
@@ -189,14 +205,14 @@ impl<T: Number> LinearSolid<T> {
             *at -= 1;
         }
         let from = &grown[*at];
-        let Some(end) = grown.get(*at + 1).map(|p| (p.time_s, p.depth_m)) else {
+        let Some(end) = grown.get(*at + 1).map(|p| (p.place.time_s, p.place.depth_m)) else {
             return self.sum(from, now);
         };
         // `moved` falls along the way from this point to the next.
         let value = |part: T| {
-            let point = from.to(law, self.tau_s, end, part);
-            let slope = self.remaining(now.time_s - point.time_s) * (end.1 - from.depth_m);
-            (-self.moved(&point, now), slope)
+            let (place, _) = from.place.to(self.tau_s, end, part);
+            let slope = self.remaining(now.place.time_s - place.time_s) * (end.1 - from.place.depth_m);
+            (-self.moved(&place, &now.place), slope)
         };
         let real = |part: f64| {
             let (value, slope) = value(T::from(part));

@@ -146,7 +146,9 @@ impl DomainScore {
             }
             Hidden::One | Hidden::Two => self.add_listed(w, doubted),
         }
-        if let Some(place) = w.key.place.as_ref().filter(|_| o.p_value <= 0.001) {
+        // Beside a second effect the baseline misses where that acts, too.
+        let alone = w.key.hidden != Hidden::Two && o.p_value <= 0.001;
+        if let Some(place) = w.key.place.as_ref().filter(|_| alone) {
             let hit = o.places.first().is_some_and(|found| {
                 let near = |found: Option<f64>, extent: f64| {
                     let ends = [place.from, place.to].into_iter().filter(|end| end.is_finite());

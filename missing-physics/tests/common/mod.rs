@@ -25,6 +25,13 @@ impl Default for Ball {
 }
 
 impl Ball {
+    /// Thrown over a floor: no run begins below it.
+    pub(crate) fn over_floor() -> Self {
+        let mut ball = Self::default();
+        ball.spec.parameters[3].lower = 0.0;
+        ball
+    }
+
     pub(crate) fn in_unit(unit_m: f64) -> Self {
         let parameter = |name: &str, scope, lower: f64, upper: f64, scale| Parameter {
             name: name.into(),

@@ -7,6 +7,7 @@ use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
 
 use super::spec::{self, Places};
+use crate::domains::builder::At;
 
 /// What is known of the set-up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,11 +110,17 @@ impl IndentationModel {
         &self.setup
     }
 
+    /// The modulus of a run's condition.
+    fn modulus(&self, run: &Run) -> Option<At> {
+        let moduli = &self.places.moduli;
+        moduli.get(run.kind as usize).or_else(|| moduli.first()).copied()
+    }
+
     fn press(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
         let p = &self.places;
         let depths = run.inputs.first().ok_or("delta_m is missing")?;
-        let value = |at: Option<crate::domains::builder::At>| at.map_or(0.0, |at| shared[at.slot]);
-        let modulus = p.moduli.get(run.kind as usize).or_else(|| p.moduli.first()).ok_or("no condition")?;
+        let value = |at: Option<At>| at.map_or(0.0, |at| shared[at.slot]);
+        let modulus = self.modulus(run).ok_or("no condition")?;
         let inverse_thickness = value(p.thickness) + self.setup.thickness_m.map_or(0.0, f64::recip);
         let law = Indentation {
             layer: self.layer.filter(|_| inverse_thickness > 0.0),
@@ -161,6 +168,12 @@ impl Model for IndentationModel {
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
         self.press(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+    }
+
+    /// A modulus acts on the runs of its own condition.
+    fn acts_on(&self, run: &Run, shared_slot: usize) -> bool {
+        let own = self.modulus(run).map(|at| at.slot);
+        own == Some(shared_slot) || self.places.moduli.iter().all(|at| at.slot != shared_slot)
     }
 
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {

@@ -158,9 +158,12 @@ impl LiquidTiltModel {
         own
     }
 
-    /// Mass (kg) and volume (m^3) of a run's liquid.
+    /// Mass (kg) and volume (m^3) of a run's liquid; no volume weighs nothing.
     fn load(&self, run: &Run, own: &[f64]) -> (f64, f64) {
         let known = run.inputs.get(2).filter(|_| self.setup.volumes_known).and_then(|c| c.first()).copied();
+        if known == Some(0.0) {
+            return (0.0, 0.0);
+        }
         let mass = self.places.mass.map(|at| own[at.slot]);
         let volume = known
             .or_else(|| self.places.volume.map(|at| own[at.slot]))
