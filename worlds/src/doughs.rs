@@ -197,8 +197,9 @@ impl Table {
             band.k2_per_m = between(rng, 4.0, 12.0).round();
         }
         let noise = std::array::from_fn(|_| {
+            // Each picture has its own, as the format says.
             let sigma = log_between(rng, 2.5e-4, 6e-4);
-            draw::noise(rng, sigma)
+            Noise { correlation: 0.0, ..draw::noise(rng, sigma) }
         });
         let world = DoughWorld {
             band,
