@@ -101,6 +101,7 @@ pub fn makers() -> &'static [&'static dyn Maker] {
         &crate::waves::Waves,
         &crate::tilts::Tilts,
         &crate::presses::Presses,
+        &crate::doughs::Doughs,
     ]
 }
 

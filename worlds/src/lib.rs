@@ -4,6 +4,8 @@ pub mod bounce;
 pub mod bounces;
 pub mod bundled;
 pub mod concealed;
+pub mod dough;
+pub mod doughs;
 pub mod flight;
 pub mod flights;
 mod layer;

@@ -58,6 +58,11 @@ pub(crate) trait SetUp: Sized {
     /// Header and data of the recording with these effects at work.
     fn files(self, effects: Self::Effects, rng: &mut ChaCha8Rng) -> [String; 2];
 
+    /// What lies beside them: name and contents.
+    fn beside(&self, _rng: &mut ChaCha8Rng) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
     /// One listed effect alone.
     fn alone(&self, listed: usize, size: f64) -> Self::Effects {
         let mut effects = Self::Effects::default();
@@ -108,8 +113,11 @@ pub(crate) fn conceal<S: SetUp>(hidden: Hidden, seed: u64) -> Concealed {
     let mut key = Key::new(hidden);
     let (set_up, choice) = S::draw(hidden, &mut rng);
     let effects = set_up.hide(hidden, &choice, &mut key, &mut rng);
+    let beside = set_up.beside(&mut rng);
     let [header, data] = set_up.files(effects, &mut rng);
-    Concealed::table(header, data, key)
+    let mut concealed = Concealed::table(header, data, key);
+    concealed.files.extend(beside);
+    concealed
 }
 
 #[cfg(test)]

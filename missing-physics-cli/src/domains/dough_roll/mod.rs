@@ -108,6 +108,13 @@ impl Domain for DoughRoll {
             undetermined
                 .push("without t_s, drying is not told from a band that tires or another stiffness".into());
         }
+        if read.one_picture() {
+            undetermined.push(
+                "a state before a roll repeats the one after the roll before it: from one picture, noise is not told \
+                 from what rolls do, and p-values mislead; take a second picture before each roll"
+                    .into(),
+            );
+        }
         Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
     }
 }

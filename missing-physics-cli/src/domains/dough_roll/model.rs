@@ -163,12 +163,17 @@ impl DoughModel {
         let block = &self.blocks[self.blocks.len() - 1];
         let dough = &block.doughs[dough];
         let of = |f: &dyn Fn(&Step) -> f64| dough.steps.iter().map(f).collect::<Vec<f64>>();
+        // The state that was expected: a measured one shares its noise with the error that is to be a function of it.
+        let followed = self.follow(dough, &block.fresh, &Effects::OFF);
+        let expected = |k: usize| -> Vec<f64> {
+            dough.steps.iter().zip(&followed).map(|(s, f)| s.roll.state[k] - f.before.off[k]).collect()
+        };
         let inputs = vec![
             of(&|s| s.step),
             of(&|s| s.t_s),
-            of(&|s| s.roll.state[0]),
-            of(&|s| s.roll.state[1]),
-            of(&|s| s.roll.state[2]),
+            expected(0),
+            expected(1),
+            expected(2),
             of(&|s| s.roll.action[0]),
             of(&|s| s.roll.action[1]),
             of(&|s| self.band.force_n(s.roll.action[0], s.roll.action[1])),

@@ -32,6 +32,19 @@ pub(super) struct Read {
     pub(super) blame: Table<'static>,
 }
 
+impl Read {
+    /// Whether states before a roll are those after the roll before it, to the last digit: one measurement where the format has two.
+    pub(super) fn one_picture(&self) -> bool {
+        let runs = self.runs.iter().flat_map(|(_, steps)| steps.windows(2));
+        let (mut same, mut all) = (0, 0);
+        for pair in runs {
+            same += usize::from(pair[0].roll.next == pair[1].roll.state);
+            all += 1;
+        }
+        2 * same > all
+    }
+}
+
 /// Reads a recording.
 ///
 /// # Errors
