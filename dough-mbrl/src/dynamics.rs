@@ -163,7 +163,7 @@ impl Dynamics {
         let rolls: Vec<&Roll> = doughs.iter().flatten().collect();
         let surface = Surface::measured(&rolls)?;
         let measured = twice_measured(doughs, &surface.left);
-        let noise = Noise { measured, process: 0.1 * measured[1], scatter: 1e-4 };
+        let noise = Noise { measured, process: 0.1 * measured[1] };
         let Learned { surface, noise, own, precision } = learn(doughs, surface, noise)?;
         Ok(Self { surface, noise, own, precision })
     }
@@ -209,8 +209,7 @@ impl Dynamics {
             let mut told = DVector::zeros(3 * p);
             told.rows_mut(k * p, p).copy_from(&terms);
             self.precision.l_dirty().solve_lower_triangular_mut(&mut told);
-            let scatter = self.noise.scatter * change[k] * change[k];
-            let variance = told.norm_squared() + self.noise.process[k] + scatter + self.noise.measured[1][k];
+            let variance = told.norm_squared() + self.noise.process[k] + self.noise.measured[1][k];
             Prediction { mean: state[k] + change[k], sigma: variance.sqrt() }
         })
     }

@@ -12,8 +12,6 @@ pub struct Noise {
     pub measured: [Vector3<f64>; 2],
     /// Of what a roll does beyond its dynamics.
     pub process: Vector3<f64>,
-    /// Relative: of a roll's whole change, all dimensions alike. No two rolls are equally strong.
-    pub scatter: f64,
 }
 
 /// What is known of a fresh dough.
@@ -108,10 +106,7 @@ pub fn follow(
             moved[k] += STEP_M;
             gradient.set_column(k, &((next(i, &moved) - there) / STEP_M));
         }
-        let change = there - x;
-        p = gradient * p * gradient.transpose()
-            + Matrix3::from_diagonal(&noise.process)
-            + change * change.transpose() * noise.scatter;
+        p = gradient * p * gradient.transpose() + Matrix3::from_diagonal(&noise.process);
         x = there;
         let after = innovation(&Vector3::from(roll.next), &x, &p, &noise.measured[1]);
         (x, p) = updated(&x, &p, &after);

@@ -18,8 +18,6 @@ const UPDATES: usize = 6;
 const DOUGHS: usize = 3;
 /// Logarithm of the variance of what a roll does beyond its dynamics, over that of a measurement.
 const LOG_PROCESS: [f64; 2] = [-7.0, 4.0];
-/// Logarithm of the relative variance of a roll's change.
-const LOG_SCATTER: [f64; 2] = [-14.0, -2.0];
 
 /// What was learned.
 #[derive(Debug, Clone)]
@@ -227,33 +225,26 @@ impl Learning<'_> {
 
     /// The variance of what a roll does beyond its dynamics, by the likelihood of the innovations.
     fn size_of_process(&mut self) {
-        let problem = Process { learning: self };
+        let problem = Process { learning: self, least: self.noise.measured[1] };
         let now = self.noise.process.zip_map(&self.noise.measured[1], |q, r| (q / r).max(1e-9).ln());
-        let bounds = [LOG_PROCESS, LOG_PROCESS, LOG_PROCESS, LOG_SCATTER];
-        let now = now.iter().copied().chain([self.noise.scatter.max(1e-9).ln()]);
-        let start: Vec<f64> = now.zip(bounds).map(|(v, [low, high])| v.clamp(low, high)).collect();
-        let [low, high] = [0, 1].map(|end| bounds.iter().map(|b| b[end]).collect());
-        let Ok(powell) = Powell::new(low, high, 1e-4) else { return };
+        let start: Vec<f64> = now.iter().map(|v| v.clamp(LOG_PROCESS[0], LOG_PROCESS[1])).collect();
+        let Ok(powell) = Powell::new(vec![LOG_PROCESS[0]; 3], vec![LOG_PROCESS[1]; 3], 1e-4) else { return };
         let found = Executor::new(problem, powell.with_lines(8, 0.02))
             .configure(|s| s.param(start).max_iters(1))
             .timer(false)
             .ctrlc(false)
             .run();
-        if let Some(log) = found.ok().and_then(|mut r| r.state.take_best_param()) {
-            self.noise = sized(&self.noise, &log);
+        let best = found.ok().and_then(|mut r| r.state.take_best_param());
+        if let Some(log) = best {
+            self.noise.process = Vector3::from_fn(|k, _| log[k].exp() * self.noise.measured[1][k]);
         }
     }
 }
 
-/// Noise with the sizes of these logarithms.
-fn sized(noise: &Noise, log: &[f64]) -> Noise {
-    let process = Vector3::from_fn(|k, _| log[k].exp() * noise.measured[1][k]);
-    Noise { process, scatter: log[3].exp(), ..*noise }
-}
-
-/// Minus twice the logarithm of the likelihood, by the logarithms of what a roll does beyond its dynamics ([`sized`]).
+/// Minus twice the logarithm of the likelihood, by the logarithm of the process over the measurements' variance.
 struct Process<'a, 'b> {
     learning: &'a Learning<'b>,
+    least: Vector3<f64>,
 }
 
 impl CostFunction for Process<'_, '_> {
@@ -262,7 +253,7 @@ impl CostFunction for Process<'_, '_> {
 
     fn cost(&self, log: &Vec<f64>) -> Result<f64, Error> {
         let Learning { doughs, surface, noise, .. } = self.learning;
-        let noise = sized(noise, log);
+        let noise = Noise { process: Vector3::from_fn(|k, _| log[k].exp() * self.least[k]), ..*noise };
         let fresh = self.learning.fresh(&noise);
         let (mut spread, mut square) = (0.0, 0.0);
         for (dough, own) in doughs.iter().zip(&self.learning.courses) {

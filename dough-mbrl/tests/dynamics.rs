@@ -21,11 +21,6 @@ fn law(state: [f64; 3], action: [f64; 2], cubic: f64) -> [f64; 3] {
 
 /// Doughs that are rolled eight times each; states are measured twice, after a roll and before the next.
 fn doughs(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Roll>> {
-    scattered(n, cubic, sigma, 0.0, rng)
-}
-
-/// The same, each roll as a whole stronger or weaker by a part.
-fn scattered(n: usize, cubic: f64, sigma: f64, part: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Roll>> {
     let measured = |state: [f64; 3], rng: &mut ChaCha8Rng| {
         state.map(|x| {
             let z: f64 = StandardNormal.sample(rng);
@@ -43,9 +38,7 @@ fn scattered(n: usize, cubic: f64, sigma: f64, part: f64, rng: &mut ChaCha8Rng) 
                 .map(|_| {
                     let action = [rng.random_range(0.04..0.12), rng.random_range(0.01..0.04)];
                     let before = measured(state, rng);
-                    let next = law(state, action, cubic);
-                    let luck: f64 = if part > 0.0 { StandardNormal.sample(rng) } else { 0.0 };
-                    state = std::array::from_fn(|k| state[k] + (1.0 + part * luck) * (next[k] - state[k]));
+                    state = law(state, action, cubic);
                     Roll { state: before, action, next: measured(state, rng) }
                 })
                 .collect()
@@ -82,17 +75,6 @@ fn the_law_is_learned_and_not_the_noise_of_the_states() {
                 assert!((0.8..1.2).contains(&(variance.sqrt() / SIGMA)), "{}", variance.sqrt());
             }
         }
-    }
-}
-
-/// By how much equal rolls differ is learned too: of a twentieth the most part (doughs of eight rolls leave some of it to what each
-/// dough does for itself), and nothing where there is none.
-#[test]
-fn the_scatter_of_rolls_is_learned() {
-    for (part, within) in [(0.0, 0.0..0.015), (0.05, 0.03..0.06)] {
-        let training = scattered(40, 0.05, SIGMA, part, &mut ChaCha8Rng::seed_from_u64(6));
-        let found = Dynamics::learn(&training).unwrap().noise().scatter.sqrt();
-        assert!(within.contains(&found), "{found} of {part}");
     }
 }
 
@@ -157,7 +139,7 @@ fn innovations_are_white() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let doughs = doughs(200, 0.0, SIGMA, &mut rng);
     let variance = nalgebra::Vector3::repeat(SIGMA * SIGMA);
-    let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros(), scatter: 0.0 };
+    let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros() };
     let first: Vec<[f64; 3]> = doughs.iter().map(|d| d[0].state).collect();
     let fresh = Fresh::of(&first, &noise);
     let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);
