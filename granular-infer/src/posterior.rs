@@ -22,20 +22,13 @@ use crate::summary::COUNT;
 const SHIPPED: &[u8] = include_bytes!("../posterior.json.gz");
 /// Draws of which an estimate is the mean.
 const DRAWS: usize = 4000;
-/// Densities that are learned and averaged.
-const MEMBERS: u64 = 3;
-/// One simulation in so many is kept from training, and says how wide intervals have to be.
-const CALIBRATING: usize = 6;
 /// Factors on variances that are tried.
 const WIDENINGS: [f64; 13] = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0];
 
-/// What was learned from a campaign: the mean of several densities, each learned from another start, their variances multiplied
-/// by what simulations that none of them had seen ask for (as a temperature is found: Guo et al. 2017, arXiv:1706.04599; the
-/// ensemble: Lakshminarayanan et al. 2017, arXiv:1612.01474, Hermans et al. 2022, arXiv:2110.06581).
+/// What was learned from a campaign; its variances may be multiplied by what unseen simulations ask for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GrainPosterior {
-    prior: Prior,
-    members: Vec<Mdrff>,
+    density: Mdrff,
     widening: f64,
     novelty: Novelty,
     /// Spread of the statistics over the training's pictures.
@@ -76,27 +69,21 @@ impl GrainPosterior {
             let mean = column.iter().sum::<f64>() / n;
             (column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
         };
-        let part = |calibrating: bool| {
-            let rows: Vec<usize> =
-                (0..simulations.len()).filter(|i| (i % CALIBRATING == 0) == calibrating).collect();
-            Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))
-        };
-        let learned_from = part(false)?;
-        let members = (0..MEMBERS).map(|k| Mdrff::train(prior, &learned_from, settings, seed + k));
-        let mut posterior = Self {
-            prior: prior.clone(),
-            members: members.collect::<Result<_, _>>()?,
+        Ok(Self {
+            density: Mdrff::train(prior, simulations, settings, seed)?,
             widening: 1.0,
             novelty: Novelty::new(simulations.x(), seed)?,
             sd: (0..simulations.x().dim()).map(|j| spread(simulations.x().column(j))).collect(),
             simulations: simulations.len(),
-        };
-        posterior.widen(&part(true)?)?;
-        Ok(posterior)
+        })
     }
 
-    /// Takes the widening under which unseen simulations are likeliest.
-    fn widen(&mut self, unseen: &Simulations) -> Result<(), Error> {
+    /// The same, its variances multiplied by the factor under which simulations that it has not seen are likeliest: what is
+    /// learned from a thousand pictures is too sure of itself. (As a temperature is found: Guo et al. 2017, arXiv:1706.04599.)
+    ///
+    /// # Errors
+    /// [`Error`] of `bayes-sim`, for statistics that are not finite.
+    pub fn widened(mut self, unseen: &Simulations) -> Result<Self, Error> {
         let mut best = (f64::NEG_INFINITY, 1.0);
         for widening in WIDENINGS {
             self.widening = widening;
@@ -109,7 +96,7 @@ impl GrainPosterior {
             }
         }
         self.widening = best.1;
-        Ok(())
+        Ok(self)
     }
 
     /// The posterior that is shipped: pours of [`crate::scene::Scene::default`] from 12 cm, seen by
@@ -159,20 +146,15 @@ impl GrainPosterior {
     }
 
     fn posterior(&self, x: &[f64]) -> Result<Posterior, Error> {
-        let share = 1.0 / self.members.len() as f64;
-        let prior = &self.prior;
-        let (mut weights, mut means, mut covariances) = (Vec::new(), Points::new(prior.dim()), Vec::new());
-        for member in &self.members {
-            let learned = member.posterior(x)?;
-            let mixture = learned.mixture();
-            for (k, weight) in mixture.weights().into_iter().enumerate() {
-                weights.push(share * weight);
-                means.push(mixture.component_mean(k))?;
-                let wide = mixture.component_covariance(k).into_iter().map(|v| self.widening * v);
-                covariances.push(wide.collect());
-            }
+        let learned = self.density.posterior(x)?;
+        let (mixture, prior) = (learned.mixture(), learned.prior());
+        let (mut means, mut covariances) = (Points::new(prior.dim()), Vec::new());
+        for k in 0..mixture.len() {
+            means.push(mixture.component_mean(k))?;
+            covariances
+                .push(mixture.component_covariance(k).into_iter().map(|v| self.widening * v).collect());
         }
-        Posterior::new(prior.clone(), Mixture::new(&weights, &means, &covariances)?)
+        Posterior::new(prior.clone(), Mixture::new(&mixture.weights(), &means, &covariances)?)
     }
 
     /// Distance of two pictures' statistics, each in standard deviations of the training's: the thesis's L2 error.
@@ -183,7 +165,7 @@ impl GrainPosterior {
 
 impl ConditionalDensity for GrainPosterior {
     fn prior(&self) -> &Prior {
-        &self.prior
+        self.density.prior()
     }
 
     fn x_dim(&self) -> usize {
