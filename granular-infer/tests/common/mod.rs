@@ -3,7 +3,7 @@
 use granular_infer::dem::{Coefficients, Funnel, Law, Pour};
 
 /// Grains of 4 mm and 1,300 kg/m3, E 5 MPa, from 5 cm.
-pub fn pour(count: usize) -> Pour {
+pub(crate) fn pour(count: usize) -> Pour {
     let dry = Coefficients::dry(0.5, 0.5, 0.2);
     Pour {
         count,
