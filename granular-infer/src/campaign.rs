@@ -196,6 +196,9 @@ impl Rig {
         let poured = pour.run(seed)?;
         let gone = [GONE_D * self.diameter_m, 0.0, 0.0];
         let stays = |p: [f64; 3]| if p[2] < c.height_m { p } else { gone };
-        Ok(Grains { positions_m: poured.positions_m.into_iter().map(stays).collect(), radii_m: poured.radii_m })
+        Ok(Grains {
+            positions_m: poured.positions_m.into_iter().map(stays).collect(),
+            radii_m: poured.radii_m,
+        })
     }
 }

@@ -78,8 +78,7 @@ pub fn check_prior(prior: &Prior) -> Result<(), PriorError> {
         Marginal::LogUniform { .. } | Marginal::LogNormal { .. } => m.bounds().map(f64::exp),
         Marginal::Uniform { .. } | Marginal::Normal { .. } => m.bounds(),
     };
-    let &[sliding, rolling, restitution] =
-        prior.marginals().iter().map(ends).collect::<Vec<_>>().as_slice()
+    let &[sliding, rolling, restitution] = prior.marginals().iter().map(ends).collect::<Vec<_>>().as_slice()
     else {
         return Err(PriorError::Dimensions { received: prior.dim() });
     };

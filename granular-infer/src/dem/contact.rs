@@ -117,8 +117,7 @@ pub(crate) fn react(f: &Factors, pair: &Pair, touch: &Touch, history: &mut Histo
     let rate = stiffness * step * pair.radius * pair.radius;
     let trial = along(scale(history.couple, less), -rate, rolls);
     let rolled;
-    (history.couple, rolled) =
-        spring(trial, dashpot * pair.radius, rolls, f.rolling * pair.radius * held);
+    (history.couple, rolled) = spring(trial, dashpot * pair.radius, rolls, f.rolling * pair.radius * held);
 
     // Twisting: damped as a spring S_t a^2 / 2 with 2/7 of rolling's inertia would be, at most 2/3 mu_s a F_n.
     let a = if f.hertz { s } else { (pair.radius * touch.overlap).sqrt() };

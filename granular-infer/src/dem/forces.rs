@@ -219,11 +219,8 @@ fn lay_out(block: &mut Block, m: usize, neighbours: &Neighbours, grains: &Grains
 /// The law of contact.
 #[inline(always)]
 fn side_by_side(block: &mut Block, m: usize, factors: &Factors, step: f64) {
-    let pair = Pair {
-        radius: block.radius[m],
-        root_mass: block.root_mass[m],
-        root_inertia: block.root_inertia[m],
-    };
+    let pair =
+        Pair { radius: block.radius[m], root_mass: block.root_mass[m], root_inertia: block.root_inertia[m] };
     let overlap = block.overlap[m];
     let touch = Touch {
         normal: get(&block.normal, m),
@@ -233,12 +230,8 @@ fn side_by_side(block: &mut Block, m: usize, factors: &Factors, step: f64) {
         surface: get(&block.surface, m),
         rotation: get(&block.rotation, m),
     };
-    let mut history = History {
-        shear: get(&block.shear, m),
-        size: block.size[m],
-        couple: get(&block.couple, m),
-        round: 0,
-    };
+    let mut history =
+        History { shear: get(&block.shear, m), size: block.size[m], couple: get(&block.couple, m), round: 0 };
     let r = react(factors, &pair, &touch, &mut history, step);
     set(&mut block.shear, m, history.shear);
     block.size[m] = history.size;

@@ -33,7 +33,8 @@ pub(super) fn words(read: &Read, baseline: &[[f64; COUNT]]) -> Option<String> {
         .iter()
         .map(|e| {
             let [from, to] = [e.ring, e.ring + 1].map(|k| 1e3 * length * RINGS[k]);
-            let place = e.octant.map_or("all round".into(), |o| format!("towards {}, beyond its ring's", OCTANTS[o]));
+            let place =
+                e.octant.map_or("all round".into(), |o| format!("towards {}, beyond its ring's", OCTANTS[o]));
             let (mean, error) = (1e3 * e.mean_m, 1e3 * e.error_m);
             format!("{mean:+.1} +- {error:.1} mm from {from:.0} to {to:.0} mm off the axis, {place}")
         })
@@ -88,9 +89,8 @@ fn cells(picture: &super::read::Picture, baseline: &[f64; COUNT], read: &Read) -
         .map(|(octants, wanted)| {
             let (sum, count) = octants.iter().fold((0.0, 0), |(s, n), (sum, count)| (s + sum, n + count));
             let ring = sum / count as f64;
-            let beyond = octants.map(|(sum, count)| {
-                if count < FEWEST { f64::NAN } else { sum / count as f64 - ring }
-            });
+            let beyond =
+                octants.map(|(sum, count)| if count < FEWEST { f64::NAN } else { sum / count as f64 - ring });
             (ring - wanted * d, beyond)
         })
         .collect()

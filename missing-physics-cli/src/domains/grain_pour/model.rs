@@ -229,13 +229,7 @@ impl PourModel {
     }
 
     /// Conditions near which pictures like these are poured: the likeliest of many draws, refined by smaller and smaller steps.
-    fn nearest(
-        &self,
-        heights: &[f64],
-        seen: &[[f64; COUNT]],
-        campaign: &Campaign,
-        effects: Effects,
-    ) -> View {
+    fn nearest(&self, heights: &[f64], seen: &[[f64; COUNT]], campaign: &Campaign, effects: Effects) -> View {
         let ranges = &campaign.ranges;
         let allowed = |view: View| if effects == Effects::None { view.plain() } else { view };
         let score = |view: &View| -> f64 {
