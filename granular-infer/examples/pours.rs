@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 use bayes_sim::campaign::{Campaign, Shard, Simulator};
 use bayes_sim::prior::Prior;
-use granular_infer::scene::{COUSCOUS, FromHeight, OfGrain, Scene, prior};
+use granular_infer::scene::{COUSCOUS, FromHeight, OfGrain, Scene, check_prior, prior};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -27,6 +27,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         other => return Err(format!("{other}: expected grains or heights").into()),
     };
     let campaign = Campaign { prior, x_dim: simulator.x_dim(), count: count.parse()?, seed };
+    if kind == "grains" {
+        check_prior(&campaign.prior)?;
+    }
     let shard = Shard { index: index.parse()?, count: of.parse()? };
     let progress = |done: usize, all: usize| println!("{done} of {all}");
     let results =

@@ -11,6 +11,9 @@ use crate::dem::{Coefficients, DemError, Funnel, Law, Pour};
 /// and its heap is the same within the spread from pour to pour.
 pub const MODULUS_PA: f64 = 1e6;
 
+/// Where grains are put that the funnel takes with it, in diameters from the axis.
+const GONE_D: f64 = 1000.0;
+
 /// What is poured, and through which funnel; the same for all pours of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rig {
@@ -155,7 +158,7 @@ impl Rig {
         self.mass_kg / self.grain_volume_m3()
     }
 
-    /// Pours once; the same seed gives the same grains.
+    /// Pours once; the same seed gives the same grains. Those that stick in the funnel go with it, far out of any picture.
     ///
     /// # Errors
     /// [`DemError`] for conditions outside physics.
@@ -191,6 +194,11 @@ impl Rig {
             most_s: 3.0,
         };
         let poured = pour.run(seed)?;
-        Ok(Grains { positions_m: poured.positions_m, radii_m: poured.radii_m })
+        let gone = [GONE_D * self.diameter_m, 0.0, 0.0];
+        let stays = |p: [f64; 3]| if p[2] < c.height_m { p } else { gone };
+        Ok(Grains {
+            positions_m: poured.positions_m.into_iter().map(stays).collect(),
+            radii_m: poured.radii_m,
+        })
     }
 }

@@ -3,12 +3,14 @@
 use bayes_sim::error::Error;
 use bayes_sim::mdn::MixtureDensity;
 use bayes_sim::mdrff::{Mdrff, MdrffSettings};
+use bayes_sim::mixture::Mixture;
 use bayes_sim::novelty::{Novelty, Resemblance};
+use bayes_sim::points::Points;
 use bayes_sim::posterior::{ConditionalDensity, Posterior};
 use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
 use bayes_sim::training::TrainingSettings;
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
@@ -20,11 +22,14 @@ use crate::summary::COUNT;
 const SHIPPED: &[u8] = include_bytes!("../posterior.json.gz");
 /// Draws of which an estimate is the mean.
 const DRAWS: usize = 4000;
+/// Factors on variances that are tried.
+const WIDENINGS: [f64; 13] = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0];
 
-/// What was learned from a campaign.
+/// What was learned from a campaign; its variances may be multiplied by what unseen simulations ask for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GrainPosterior {
     density: Mdrff,
+    widening: f64,
     novelty: Novelty,
     /// Spread of the statistics over the training's pictures.
     sd: Vec<f64>,
@@ -66,10 +71,32 @@ impl GrainPosterior {
         };
         Ok(Self {
             density: Mdrff::train(prior, simulations, settings, seed)?,
+            widening: 1.0,
             novelty: Novelty::new(simulations.x(), seed)?,
             sd: (0..simulations.x().dim()).map(|j| spread(simulations.x().column(j))).collect(),
             simulations: simulations.len(),
         })
+    }
+
+    /// The same, its variances multiplied by the factor under which simulations that it has not seen are likeliest: what is
+    /// learned from a thousand pictures is too sure of itself. (As a temperature is found: Guo et al. 2017, arXiv:1706.04599.)
+    ///
+    /// # Errors
+    /// [`Error`] of `bayes-sim`, for statistics that are not finite.
+    pub fn widened(mut self, unseen: &Simulations) -> Result<Self, Error> {
+        let mut best = (f64::NEG_INFINITY, 1.0);
+        for widening in WIDENINGS {
+            self.widening = widening;
+            let mut sum = 0.0;
+            for (theta, x) in unseen.theta().rows().zip(unseen.x().rows()) {
+                sum += self.ln_density(theta, x)?;
+            }
+            if sum > best.0 {
+                best = (sum, widening);
+            }
+        }
+        self.widening = best.1;
+        Ok(self)
     }
 
     /// The posterior that is shipped: pours of [`crate::scene::Scene::default`] from 12 cm, seen by
@@ -97,9 +124,9 @@ impl GrainPosterior {
         shipped::pack(self)
     }
 
-    /// The density of parameters given statistics, for calibration.
-    pub fn density(&self) -> &dyn ConditionalDensity {
-        &self.density
+    /// The factor on the variances of what was learned.
+    pub fn widening(&self) -> f64 {
+        self.widening
     }
 
     /// How many pictures it was learned from.
@@ -113,14 +140,49 @@ impl GrainPosterior {
     /// [`Error::NotFinite`].
     pub fn infer(&self, statistics: &[f64; COUNT]) -> Result<Inferred, Error> {
         Ok(Inferred {
-            posterior: self.density.posterior(statistics)?,
+            posterior: self.posterior(statistics)?,
             resemblance: self.novelty.compare(statistics)?,
         })
+    }
+
+    fn posterior(&self, x: &[f64]) -> Result<Posterior, Error> {
+        let learned = self.density.posterior(x)?;
+        let (mixture, prior) = (learned.mixture(), learned.prior());
+        let (mut means, mut covariances) = (Points::new(prior.dim()), Vec::new());
+        for k in 0..mixture.len() {
+            means.push(mixture.component_mean(k))?;
+            covariances
+                .push(mixture.component_covariance(k).into_iter().map(|v| self.widening * v).collect());
+        }
+        Posterior::new(prior.clone(), Mixture::new(&mixture.weights(), &means, &covariances)?)
     }
 
     /// Distance of two pictures' statistics, each in standard deviations of the training's: the thesis's L2 error.
     pub fn distance(&self, a: &[f64; COUNT], b: &[f64; COUNT]) -> f64 {
         a.iter().zip(b).zip(&self.sd).map(|((a, b), sd)| ((a - b) / sd).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+impl ConditionalDensity for GrainPosterior {
+    fn prior(&self) -> &Prior {
+        self.density.prior()
+    }
+
+    fn x_dim(&self) -> usize {
+        COUNT
+    }
+
+    fn ln_density(&self, theta: &[f64], x: &[f64]) -> Result<f64, Error> {
+        self.posterior(x)?.ln_density(theta)
+    }
+
+    fn ln_densities(&self, theta: &Points, x: &[f64]) -> Result<Vec<f64>, Error> {
+        let posterior = self.posterior(x)?;
+        theta.rows().map(|t| posterior.ln_density(t)).collect()
+    }
+
+    fn sample(&self, x: &[f64], count: usize, rng: &mut dyn Rng) -> Result<Points, Error> {
+        Ok(self.posterior(x)?.sample(count, rng).theta)
     }
 }
 

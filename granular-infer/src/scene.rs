@@ -55,6 +55,39 @@ pub fn prior() -> Result<Prior, Error> {
     ])
 }
 
+/// A prior from which grains cannot be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PriorError {
+    /// It is over another number of parameters.
+    #[error("a prior over {received} parameters, expected 3: mu_s, mu_r, e")]
+    Dimensions {
+        /// Parameters that it has.
+        received: usize,
+    },
+    /// It reaches outside physics.
+    #[error("the prior reaches outside physics: {0}")]
+    Outside(#[from] DemError),
+}
+
+/// Whether every draw of a prior over `[mu_s, mu_r, e]` can be poured; a campaign under another is a list of failures.
+///
+/// # Errors
+/// [`PriorError`]; a prior without bounds reaches outside.
+pub fn check_prior(prior: &Prior) -> Result<(), PriorError> {
+    let ends = |m: &Marginal| match m {
+        Marginal::LogUniform { .. } | Marginal::LogNormal { .. } => m.bounds().map(f64::exp),
+        Marginal::Uniform { .. } | Marginal::Normal { .. } => m.bounds(),
+    };
+    let &[sliding, rolling, restitution] = prior.marginals().iter().map(ends).collect::<Vec<_>>().as_slice()
+    else {
+        return Err(PriorError::Dimensions { received: prior.dim() });
+    };
+    for end in 0..2 {
+        Coefficients::dry(restitution[end], sliding[end], rolling[end]).check()?;
+    }
+    Ok(())
+}
+
 /// Where grains are poured: the rig and the cloth under it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scene {

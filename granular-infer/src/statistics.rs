@@ -9,7 +9,9 @@ use std::sync::LazyLock;
 use crate::seeing::HeightMap;
 
 /// Edges of the rings in L.
-const RINGS: [f64; 10] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1, 3.0];
+pub const RINGS: [f64; 10] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1, 3.0];
+/// Added to a ring's mean height before its root is taken, in diameters.
+const RING_FLOOR: f64 = 0.01;
 /// Least height that moments are divided by, over what the grains' volume should give.
 const LEAST: f64 = 0.3;
 /// Heap and strays part here, in L.
@@ -56,6 +58,11 @@ pub static STATISTICS: LazyLock<Vec<(String, Symmetry)>> = LazyLock::new(|| {
 /// Number of [`STATISTICS`].
 pub const COUNT: usize = 3 + RINGS.len() - 1 + LAGS.len() + 5;
 
+/// Mean heights of the rings in diameters, of statistics.
+pub fn ring_heights(statistics: &[f64; COUNT]) -> [f64; RINGS.len() - 1] {
+    std::array::from_fn(|k| statistics[3 + k].powi(2) - RING_FLOOR)
+}
+
 /// The statistics of a picture of `count` grains of a mean diameter in m.
 pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT] {
     let length = diameter_m * (count as f64).cbrt();
@@ -98,7 +105,7 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
     out[2] = map.slope[1];
     for k in 0..ring.len() {
         // A root evens out how much a height varies from pour to pour; a hundredth of a diameter keeps noise inside it.
-        out[3 + k] = (ring[k] / pixels[k].max(1) as f64 / d + 0.01).max(0.0).sqrt();
+        out[3 + k] = (ring[k] / pixels[k].max(1) as f64 / d + RING_FLOOR).max(0.0).sqrt();
     }
     let at = 3 + ring.len();
     let [one, two, four] = LAGS.map(|lag| {

@@ -1,9 +1,11 @@
 //! Grains against closed forms, conservation laws and refusals.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
+mod common;
+
 use approx::assert_relative_eq;
 use granular_infer::dem::{
-    Coefficients, DemError, Funnel, Law, Pour, Rest, Setup, Shape, Simulation, Wall, heap, stable_step_s,
+    Coefficients, DemError, Law, Pour, Rest, Setup, Shape, Simulation, Wall, heap, stable_step_s,
 };
 
 const R: f64 = 2e-3;
@@ -205,36 +207,10 @@ fn energy_is_never_created_in_a_box() {
     }
 }
 
-fn small(count: usize) -> Pour {
-    let dry = Coefficients::dry(0.5, 0.5, 0.2);
-    Pour {
-        count,
-        diameter_m: 2.0 * R,
-        size_variation: 0.0,
-        density_kg_m3: DENSITY,
-        law: HERTZ,
-        grains: dry,
-        ground: dry,
-        funnel: Funnel {
-            outlet_radius_m: 0.014,
-            cone_half_angle_rad: std::f64::consts::FRAC_PI_4,
-            tube_radius_m: 0.03,
-            outlet_height_m: 0.05,
-            axis_m: [0.0; 2],
-        },
-        gravity_m_s2: [0.0, 0.0, -G],
-        drag_per_m: 0.0,
-        closed_s: 0.0,
-        step_s: None,
-        rest: None,
-        most_s: 4.0,
-    }
-}
-
 /// What the rolling spring is for: after rest, no grain goes on by more than a millionth of its diameter.
 #[test]
 fn a_heap_comes_to_rest_and_does_not_creep() {
-    let mut s = small(300).filled(1).unwrap();
+    let mut s = common::pour(300).filled(1).unwrap();
     s.remove_wall(3).unwrap();
     // Far below the usual threshold, where speeds are 3e-8 of sqrt(g d): 2e-7 of a diameter in 0.2 s would be left.
     let usual = Rest::usual(s.masses_kg()[0], 2.0 * R, G);
@@ -254,7 +230,7 @@ fn a_heap_comes_to_rest_and_does_not_creep() {
 
 #[test]
 fn the_same_seed_gives_the_same_bits() {
-    let pour = Pour { size_variation: 0.2, most_s: 0.3, ..small(200) };
+    let pour = Pour { size_variation: 0.2, most_s: 0.3, ..common::pour(200) };
     let a = pour.run(7).unwrap();
     assert_eq!(a, pour.run(7).unwrap());
     assert_ne!(a.positions_m, pour.run(8).unwrap().positions_m);
@@ -285,7 +261,7 @@ fn what_is_out_of_range_is_refused() {
         Err(DemError::Length { expected: 2, received: 1, .. })
     ));
     assert!(matches!(Simulation::new(&good, &[], &[]), Err(DemError::Count { received: 0, .. })));
-    assert!(matches!(small(20_001).run(1), Err(DemError::Count { received: 20_001, .. })));
+    assert!(matches!(common::pour(20_001).run(1), Err(DemError::Count { received: 20_001, .. })));
 }
 
 /// A fall through the air reaches sqrt(g/k).

@@ -1,19 +1,14 @@
 //! The funnel's filling.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+mod common;
+
 use approx::assert_relative_eq;
-use granular_infer::dem::{Coefficients, Funnel, Law, Pour};
+use granular_infer::dem::{Funnel, Pour};
 
 fn pour() -> Pour {
-    let dry = Coefficients::dry(0.5, 0.5, 0.2);
     Pour {
-        count: 600,
-        diameter_m: 4e-3,
         size_variation: 0.2,
-        density_kg_m3: 1300.0,
-        law: Law::Hertz { modulus_pa: 5e6, poisson_ratio: 0.25 },
-        grains: dry,
-        ground: dry,
         funnel: Funnel {
             outlet_radius_m: 0.012,
             cone_half_angle_rad: 0.7,
@@ -21,12 +16,8 @@ fn pour() -> Pour {
             outlet_height_m: 0.1,
             axis_m: [0.01, -0.02],
         },
-        gravity_m_s2: [0.0, 0.0, -9.81],
-        drag_per_m: 0.0,
-        closed_s: 0.0,
-        step_s: None,
-        rest: None,
         most_s: 1.0,
+        ..common::pour(600)
     }
 }
 

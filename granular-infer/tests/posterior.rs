@@ -1,8 +1,9 @@
 //! The shipped posterior on pours it has not seen, and what it refuses.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+use bayes_sim::prior::{Marginal, Prior};
 use granular_infer::posterior::GrainPosterior;
-use granular_infer::scene::{Grain, Scene, prior};
+use granular_infer::scene::{Grain, PriorError, Scene, check_prior, prior};
 use granular_infer::tasks::{Ring, RingHeights};
 use granular_infer::view::View;
 use rand::SeedableRng;
@@ -31,6 +32,19 @@ fn what_no_pour_looks_like_is_doubted_or_refused() {
     assert!(posterior.infer(&[f64::NAN; 16]).is_err());
     assert!(GrainPosterior::from_bytes(b"nothing").is_err());
     assert_eq!(GrainPosterior::from_bytes(&posterior.to_bytes().unwrap()).unwrap(), posterior);
+}
+
+#[test]
+fn priors_outside_physics_are_refused() {
+    let flat = |bounds: &[[f64; 2]]| check_prior(&Prior::uniform(bounds).unwrap());
+    check_prior(&prior().unwrap()).unwrap();
+    assert_eq!(flat(&[[0.1, 1.0]]), Err(PriorError::Dimensions { received: 1 }));
+    let bouncier = flat(&[[0.1, 1.0], [0.1, 0.5], [0.2, 1.2]]).unwrap_err();
+    assert!(bouncier.to_string().contains("restitution is 1.2"), "{bouncier}");
+    assert!(matches!(flat(&[[-0.1, 1.0], [0.1, 0.5], [0.2, 0.8]]), Err(PriorError::Outside(_))));
+    let unbounded = Marginal::Normal { mean: 0.5, sd: 0.1 };
+    let prior = Prior::new(vec![unbounded, unbounded, Marginal::Uniform { low: 0.1, high: 0.9 }]).unwrap();
+    assert!(check_prior(&prior).is_err());
 }
 
 /// Higher pours make wider rings.

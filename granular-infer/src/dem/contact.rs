@@ -111,22 +111,19 @@ pub(crate) fn react(f: &Factors, pair: &Pair, touch: &Touch, history: &mut Histo
     let tangential;
     (history.shear, tangential) = spring(trial, f.damping_t * damping, slip, f.friction * held);
 
-    let mut couple = [0.0; 3];
-    if f.rolling > 0.0 {
-        let spin = dot(touch.rotation, n);
-        let rolls = along(touch.rotation, -spin, n);
-        let dashpot = f.damping_r * q * pair.root_inertia;
-        let rate = stiffness * step * pair.radius * pair.radius;
-        let trial = along(scale(history.couple, less), -rate, rolls);
-        let limit = f.rolling * pair.radius * held;
-        (history.couple, couple) = spring(trial, dashpot * pair.radius, rolls, limit);
+    let spin = dot(touch.rotation, n);
+    let rolls = along(touch.rotation, -spin, n);
+    let dashpot = f.damping_r * q * pair.root_inertia;
+    let rate = stiffness * step * pair.radius * pair.radius;
+    let trial = along(scale(history.couple, less), -rate, rolls);
+    let rolled;
+    (history.couple, rolled) = spring(trial, dashpot * pair.radius, rolls, f.rolling * pair.radius * held);
 
-        // Twisting: damped as a spring S_t a^2 / 2 with 2/7 of rolling's inertia would be, at most 2/3 mu_s a F_n.
-        let a = if f.hertz { s } else { (pair.radius * touch.overlap).sqrt() };
-        let most = 2.0 / 3.0 * f.friction * a * held;
-        let twist = (1.0 / 7.0_f64).sqrt() * dashpot * a * spin;
-        couple = along(couple, -twist.min(most).max(-most), n);
-    }
+    // Twisting: damped as a spring S_t a^2 / 2 with 2/7 of rolling's inertia would be, at most 2/3 mu_s a F_n.
+    let a = if f.hertz { s } else { (pair.radius * touch.overlap).sqrt() };
+    let most = if f.rolling > 0.0 { 2.0 / 3.0 * f.friction * a * held } else { 0.0 };
+    let twist = (1.0 / 7.0_f64).sqrt() * dashpot * a * spin;
+    let couple = along(rolled, -twist.min(most).max(-most), n);
     Reaction {
         force: along(tangential, pressed - f.adhesion * pair.radius, n),
         turn: cross(n, tangential),
@@ -135,18 +132,16 @@ pub(crate) fn react(f: &Factors, pair: &Pair, touch: &Touch, history: &mut Histo
 }
 
 /// Cuts a spring's load to a limit and adds a dashpot as far as the limit allows: what is stored, what acts.
+///
+/// All cases are worked out and one is chosen, without a branch: that lets contacts go side by side.
 #[inline(always)]
 fn spring(load: V3, dashpot: f64, rate: V3, limit: f64) -> (V3, V3) {
-    let square = dot(load, load);
-    let most = limit * limit;
-    if square > most {
-        let cut = scale(load, limit / square.sqrt());
-        return (cut, cut);
-    }
-    let acting = along(load, -dashpot, rate);
-    if dot(acting, acting) <= most {
-        return (load, acting);
-    }
-    let share = (limit - square.sqrt()) / (dashpot * dot(rate, rate).sqrt());
-    (load, along(load, -dashpot * share.clamp(0.0, 1.0), rate))
+    let (square, most) = (dot(load, load), limit * limit);
+    let size = square.sqrt();
+    let slips = square > most;
+    let whole = along(load, -dashpot, rate);
+    let share = ((limit - size) / (dashpot * dot(rate, rate).sqrt())).clamp(0.0, 1.0);
+    let share = if dot(whole, whole) <= most { 1.0 } else { share };
+    let stored = scale(load, if slips { limit / size } else { 1.0 });
+    (stored, along(stored, -dashpot * if slips { 0.0 } else { share }, rate))
 }

@@ -100,11 +100,13 @@ impl Pour {
         let plane = |height: f64| Shape::Plane { point_m: [0.0, 0.0, height], normal: up };
         let [cone, tube] = self.funnel.shapes();
         let with = |shape, coefficients| Wall { shape, coefficients };
+        // A funnel is made not to stick.
+        let funnel = Coefficients { work_of_adhesion_j_m2: 0.0, ..self.grains };
         vec![
             with(plane(0.0), self.ground),
-            with(cone, self.grains),
-            with(tube, self.grains),
-            with(plane(self.funnel.outlet_height_m), self.grains),
+            with(cone, funnel),
+            with(tube, funnel),
+            with(plane(self.funnel.outlet_height_m), funnel),
         ]
     }
 

@@ -124,7 +124,7 @@ fn cache_file(rig: &Rig, ranges: &Ranges) -> Option<PathBuf> {
     let set = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let folder = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
     // FNV-1a over everything that the pours depend on.
-    let text = format!("1 {SEED} {rig:?} {ranges:?}");
+    let text = format!("2 {SEED} {rig:?} {ranges:?}");
     let hash = text
         .bytes()
         .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));

@@ -4,6 +4,7 @@
 //! simulated pours, each seen by the recording's own camera; the engine gets the statistics independent and of variance one.
 
 mod campaign;
+mod excess;
 mod model;
 mod read;
 mod spec;
@@ -98,10 +99,11 @@ impl Domain for GrainPour {
             calibration: vec![Some(1.0); COUNT],
             resolution: vec![0.0; COUNT],
         };
-        let undetermined = vec![
+        let mut undetermined = vec![
             "each statistic is shown less what those before it say of it, in standard deviations from pour to pour".into(),
             "grains that are not spheres are not in the model: they would be unexplained".into(),
         ];
+        undetermined.extend(excess::words(&read, &model.baseline(&read, &campaign)));
         Ok(Loaded {
             recording,
             model: Box::new(model),

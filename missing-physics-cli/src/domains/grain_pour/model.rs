@@ -33,6 +33,13 @@ const DISCREPANCY: f64 = 0.5;
 /// Draws and refinements of the search for where the spread is taken.
 const DRAWS: u64 = 3000;
 
+/// Whether the search may take effects on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Effects {
+    Any,
+    None,
+}
+
 /// Everything that a prediction depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct View {
@@ -132,6 +139,16 @@ fn missing(campaign: &Campaign, read: &Read, flaws: Flaws) -> Flaws {
     Flaws { missing, missing_at_edges, edge_m, ..flaws }
 }
 
+impl View {
+    /// The same without what is not the baseline's.
+    fn plain(mut self) -> Self {
+        let c = &mut self.conditions;
+        (c.work_of_adhesion_j_m2, c.size_variation, c.drag_per_m) = (0.0, 0.0, 0.0);
+        (c.ground_ratio, c.tilt_rad, self.blur_px2) = (1.0, [0.0; 2], 0.0);
+        self
+    }
+}
+
 impl PourModel {
     pub(super) fn new(campaign: &Campaign, read: &Read) -> Result<Self, EmulatorError> {
         let emulator = Emulator::learn(&campaign.ranges, &samples(campaign, read))?;
@@ -149,7 +166,7 @@ impl PourModel {
             runs: HashMap::new(),
         };
         let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| model.statistics(p, read)).collect();
-        let near = model.nearest(&heights, &seen, campaign);
+        let near = model.nearest(&heights, &seen, campaign, Effects::Any);
         let c = near.conditions;
         let start = [c.sliding_friction, c.rolling_friction, c.restitution];
         (model.spec, model.places) = build(&campaign.ranges, start, lowest, highest);
@@ -212,8 +229,9 @@ impl PourModel {
     }
 
     /// Conditions near which pictures like these are poured: the likeliest of many draws, refined by smaller and smaller steps.
-    fn nearest(&self, heights: &[f64], seen: &[[f64; COUNT]], campaign: &Campaign) -> View {
+    fn nearest(&self, heights: &[f64], seen: &[[f64; COUNT]], campaign: &Campaign, effects: Effects) -> View {
         let ranges = &campaign.ranges;
+        let allowed = |view: View| if effects == Effects::None { view.plain() } else { view };
         let score = |view: &View| -> f64 {
             heights
                 .iter()
@@ -237,7 +255,7 @@ impl PourModel {
             let mut rng = ChaCha8Rng::seed_from_u64(0x9e3);
             rng.set_stream(k);
             let blur: f64 = if k.is_multiple_of(3) { rng.random::<f64>() * MOST_BLUR_PX } else { 0.0 };
-            View { conditions: ranges.draw(0x51, k), blur_px2: blur * blur }
+            allowed(View { conditions: ranges.draw(0x51, k), blur_px2: blur * blur })
         };
         let scored: Vec<(f64, View)> =
             (0..DRAWS).into_par_iter().map(|k| (score(&draw(k)), draw(k))).collect();
@@ -261,6 +279,7 @@ impl PourModel {
                     c.size_variation = (c.size_variation * step().exp()).min(ranges.size_variation);
                     c.tilt_rad = c.tilt_rad.map(|t| t + 0.03 * step());
                     view.blur_px2 *= step().exp();
+                    let view = allowed(view);
                     (score(&view), view)
                 })
                 .collect();
@@ -271,6 +290,20 @@ impl PourModel {
             }
         }
         best.1
+    }
+
+    /// Mean statistics of each picture under the likeliest baseline.
+    pub(super) fn baseline(&self, read: &Read, campaign: &Campaign) -> Vec<[f64; COUNT]> {
+        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / self.scale).collect();
+        let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| self.statistics(p, read)).collect();
+        let mut near = self.nearest(&heights, &seen, campaign, Effects::None);
+        heights
+            .iter()
+            .map(|&height_m| {
+                near.conditions.height_m = height_m;
+                self.emulator.mean(&near.conditions, near.blur_px2)
+            })
+            .collect()
     }
 
     /// What the engine is to see of a picture.
