@@ -245,7 +245,7 @@ impl Ensemble {
             .members
             .iter()
             .zip(&self.weights)
-            .map(|(m, w)| w.ln() - m.head.loss(m.outputs(inputs, 1, &mut scratch), target, None, &mut head))
+            .map(|(m, w)| w.ln() - m.head.loss(m.outputs(inputs, 1, &mut scratch), target, &mut head))
             .collect();
         crate::normal::ln_sum_exp(terms.into_iter())
     }
