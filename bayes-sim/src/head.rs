@@ -38,7 +38,17 @@ impl Head {
 
     /// Outputs that are means.
     pub(crate) fn mean_rows(&self) -> Vec<usize> {
-        (0..self.components).flat_map(|k| (0..self.dim).map(move |i| k * self.stride() + 1 + i)).collect()
+        self.rows(1)
+    }
+
+    /// Outputs that are log precisions.
+    pub(crate) fn precision_rows(&self) -> Vec<usize> {
+        self.rows(1 + self.dim)
+    }
+
+    /// `dim` outputs of each component, from `first`.
+    fn rows(&self, first: usize) -> Vec<usize> {
+        (0..self.components).flat_map(|k| (0..self.dim).map(move |i| k * self.stride() + first + i)).collect()
     }
 
     /// Bounds as numbers, infinite where there is none.

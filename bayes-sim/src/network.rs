@@ -140,6 +140,12 @@ impl Network {
         &mut self.params[range]
     }
 
+    /// Adds to the biases of these outputs.
+    pub(crate) fn shift_biases(&mut self, rows: &[usize], shift: f64) {
+        let biases = self.output_bias_mut();
+        rows.iter().for_each(|&r| biases[r] += shift);
+    }
+
     /// Weight from input `column` to output `row` past the hidden layers (with no hidden layer: of the body).
     pub(crate) fn set_linear(&mut self, row: usize, column: usize, value: f64) {
         let (_, output, linear) = self.shape.blocks();
