@@ -8,7 +8,7 @@ use rand::Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::ensemble::{Ensemble, Plan};
+use crate::ensemble::{Ensemble, networks};
 use crate::error::Error;
 use crate::mdn::check_components;
 use crate::network::Scratch;
@@ -63,9 +63,7 @@ impl Autoregressive {
         check_components(settings.components, &settings.hidden, settings.members)?;
         settings.training.check()?;
         let prepared = Prepared::new(prior, simulations, settings.training.validation_share, seed)?;
-        let network = Plan::Network { hidden: settings.hidden.clone(), components: settings.components };
-        let mut plans = vec![Plan::Linear];
-        plans.resize(1 + settings.members, network);
+        let plans = networks(&settings.hidden, settings.components, settings.members);
         let bounds = prior.bounds();
         let factors = (0..prior.dim())
             .into_par_iter()

@@ -10,10 +10,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::error::Error;
+use crate::learner::Learner;
 use crate::network::{Activation, Network, Scratch, Shape};
 use crate::points::Points;
 use crate::scaling::mean_sd;
-use crate::training::Adam;
 
 const FOLDS: usize = 5;
 const MOST_EPOCHS: usize = 10_000;
@@ -89,16 +89,18 @@ impl Classifier {
             linear: vec![],
             activation: Activation::Relu,
         };
-        let mut out = Self { network: Network::glorot(shape, 6.0, rng) };
+        let mut network = Network::glorot(shape, 6.0, rng);
+        let mut learner = Learner::<f32>::new(&network);
         let mut order = train.to_vec();
-        let (mut adam, mut scratch) = (Adam::new(out.network.params.len()), Scratch::default());
-        let mut gradient = vec![0.0; out.network.params.len()];
+        let mut inputs = Vec::new();
         let (mut best, mut waited) = (f64::INFINITY, 0);
         for _ in 0..MOST_EPOCHS {
             order.shuffle(rng);
             let mut sum = 0.0;
             for batch in order.chunks(200.min(train.len())) {
-                sum += out.step(rows, batch, &mut scratch, &mut gradient, &mut adam) * batch.len() as f64;
+                inputs.clear();
+                inputs.extend(batch.iter().flat_map(|&i| rows[i].0.iter().map(|v| *v as f32)));
+                sum += step(&mut learner, &inputs, batch.iter().map(|&i| rows[i].1));
             }
             let loss = sum / train.len() as f64;
             waited = if loss > best - TOLERANCE { waited + 1 } else { 0 };
@@ -107,39 +109,8 @@ impl Classifier {
                 break;
             }
         }
-        out
-    }
-
-    /// One step on a batch; its loss before.
-    fn step(
-        &mut self,
-        rows: &[(Vec<f64>, f64)],
-        batch: &[usize],
-        scratch: &mut Scratch,
-        gradient: &mut [f64],
-        adam: &mut Adam,
-    ) -> f64 {
-        let n = batch.len() as f64;
-        let inputs: Vec<f64> = batch.iter().flat_map(|&i| &rows[i].0).copied().collect();
-        self.network.forward(&inputs, batch.len(), scratch);
-        let mut loss = 0.0;
-        scratch.output_gradient.clear();
-        for (&i, &logit) in batch.iter().zip(&scratch.outputs) {
-            let label = rows[i].1;
-            // ln(1 + e^l) - label l, without overflow.
-            loss += logit.max(0.0) + (-logit.abs()).exp().ln_1p() - label * logit;
-            scratch.output_gradient.push((1.0 / (1.0 + (-logit).exp()) - label) / n);
-        }
-        self.network.backward(&inputs, batch.len(), scratch, gradient);
-        let mut squares = 0.0;
-        for range in self.network.weight_ranges() {
-            for (g, w) in gradient[range.clone()].iter_mut().zip(&self.network.params[range]) {
-                squares += w * w;
-                *g += ALPHA * w / n;
-            }
-        }
-        adam.step(&mut self.network.params, gradient, RATE);
-        (loss + 0.5 * ALPHA * squares) / n
+        learner.write(&mut network);
+        Self { network }
     }
 
     /// Log odds of label 1.
@@ -148,4 +119,25 @@ impl Classifier {
         self.network.forward(x, 1, &mut scratch);
         scratch.outputs[0]
     }
+}
+
+/// One step on a batch; the sum of its losses before.
+fn step(learner: &mut Learner<f32>, inputs: &[f32], labels: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let batch = labels.len();
+    let n = batch as f64;
+    learner.forward(inputs, batch);
+    let mut loss = 0.0;
+    learner.output_gradient.clear();
+    for (label, logit) in labels.zip(&learner.outputs) {
+        let logit = f64::from(*logit);
+        // ln(1 + e^l) - label l, without overflow.
+        let odds = (-logit.abs()).exp();
+        loss += logit.max(0.0) + odds.ln_1p() - label * logit;
+        let share = if logit > 0.0 { 1.0 / (1.0 + odds) } else { odds / (1.0 + odds) };
+        learner.output_gradient.push(((share - label) / n) as f32);
+    }
+    learner.backward(inputs, batch);
+    let squares = learner.penalise(ALPHA / n);
+    learner.step(RATE, 0.0);
+    loss + 0.5 * ALPHA * squares
 }

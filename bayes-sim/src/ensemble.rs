@@ -15,6 +15,11 @@ use crate::network::{Activation, Network, Scratch, Shape};
 use crate::random_features::{Draw, RandomFeatures};
 use crate::training::{Pairs, TrainingReport, TrainingSettings, ln_densities, train};
 
+/// How far the spread of an ensemble is thought to be off, as the standard deviation of its logarithm.
+const TEMPER_SD: f64 = 0.05;
+/// Steps in which it is looked for.
+const TEMPER_STEP: f64 = 0.02;
+
 /// What one member is made of.
 #[derive(Debug, Clone)]
 pub(crate) enum Plan {
@@ -51,20 +56,22 @@ pub(crate) fn split(n: usize, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>)
     (rest, order)
 }
 
-/// Random features of each input, with the inputs themselves behind.
-fn expanded(features: &RandomFeatures, pairs: &Pairs) -> Pairs {
-    let input_dim = features.len() + pairs.input_dim;
-    let mut inputs = vec![0.0; input_dim * pairs.len()];
-    for (i, out) in inputs.chunks_exact_mut(input_dim).enumerate() {
-        expand(features, pairs.input(i), out);
+/// Random features of each input of `dim` numbers, with the input itself behind.
+fn widened(features: &RandomFeatures, inputs: &[f64], dim: usize) -> Vec<f64> {
+    let wide_dim = features.len() + dim;
+    let mut wide = vec![0.0; wide_dim * (inputs.len() / dim)];
+    for (out, x) in wide.chunks_exact_mut(wide_dim).zip(inputs.chunks_exact(dim)) {
+        let (head, tail) = out.split_at_mut(features.len());
+        features.write(x, head);
+        tail.copy_from_slice(x);
     }
-    Pairs { input_dim, inputs, target_dim: pairs.target_dim, targets: pairs.targets.clone() }
+    wide
 }
 
-fn expand(features: &RandomFeatures, x: &[f64], out: &mut [f64]) {
-    let (head, tail) = out.split_at_mut(features.len());
-    features.write(x, head);
-    tail.copy_from_slice(x);
+fn expanded(features: &RandomFeatures, pairs: &Pairs) -> Pairs {
+    let inputs = widened(features, &pairs.inputs, pairs.input_dim);
+    let input_dim = features.len() + pairs.input_dim;
+    Pairs { input_dim, inputs, target_dim: pairs.target_dim, targets: pairs.targets.clone() }
 }
 
 impl Member {
@@ -73,11 +80,7 @@ impl Member {
         match &self.features {
             None => self.network.forward(inputs, batch, scratch),
             Some(features) => {
-                let dim = inputs.len() / batch;
-                let mut wide = vec![0.0; (features.len() + dim) * batch];
-                let columns = wide.chunks_exact_mut(features.len() + dim);
-                columns.zip(inputs.chunks_exact(dim)).for_each(|(out, x)| expand(features, x, out));
-                self.network.forward(&wide, batch, scratch);
+                self.network.forward(&widened(features, inputs, inputs.len() / batch), batch, scratch);
             }
         }
         &scratch.outputs[..self.head.outputs() * batch]
@@ -99,29 +102,28 @@ impl Member {
         settings: &TrainingSettings,
         rng: &mut ChaCha8Rng,
     ) -> Result<(Self, TrainingReport), Error> {
-        match plan {
-            Plan::Features { kernel, count, draw, components } => {
-                let (features, regression, wide) =
-                    choose_features(kernel, *count, *draw, pairs, held_out, rng)?;
-                let held_out = expanded(&features, held_out);
-                let head = Head { dim: pairs.target_dim, components: *components, cut };
-                let mut network = start(&head, &[], true, wide.input_dim, &regression, rng);
-                let report = train(&mut network, &head, &wide, &held_out, settings, rng);
-                Ok((Self { features: Some(features), network, head }, report))
+        let (hidden, components): (&[usize], usize) = match plan {
+            Plan::Linear => (&[], 1),
+            Plan::Network { hidden, components } => (hidden, *components),
+            Plan::Features { components, .. } => (&[], *components),
+        };
+        let head = Head { dim: pairs.target_dim, components, cut };
+        let mut features = None;
+        let wide = match plan {
+            Plan::Features { kernel, count, draw, .. } => {
+                let (chosen, wide) = choose_features(kernel, *count, *draw, pairs, held_out, rng)?;
+                let tests = expanded(&chosen, held_out);
+                features = Some(chosen);
+                Some((wide, tests))
             }
-            Plan::Linear | Plan::Network { .. } => {
-                let (hidden, components): (&[usize], _) = match plan {
-                    Plan::Network { hidden, components } => (hidden, *components),
-                    _ => (&[], 1),
-                };
-                let head = Head { dim: pairs.target_dim, components, cut };
-                let regression = best_ridge(pairs, held_out).ok_or(Error::Diverged)?;
-                let body = !hidden.is_empty();
-                let mut network = start(&head, hidden, body, pairs.input_dim, &regression, rng);
-                let report = train(&mut network, &head, pairs, held_out, settings, rng);
-                Ok((Self { features: None, network, head }, report))
-            }
-        }
+            _ => None,
+        };
+        let (pairs, held_out) = wide.as_ref().map_or((pairs, held_out), |w| (&w.0, &w.1));
+        let regression = best_ridge(pairs, held_out).ok_or(Error::Diverged)?;
+        let body = !matches!(plan, Plan::Linear);
+        let mut network = start(&head, hidden, body, pairs.input_dim, &regression, rng);
+        let report = train(&mut network, &head, pairs, held_out, settings, rng);
+        Ok((Self { features, network, head }, report))
     }
 }
 
@@ -139,19 +141,20 @@ fn choose_features(
     pairs: &Pairs,
     held_out: &Pairs,
     rng: &mut ChaCha8Rng,
-) -> Result<(RandomFeatures, Regression, Pairs), Error> {
-    let mut best: Option<(f64, RandomFeatures, Regression, Pairs)> = None;
+) -> Result<(RandomFeatures, Pairs), Error> {
+    let mut best: Option<(f64, RandomFeatures, Pairs)> = None;
     for factor in [0.25, 0.5, 1.0, 2.0, 4.0] {
         let scaled = Kernel { length_scale: kernel.length_scale * factor, ..*kernel };
         let features = RandomFeatures::draw(&scaled, pairs.input_dim, count, draw, rng)?;
         let wide = expanded(&features, pairs);
-        let Some(regression) = best_ridge(&wide, &expanded(&features, held_out)) else { continue };
-        let error = regression.ln_error(&expanded(&features, held_out));
+        let tests = expanded(&features, held_out);
+        let Some(regression) = best_ridge(&wide, &tests) else { continue };
+        let error = regression.ln_error(&tests);
         if best.as_ref().is_none_or(|b| error < b.0) {
-            best = Some((error, features, regression, wide));
+            best = Some((error, features, wide));
         }
     }
-    best.map(|(_, f, r, w)| (f, r, w)).ok_or(Error::Diverged)
+    best.map(|(_, f, w)| (f, w)).ok_or(Error::Diverged)
 }
 
 /// A network whose components all start at the regression, spread by what it leaves.
@@ -174,16 +177,26 @@ fn start<R: Rng + ?Sized>(
     let mut network = Network::new(shape, 1.7, if hidden.is_empty() { 0.0 } else { 0.1 }, rng);
     let spread = if head.components == 1 { 0.0 } else { 1.0 };
     for k in 0..head.components {
+        // Without hidden layers nothing but this sets components apart: narrow and wide ones, since what is left is seldom of one width.
+        let last = (head.components - 1).max(1) as f64;
+        let narrower = if hidden.is_empty() { 2.0 * k as f64 / last } else { 0.5 * spread };
         for i in 0..head.dim {
             let (row, sd) = (k * head.stride() + 1 + i, regression.residual_sd[i]);
             (0..inputs).for_each(|j| network.set_linear(row, j, regression.coefficients[(j, i)]));
             let z: f64 = StandardNormal.sample(rng);
             let bias = network.output_bias_mut();
             bias[row] = regression.intercept[i] + spread * sd * z;
-            bias[row + head.dim] = 0.5 * spread - sd.ln();
+            bias[row + head.dim] = narrower - sd.ln();
         }
     }
     network
+}
+
+/// A regression and alike networks.
+pub(crate) fn networks(hidden: &[usize], components: usize, members: usize) -> Vec<Plan> {
+    let mut plans = vec![Plan::Linear];
+    plans.resize(1 + members, Plan::Network { hidden: hidden.to_vec(), components });
+    plans
 }
 
 impl Ensemble {
@@ -224,7 +237,30 @@ impl Ensemble {
         }
         let total: f64 = out.weights.iter().sum();
         out.weights.iter_mut().for_each(|w| *w /= total);
+        out.temper(held_out);
         Ok(out)
+    }
+
+    /// Widens all components alike, by the biases of their log precisions, as far as the held-out log density gains by it (temperature
+    /// scaling; Guo et al. 2017, arXiv:1706.04599). Never narrows: the held-out simulations have already chosen when to stop, and
+    /// flatter. The logarithm of the factor is normal with [`TEMPER_SD`] before anything is seen, so that a few do not say much.
+    fn temper(&mut self, held_out: &Pairs) {
+        let mut widened = |at: f64, step: f64| {
+            for member in &mut self.members {
+                let rows = member.head.precision_rows();
+                member.network.shift_biases(&rows, -step);
+            }
+            robust_sum(&self.ln_densities(held_out), held_out) - 0.5 * (at / TEMPER_SD).powi(2)
+        };
+        let (mut at, mut best) = (0.0, widened(0.0, 0.0));
+        loop {
+            let value = widened(at + TEMPER_STEP, TEMPER_STEP);
+            if !(value > best) {
+                widened(at, -TEMPER_STEP);
+                return;
+            }
+            (at, best) = (at + TEMPER_STEP, value);
+        }
     }
 
     /// Log density of each target under the weighted members.
@@ -245,10 +281,21 @@ impl Ensemble {
             .members
             .iter()
             .zip(&self.weights)
-            .map(|(m, w)| w.ln() - m.head.loss(m.outputs(inputs, 1, &mut scratch), target, None, &mut head))
+            .map(|(m, w)| w.ln() - m.head.loss(m.outputs(inputs, 1, &mut scratch), target, &mut head))
             .collect();
         crate::normal::ln_sum_exp(terms.into_iter())
     }
+}
+
+/// Sum of the log densities with one in a hundred thought to come from anywhere, so that a single target far from everything does not
+/// decide.
+fn robust_sum(ln_densities: &[f64], pairs: &Pairs) -> f64 {
+    let floor = |i: usize| {
+        let squares = pairs.target(i).iter().map(|z| z * z).sum::<f64>();
+        0.01_f64.ln() - 0.5 * squares - pairs.target_dim as f64 * crate::normal::LN_SQRT_2PI
+    };
+    let terms = ln_densities.iter().enumerate();
+    terms.map(|(i, ln)| crate::normal::ln_sum_exp([0.99_f64.ln() + ln, floor(i)].into_iter())).sum()
 }
 
 /// Weights that maximise the held-out log density of the weighted sum (stacking of predictive distributions, Yao et al. 2018,

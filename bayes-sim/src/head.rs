@@ -1,11 +1,11 @@
-//! What a network's outputs mean: K Gaussian components, and the negative log density of a target under them, by hand differentiated.
+//! What a network's outputs mean: K Gaussian components, and the negative log density of a target under them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::normal::{LN_SQRT_2PI, ln_mass};
 
 /// Least standard deviation of a component, in standard deviations of the target: `exp(-MAX_LOG_PRECISION)`.
-const MAX_LOG_PRECISION: f64 = 9.0;
+pub(crate) const MAX_LOG_PRECISION: f64 = 9.0;
 
 /// K Gaussians with full covariance in `dim` dimensions, or, in one, each cut to an interval.
 ///
@@ -24,8 +24,6 @@ pub(crate) struct Head {
 pub(crate) struct HeadScratch {
     log_terms: Vec<f64>,
     residual: Vec<f64>,
-    whitened: Vec<f64>,
-    gradients: Vec<f64>,
 }
 
 impl Head {
@@ -40,7 +38,17 @@ impl Head {
 
     /// Outputs that are means.
     pub(crate) fn mean_rows(&self) -> Vec<usize> {
-        (0..self.components).flat_map(|k| (0..self.dim).map(move |i| k * self.stride() + 1 + i)).collect()
+        self.rows(1)
+    }
+
+    /// Outputs that are log precisions.
+    pub(crate) fn precision_rows(&self) -> Vec<usize> {
+        self.rows(1 + self.dim)
+    }
+
+    /// `dim` outputs of each component, from `first`.
+    fn rows(&self, first: usize) -> Vec<usize> {
+        (0..self.components).flat_map(|k| (0..self.dim).map(move |i| k * self.stride() + first + i)).collect()
     }
 
     /// Bounds as numbers, infinite where there is none.
@@ -48,102 +56,41 @@ impl Head {
         self.cut.map(|[a, b]| [a.unwrap_or(f64::NEG_INFINITY), b.unwrap_or(f64::INFINITY)])
     }
 
-    /// Negative log density of `target`; with `gradient`, its derivative by the outputs.
-    pub(crate) fn loss(
-        &self,
-        outputs: &[f64],
-        target: &[f64],
-        gradient: Option<&mut [f64]>,
-        scratch: &mut HeadScratch,
-    ) -> f64 {
+    /// Negative log density of `target`.
+    pub(crate) fn loss(&self, outputs: &[f64], target: &[f64], scratch: &mut HeadScratch) -> f64 {
         let stride = self.stride();
         let top = outputs.iter().step_by(stride).fold(f64::NEG_INFINITY, |m, &l| m.max(l));
         let total: f64 = outputs.iter().step_by(stride).map(|l| (l - top).exp()).sum();
         let ln_total = top + total.ln();
         scratch.log_terms.clear();
-        scratch.gradients.resize(self.outputs(), 0.0);
         scratch.residual.resize(self.dim, 0.0);
-        scratch.whitened.resize(self.dim, 0.0);
-        let wanted = gradient.is_some();
-        for k in 0..self.components {
-            let block = &outputs[k * stride..(k + 1) * stride];
-            let ln_density = self.component(block, target, wanted.then_some(k), scratch);
+        for block in outputs.chunks_exact(stride).take(self.components) {
+            let ln_density = self.component(block, target, &mut scratch.residual);
             scratch.log_terms.push(block[0] - ln_total + ln_density);
         }
         let best = scratch.log_terms.iter().fold(f64::NEG_INFINITY, |m, &l| m.max(l));
         let sum: f64 = scratch.log_terms.iter().map(|l| (l - best).exp()).sum();
-        if let Some(gradient) = gradient {
-            for k in 0..self.components {
-                let share = (scratch.log_terms[k] - best).exp() / sum;
-                let weight = (outputs[k * stride] - ln_total).exp();
-                gradient[k * stride] = weight - share;
-                let block = k * stride + 1..(k + 1) * stride;
-                let pairs = gradient[block.clone()].iter_mut().zip(&scratch.gradients[block]);
-                pairs.for_each(|(g, own)| *g = -share * own);
-            }
-        }
         -(best + sum.ln())
     }
 
-    /// Log density of one component; for `wanted = Some(k)` its gradient goes into the scratch of component k.
-    fn component(&self, block: &[f64], target: &[f64], wanted: Option<usize>, s: &mut HeadScratch) -> f64 {
+    /// Log density of one component.
+    fn component(&self, block: &[f64], target: &[f64], residual: &mut [f64]) -> f64 {
         let d = self.dim;
         let (mean, a, l) = (&block[1..=d], &block[d + 1..=2 * d], &block[2 * d + 1..]);
         for i in 0..d {
-            s.residual[i] = target[i] - mean[i];
+            residual[i] = target[i] - mean[i];
         }
         let mut ln_density = -(d as f64) * LN_SQRT_2PI;
         let mut at = 0;
         for i in 0..d {
             let ln_precision = a[i].min(MAX_LOG_PRECISION);
-            let dot: f64 = l[at..at + i].iter().zip(&s.residual).map(|(l, r)| l * r).sum();
-            s.whitened[i] = ln_precision.exp() * (s.residual[i] + dot);
-            ln_density += ln_precision - 0.5 * s.whitened[i] * s.whitened[i];
+            let dot: f64 = l[at..at + i].iter().zip(&*residual).map(|(l, r)| l * r).sum();
+            let whitened = ln_precision.exp() * (residual[i] + dot);
+            ln_density += ln_precision - 0.5 * whitened * whitened;
             at += i;
         }
-        if let Some(k) = wanted {
-            let g = &mut s.gradients[k * block.len()..(k + 1) * block.len()];
-            g.fill(0.0);
-            let mut at = 0;
-            for i in 0..d {
-                let scaled = s.whitened[i] * a[i].min(MAX_LOG_PRECISION).exp();
-                g[1 + i] += scaled;
-                for j in 0..i {
-                    g[1 + j] += scaled * l[at + j];
-                    g[2 * d + 1 + at + j] = -scaled * s.residual[j];
-                }
-                if a[i] < MAX_LOG_PRECISION {
-                    g[d + 1 + i] = 1.0 - s.whitened[i] * s.whitened[i];
-                }
-                at += i;
-            }
-        }
-        match self.interval() {
-            Some(interval) => ln_density - self.cut_mass(block, interval, wanted, s),
-            None => ln_density,
-        }
-    }
-
-    /// `ln` of the mass that a one-dimensional component has within the interval; its gradient is taken off.
-    fn cut_mass(&self, block: &[f64], interval: [f64; 2], wanted: Option<usize>, s: &mut HeadScratch) -> f64 {
-        let (mean, ln_precision) = (block[1], block[2].min(MAX_LOG_PRECISION));
-        let precision = ln_precision.exp();
-        let [low, high] = interval.map(|b| precision * (b - mean));
-        if low < -8.5 && high > 8.5 {
-            return 0.0;
-        }
-        let ln = ln_mass(low, high);
-        if let Some(k) = wanted {
-            let edge = |z: f64| if z.is_finite() { (-0.5 * z * z - LN_SQRT_2PI - ln).exp() } else { 0.0 };
-            let (at_low, at_high) = (edge(low), edge(high));
-            let times = |z: f64, e: f64| if z.is_finite() { z * e } else { 0.0 };
-            let g = &mut s.gradients[k * block.len()..(k + 1) * block.len()];
-            g[1] -= precision * (at_low - at_high);
-            if block[2] < MAX_LOG_PRECISION {
-                g[2] -= times(high, at_high) - times(low, at_low);
-            }
-        }
-        ln
+        let cut = self.interval().and_then(|interval| cut_mass([block[1], block[2]], interval));
+        ln_density - cut.map_or(0.0, |c| c.0)
     }
 
     /// `exp(a_i)` of one component, floored as in the loss.
@@ -152,9 +99,27 @@ impl Head {
     }
 }
 
+/// `ln` of the mass that a one-dimensional component `[mean, a]` has within the interval, and its derivatives by the two; none where
+/// all of it is inside.
+pub(crate) fn cut_mass([mean, a]: [f64; 2], interval: [f64; 2]) -> Option<(f64, [f64; 2])> {
+    let precision = a.min(MAX_LOG_PRECISION).exp();
+    let [low, high] = interval.map(|b| precision * (b - mean));
+    if low < -8.5 && high > 8.5 {
+        return None;
+    }
+    let ln = ln_mass(low, high);
+    let edge = |z: f64| if z.is_finite() { (-0.5 * z * z - LN_SQRT_2PI - ln).exp() } else { 0.0 };
+    let (at_low, at_high) = (edge(low), edge(high));
+    let times = |z: f64, e: f64| if z.is_finite() { z * e } else { 0.0 };
+    let by_precision = if a < MAX_LOG_PRECISION { times(high, at_high) - times(low, at_low) } else { 0.0 };
+    Some((ln, [precision * (at_low - at_high), by_precision]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::head_batch::BatchScratch;
+    use crate::real::Real;
     use num_dual::{Dual64, DualNum};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -182,6 +147,14 @@ mod tests {
         -(sum / weights).ln()
     }
 
+    /// The loss and its derivative as training has them.
+    fn by_hand<T: Real>(head: &Head, out: &[f64], target: &[f64]) -> (f64, Vec<f64>) {
+        let [out, target] = [out, target].map(|v| v.iter().map(|v| T::of(*v)).collect::<Vec<T>>());
+        let mut gradient = vec![T::ZERO; out.len()];
+        let loss = head.batch_loss(&out, &target, Some(&mut gradient), &mut BatchScratch::new(head));
+        (loss, gradient.iter().map(|g| g.to_f64()).collect())
+    }
+
     #[test]
     fn gradients_agree_with_dual_numbers() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -190,8 +163,7 @@ mod tests {
             for _ in 0..20 {
                 let out: Vec<f64> = (0..head.outputs()).map(|_| rng.random_range(-1.5..1.5)).collect();
                 let target: Vec<f64> = (0..dim).map(|_| rng.random_range(-1.5..1.5)).collect();
-                let mut by_hand = vec![0.0; out.len()];
-                let loss = head.loss(&out, &target, Some(&mut by_hand), &mut HeadScratch::default());
+                let (loss, by_hand) = by_hand::<f64>(&head, &out, &target);
                 for (i, a) in by_hand.iter().enumerate() {
                     let seeded = out.iter().enumerate();
                     let dual: Vec<Dual64> =
@@ -213,9 +185,8 @@ mod tests {
             let head = Head { dim: 1, components: 3, cut: Some(cut) };
             for far in [1.0, 6.0] {
                 let out: Vec<f64> = (0..head.outputs()).map(|_| far * rng.random_range(-1.5..1.5)).collect();
-                let loss = |o: &[f64], t: f64| head.loss(o, &[t], None, &mut HeadScratch::default());
-                let mut by_hand = vec![0.0; out.len()];
-                head.loss(&out, &[0.2], Some(&mut by_hand), &mut HeadScratch::default());
+                let loss = |o: &[f64], t: f64| head.loss(o, &[t], &mut HeadScratch::default());
+                let by_hand = by_hand::<f64>(&head, &out, &[0.2]).1;
                 for i in 0..out.len() {
                     let mut moved = out.clone();
                     moved[i] += 1e-5;
@@ -236,13 +207,33 @@ mod tests {
                     let h = (high - low) / f64::from(n);
                     let mut s = HeadScratch::default();
                     let sum: f64 = (0..n)
-                        .map(|i| {
-                            h * (-head.loss(&out, &[low + h * (f64::from(i) + 0.5)], None, &mut s)).exp()
-                        })
+                        .map(|i| h * (-head.loss(&out, &[low + h * (f64::from(i) + 0.5)], &mut s)).exp())
                         .sum();
                     assert!((sum - 1.0).abs() < 1e-5, "{sum}");
                 }
             }
+        }
+    }
+
+    /// A batch, in double and in single precision, against one target after another; its length no multiple of the lanes.
+    #[test]
+    fn a_batch_is_the_sum_of_its_rows() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for (dim, cut) in [(1, Some([Some(-1.0), Some(1.0)])), (3, None)] {
+            let (head, batch) = (Head { dim, components: 4, cut }, 37);
+            let mut draw = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
+            let (rows, targets) = (draw(batch * head.outputs()), draw(batch * dim));
+            let columns: Vec<f64> =
+                (0..head.outputs() * batch).map(|i| rows[(i % batch) * head.outputs() + i / batch]).collect();
+            let mut s = HeadScratch::default();
+            let pairs = rows.chunks(head.outputs()).zip(targets.chunks(dim));
+            let plain: f64 = pairs.map(|(o, t)| head.loss(o, t, &mut s)).sum();
+            let (double, exact) = by_hand::<f64>(&head, &columns, &targets);
+            let (single, near) = by_hand::<f32>(&head, &columns, &targets);
+            assert!((plain - double).abs() < 1e-10, "{plain} {double}");
+            assert!((single - double).abs() < 1e-4, "{single} {double}");
+            let largest = exact.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+            assert!(exact.iter().zip(&near).all(|(a, b)| (a - b).abs() < 1e-5 * largest.max(1.0)));
         }
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::ensemble::{Ensemble, Plan};
+use crate::ensemble::{Ensemble, Plan, networks};
 use crate::error::Error;
 use crate::mixture::{Component, Mixture};
 use crate::network::Scratch;
@@ -30,7 +30,7 @@ pub struct MdnSettings {
 
 impl Default for MdnSettings {
     fn default() -> Self {
-        Self { components: 8, hidden: vec![50, 50], members: 2, training: TrainingSettings::default() }
+        Self { components: 8, hidden: vec![64, 64, 64], members: 2, training: TrainingSettings::default() }
     }
 }
 
@@ -133,9 +133,7 @@ impl Mdn {
         seed: u64,
     ) -> Result<Self, Error> {
         check_components(settings.components, &settings.hidden, settings.members)?;
-        let network = Plan::Network { hidden: settings.hidden.clone(), components: settings.components };
-        let mut plans = vec![Plan::Linear];
-        plans.resize(1 + settings.members, network);
+        let plans = networks(&settings.hidden, settings.components, settings.members);
         Ok(Self { trained: Trained::train(prior, simulations, &plans, &settings.training, seed)? })
     }
 }

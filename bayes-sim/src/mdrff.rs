@@ -28,8 +28,10 @@ pub struct MdrffSettings {
     pub length_scale: Option<f64>,
     /// Frequencies: half the number of features.
     pub frequencies: usize,
-    /// Gaussian components.
+    /// Gaussian components of each member.
     pub components: usize,
+    /// Members, each with frequencies of its own; a linear Gaussian regression joins them, and all are weighted by held-out density.
+    pub members: usize,
     /// How the outputs are trained.
     pub training: TrainingSettings,
 }
@@ -43,6 +45,7 @@ impl Default for MdrffSettings {
             length_scale: None,
             frequencies: 150,
             components: 8,
+            members: 2,
             training: TrainingSettings { learning_rate: 3e-3, ..TrainingSettings::default() },
         }
     }
@@ -66,7 +69,7 @@ impl Mdrff {
         settings: &MdrffSettings,
         seed: u64,
     ) -> Result<Self, Error> {
-        check_components(settings.components, &[], 1)?;
+        check_components(settings.components, &[], settings.members)?;
         let length_scale = settings.length_scale.unwrap_or((simulations.x().dim() as f64).sqrt());
         let kernel = Kernel { family: settings.family, form: settings.form, length_scale };
         let features = Plan::Features {
@@ -75,7 +78,8 @@ impl Mdrff {
             draw: settings.draw,
             components: settings.components,
         };
-        let plans = [Plan::Linear, features];
+        let mut plans = vec![Plan::Linear];
+        plans.resize(1 + settings.members, features);
         Ok(Self { trained: Trained::train(prior, simulations, &plans, &settings.training, seed)? })
     }
 }

@@ -1,5 +1,7 @@
 //! A small network in batches: dense layers with a smooth rectifier, and a linear path past them to chosen outputs.
 
+use std::ops::Range;
+
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use rand::{Rng, RngExt};
@@ -24,22 +26,6 @@ impl Activation {
             }),
         }
     }
-
-    /// Multiplies by the derivative, which is known from the output: below 0, `(1 - y^2)^(3/2)`.
-    fn times_derivative(self, outputs: &[f64], gradient: &mut [f64]) {
-        match self {
-            Self::Relu => gradient.iter_mut().zip(outputs).for_each(|(g, &y)| {
-                if y <= 0.0 {
-                    *g = 0.0;
-                }
-            }),
-            Self::Isrlu => gradient.iter_mut().zip(outputs).for_each(|(g, &y)| {
-                let low = y.min(0.0);
-                let c = 1.0 - low * low;
-                *g *= c * c.sqrt();
-            }),
-        }
-    }
 }
 
 /// What a network is made of.
@@ -55,32 +41,37 @@ pub(crate) struct Shape {
     pub(crate) activation: Activation,
 }
 
-/// Where a matrix lies among the parameters.
+/// Where a matrix lies among the parameters; its bias lies behind it.
 #[derive(Debug, Clone, Copy)]
-struct Block {
+pub(crate) struct Block {
     at: usize,
-    rows: usize,
-    columns: usize,
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
 }
 
 impl Block {
-    fn of<'a>(&self, params: &'a [f64]) -> MatRef<'a, f64> {
+    pub(crate) fn of<'a, T>(&self, params: &'a [T]) -> MatRef<'a, T> {
         MatRef::from_column_major_slice(&params[self.range()], self.rows, self.columns)
     }
 
-    fn of_mut<'a>(&self, params: &'a mut [f64]) -> MatMut<'a, f64> {
+    pub(crate) fn of_mut<'a, T>(&self, params: &'a mut [T]) -> MatMut<'a, T> {
         let range = self.range();
         MatMut::from_column_major_slice_mut(&mut params[range], self.rows, self.columns)
     }
 
-    fn range(&self) -> std::ops::Range<usize> {
+    pub(crate) fn range(&self) -> Range<usize> {
         self.at..self.at + self.rows * self.columns
+    }
+
+    pub(crate) fn bias(&self) -> Range<usize> {
+        let end = self.range().end;
+        end..end + self.rows
     }
 }
 
 impl Shape {
     /// Weights of the layers, outputs' included: `rows x columns`, each followed by its bias; then the linear path.
-    fn blocks(&self) -> (Vec<Block>, Block, Block) {
+    pub(crate) fn blocks(&self) -> (Vec<Block>, Block, Block) {
         let (mut at, mut columns, mut layers) = (0, self.inputs, Vec::new());
         for &rows in &self.hidden {
             layers.push(Block { at, rows, columns });
@@ -104,19 +95,12 @@ pub(crate) struct Network {
     pub(crate) params: Vec<f64>,
 }
 
-/// Activations and gradients of one batch, kept between batches.
+/// Activations of one batch, kept between batches.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     layers: Vec<Vec<f64>>,
-    deltas: [Vec<f64>; 2],
     linear: Vec<f64>,
     pub(crate) outputs: Vec<f64>,
-    pub(crate) output_gradient: Vec<f64>,
-}
-
-fn bias_range(block: &Block) -> std::ops::Range<usize> {
-    let end = block.range().end;
-    end..end + block.rows
 }
 
 fn matrix(values: &[f64], rows: usize, columns: usize) -> MatRef<'_, f64> {
@@ -145,15 +129,21 @@ impl Network {
         let (layers, output, _) = shape.blocks();
         for block in layers.iter().chain([&output]) {
             let bound = (factor / (block.rows + block.columns) as f64).sqrt();
-            let range = block.at..bias_range(block).end;
+            let range = block.at..block.bias().end;
             params[range].iter_mut().for_each(|p| *p = bound * (2.0 * rng.random::<f64>() - 1.0));
         }
         Self { shape, params }
     }
 
     pub(crate) fn output_bias_mut(&mut self) -> &mut [f64] {
-        let range = bias_range(&self.shape.blocks().1);
+        let range = self.shape.blocks().1.bias();
         &mut self.params[range]
+    }
+
+    /// Adds to the biases of these outputs.
+    pub(crate) fn shift_biases(&mut self, rows: &[usize], shift: f64) {
+        let biases = self.output_bias_mut();
+        rows.iter().for_each(|&r| biases[r] += shift);
     }
 
     /// Weight from input `column` to output `row` past the hidden layers (with no hidden layer: of the body).
@@ -164,12 +154,6 @@ impl Network {
         } else if self.shape.hidden.is_empty() && output.columns > column {
             self.params[output.at + column * output.rows + row] = value;
         }
-    }
-
-    /// Ranges of the parameters that are weights, not biases.
-    pub(crate) fn weight_ranges(&self) -> Vec<std::ops::Range<usize>> {
-        let (layers, output, linear) = self.shape.blocks();
-        layers.iter().chain([&output, &linear]).map(Block::range).collect()
     }
 
     /// Outputs of `batch` inputs, column after column, into `scratch.outputs`.
@@ -201,54 +185,12 @@ impl Network {
 
     fn affine(&self, block: &Block, source: &[f64], batch: usize, target: &mut Vec<f64>) {
         target.resize(block.rows * batch, 0.0);
-        let bias = &self.params[bias_range(block)];
+        let bias = &self.params[block.bias()];
         target.chunks_exact_mut(block.rows).for_each(|column| column.copy_from_slice(bias));
         if block.columns > 0 {
             let x = matrix(source, block.columns, batch);
             let y = matrix_mut(target, block.rows, batch);
             matmul(y, Accum::Add, block.of(&self.params), x, 1.0, Par::Seq);
-        }
-    }
-
-    /// Gradient of the parameters from `scratch.output_gradient`, after [`Network::forward`] of the same batch.
-    pub(crate) fn backward(&self, inputs: &[f64], batch: usize, scratch: &mut Scratch, gradient: &mut [f64]) {
-        let (layers, output, linear) = self.shape.blocks();
-        let Scratch { layers: values, deltas, linear: picked, output_gradient, .. } = scratch;
-        if linear.rows > 0 {
-            for (out, pick) in
-                output_gradient.chunks_exact(output.rows).zip(picked.chunks_exact_mut(linear.rows))
-            {
-                for (&row, pick) in self.shape.linear.iter().zip(pick) {
-                    *pick = out[row];
-                }
-            }
-            let (d, x) = (matrix(picked, linear.rows, batch), matrix(inputs, linear.columns, batch));
-            matmul(linear.of_mut(gradient), Accum::Replace, d, x.transpose(), 1.0, Par::Seq);
-        }
-        let [delta, next] = deltas;
-        delta.clear();
-        delta.extend_from_slice(&output_gradient[..output.rows * batch]);
-        let blocks: Vec<Block> = layers.iter().chain([&output]).copied().collect();
-        for (l, block) in blocks.iter().enumerate().rev() {
-            let source = if l == 0 { inputs } else { &values[l - 1] };
-            let bias = &mut gradient[bias_range(block)];
-            bias.fill(0.0);
-            for column in delta.chunks_exact(block.rows) {
-                bias.iter_mut().zip(column).for_each(|(b, d)| *b += d);
-            }
-            if block.columns == 0 {
-                continue;
-            }
-            let (d, x) = (matrix(delta, block.rows, batch), matrix(source, block.columns, batch));
-            matmul(block.of_mut(gradient), Accum::Replace, d, x.transpose(), 1.0, Par::Seq);
-            if l > 0 {
-                next.resize(block.columns * batch, 0.0);
-                let target = matrix_mut(next, block.columns, batch);
-                let w = block.of(&self.params);
-                matmul(target, Accum::Replace, w.transpose(), d, 1.0, Par::Seq);
-                self.shape.activation.times_derivative(source, next);
-                std::mem::swap(delta, next);
-            }
         }
     }
 }

@@ -40,8 +40,11 @@ pub(crate) fn mass(a: f64, b: f64) -> f64 {
 /// `ln` of the mass between `a` and `b`, finite however far out they are.
 pub(crate) fn ln_mass(a: f64, b: f64) -> f64 {
     let (a, b) = if a > 0.0 { (-b, -a) } else { (a, b) };
-    if b > -6.0 && mass(a, b) > 1e-9 {
-        return mass(a, b).ln();
+    if b > -6.0 {
+        let mass = mass(a, b);
+        if mass > 1e-9 {
+            return mass.ln();
+        }
     }
     // Both in the lower tail, or close together: ln(cdf b - cdf a) = ln cdf b + ln(1 - exp(ln cdf a - ln cdf b)).
     let (la, lb) = (ln_cdf(a), ln_cdf(b));

@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::head::{Head, HeadScratch};
+use crate::head_batch::BatchScratch;
+use crate::learner::Learner;
 use crate::network::{Network, Scratch};
+use crate::real::Real;
 
 /// How a network is trained. The defaults suit a thousand to some hundred thousand simulations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,34 +83,6 @@ pub struct TrainingReport {
     pub cut_short: bool,
 }
 
-/// Adam's moments.
-#[derive(Debug)]
-pub(crate) struct Adam {
-    first: Vec<f64>,
-    second: Vec<f64>,
-    steps: i32,
-}
-
-impl Adam {
-    pub(crate) fn new(n: usize) -> Self {
-        Self { first: vec![0.0; n], second: vec![0.0; n], steps: 0 }
-    }
-
-    /// One step down the gradient.
-    pub(crate) fn step(&mut self, params: &mut [f64], gradient: &[f64], rate: f64) {
-        const B1: f64 = 0.9;
-        const B2: f64 = 0.999;
-        self.steps = self.steps.saturating_add(1);
-        let rate = rate * (1.0 - B2.powi(self.steps)).sqrt() / (1.0 - B1.powi(self.steps));
-        let moments = self.first.iter_mut().zip(&mut self.second);
-        for ((p, &g), (m, v)) in params.iter_mut().zip(gradient).zip(moments) {
-            *m = B1 * *m + (1.0 - B1) * g;
-            *v = B2 * *v + (1.0 - B2) * g * g;
-            *p -= rate * *m / (v.sqrt() + 1e-8);
-        }
-    }
-}
-
 /// Inputs and targets as the network sees them, column after column.
 #[derive(Debug)]
 pub(crate) struct Pairs {
@@ -141,46 +116,74 @@ pub(crate) fn ln_densities(network: &Network, head: &Head, pairs: &Pairs) -> Vec
         let inputs = &pairs.inputs[start * pairs.input_dim..(start + batch) * pairs.input_dim];
         network.forward(inputs, batch, &mut scratch);
         for (b, outputs) in scratch.outputs.chunks_exact(head.outputs()).take(batch).enumerate() {
-            out.push(-head.loss(outputs, pairs.target(start + b), None, &mut head_scratch));
+            out.push(-head.loss(outputs, pairs.target(start + b), &mut head_scratch));
         }
     }
     out
 }
 
-fn mean_loss(network: &Network, head: &Head, pairs: &Pairs) -> f64 {
-    let ln = ln_densities(network, head, pairs);
-    let loss = -ln.iter().sum::<f64>() / ln.len() as f64;
-    if loss.is_finite() { loss } else { f64::INFINITY }
+/// Pairs in the numbers of training.
+struct Rows<T> {
+    input_dim: usize,
+    inputs: Vec<T>,
+    target_dim: usize,
+    targets: Vec<T>,
 }
 
-/// One minibatch's buffers.
-#[derive(Default)]
-struct Step {
-    scratch: Scratch,
-    head: HeadScratch,
-    inputs: Vec<f64>,
-    gradient: Vec<f64>,
-}
-
-impl Step {
-    /// Gradient of the mean loss of these pairs, its norm at most 5.
-    fn gradient(&mut self, network: &Network, head: &Head, pairs: &Pairs, indices: &[usize]) {
-        self.inputs.clear();
-        indices.iter().for_each(|&i| self.inputs.extend_from_slice(pairs.input(i)));
-        network.forward(&self.inputs, indices.len(), &mut self.scratch);
-        let (n, share) = (head.outputs(), 1.0 / indices.len() as f64);
-        self.scratch.output_gradient.resize(n * indices.len(), 0.0);
-        let columns = self.scratch.output_gradient.chunks_exact_mut(n);
-        for ((&i, outputs), gradient) in indices.iter().zip(self.scratch.outputs.chunks_exact(n)).zip(columns)
-        {
-            head.loss(outputs, pairs.target(i), Some(gradient), &mut self.head);
-            gradient.iter_mut().for_each(|g| *g *= share);
+impl<T: Real> Rows<T> {
+    fn of(pairs: &Pairs) -> Self {
+        let cast = |values: &[f64]| values.iter().map(|v| T::of(*v)).collect();
+        Self {
+            input_dim: pairs.input_dim,
+            inputs: cast(&pairs.inputs),
+            target_dim: pairs.target_dim,
+            targets: cast(&pairs.targets),
         }
-        self.gradient.resize(network.params.len(), 0.0);
-        network.backward(&self.inputs, indices.len(), &mut self.scratch, &mut self.gradient);
-        let norm = self.gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-        let factor = if norm.is_finite() { (5.0 / norm).min(1.0) } else { 0.0 };
-        self.gradient.iter_mut().for_each(|g| *g = if factor > 0.0 { *g * factor } else { 0.0 });
+    }
+}
+
+/// A network that learns, and one minibatch's buffers.
+struct Student<'a, T> {
+    learner: Learner<T>,
+    head: &'a Head,
+    scratch: BatchScratch<T>,
+    inputs: Vec<T>,
+    targets: Vec<T>,
+}
+
+impl<'a, T: Real> Student<'a, T> {
+    fn new(network: &Network, head: &'a Head) -> Self {
+        let (learner, scratch) = (Learner::new(network), BatchScratch::new(head));
+        Self { learner, head, scratch, inputs: Vec::new(), targets: Vec::new() }
+    }
+
+    /// Gradient of the mean loss of these rows.
+    fn gradient(&mut self, rows: &Rows<T>, indices: &[usize]) {
+        let (p, t) = (rows.input_dim, rows.target_dim);
+        self.inputs.clear();
+        self.targets.clear();
+        for &i in indices {
+            self.inputs.extend_from_slice(&rows.inputs[i * p..(i + 1) * p]);
+            self.targets.extend_from_slice(&rows.targets[i * t..(i + 1) * t]);
+        }
+        let learner = &mut self.learner;
+        learner.forward(&self.inputs, indices.len());
+        learner.output_gradient.resize(learner.outputs.len(), T::ZERO);
+        let gradient = Some(learner.output_gradient.as_mut_slice());
+        self.head.batch_loss(&learner.outputs, &self.targets, gradient, &mut self.scratch);
+        learner.backward(&self.inputs, indices.len());
+    }
+
+    fn mean_loss(&mut self, rows: &Rows<T>) -> f64 {
+        const CHUNK: usize = 256;
+        let (p, t) = (rows.input_dim, rows.target_dim);
+        let mut total = 0.0;
+        for (inputs, targets) in rows.inputs.chunks(CHUNK * p).zip(rows.targets.chunks(CHUNK * t)) {
+            self.learner.forward(inputs, targets.len() / t);
+            total += self.head.batch_loss(&self.learner.outputs, targets, None, &mut self.scratch);
+        }
+        let loss = total * t as f64 / rows.targets.len() as f64;
+        if loss.is_finite() { loss } else { f64::INFINITY }
     }
 }
 
@@ -196,24 +199,22 @@ pub(crate) fn train(
     let batch = settings.batch.unwrap_or((pairs.len() / 50).clamp(32, 256)).min(pairs.len());
     let steps_per_epoch = pairs.len() / batch;
     let patience = settings.patience_steps.div_ceil(steps_per_epoch).max(2);
-    let weights = network.weight_ranges();
+    let [rows, tests] = [pairs, held_out].map(Rows::<f32>::of);
+    let mut student = Student::new(network, head);
     let mut order: Vec<usize> = (0..pairs.len()).collect();
-    let mut adam = Adam::new(network.params.len());
-    let mut step = Step::default();
     let mut rate = settings.learning_rate;
-    let (mut best, mut best_params) = (mean_loss(network, head, held_out), network.params.clone());
-    let (mut waited, mut decays, mut epochs) = (0, 0, 0);
+    let (mut best, mut best_params) = (student.mean_loss(&tests), student.learner.params.clone());
+    let (mut waited, mut decays, mut epochs, mut cut_short) = (0, 0, 0, true);
     while epochs < settings.max_epochs {
         order.shuffle(rng);
         // The last, shorter batch is left for another shuffle.
         for indices in order.chunks_exact(batch) {
-            step.gradient(network, head, pairs, indices);
-            adam.step(&mut network.params, &step.gradient, rate);
-            let keep = 1.0 - rate * settings.weight_decay;
-            weights.iter().for_each(|r| network.params[r.clone()].iter_mut().for_each(|p| *p *= keep));
+            student.gradient(&rows, indices);
+            student.learner.clip(5.0);
+            student.learner.step(rate, settings.weight_decay);
         }
         epochs += 1;
-        let loss = mean_loss(network, head, held_out);
+        let loss = student.mean_loss(&tests);
         waited += 1;
         if loss < best {
             // A gain too small to see does not prolong the wait.
@@ -221,21 +222,23 @@ pub(crate) fn train(
                 waited = 0;
             }
             best = loss;
-            best_params.copy_from_slice(&network.params);
+            best_params.copy_from_slice(&student.learner.params);
         }
         if waited >= patience {
-            network.params.copy_from_slice(&best_params);
             if decays == settings.decays {
-                return TrainingReport { validation_loss: best, epochs, cut_short: false };
+                cut_short = false;
+                break;
             }
+            student.learner.params.copy_from_slice(&best_params);
+            student.learner.restart();
             decays += 1;
             rate *= settings.decay;
-            adam = Adam::new(network.params.len());
             waited = 0;
         }
     }
-    network.params.copy_from_slice(&best_params);
-    TrainingReport { validation_loss: best, epochs, cut_short: true }
+    student.learner.params.copy_from_slice(&best_params);
+    student.learner.write(network);
+    TrainingReport { validation_loss: best, epochs, cut_short }
 }
 
 #[cfg(test)]
@@ -258,7 +261,7 @@ mod tests {
                 linear: head.mean_rows(),
                 activation: Activation::Isrlu,
             };
-            let mut network = Network::new(shape, 1.0, 1.0, &mut rng);
+            let network = Network::new(shape, 1.0, 1.0, &mut rng);
             let draw = |n: usize, rng: &mut ChaCha8Rng| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
             let pairs = Pairs {
                 input_dim: 3,
@@ -266,20 +269,20 @@ mod tests {
                 target_dim: 2,
                 targets: draw(14, &mut rng),
             };
-            let mut step = Step::default();
-            step.gradient(&network, &head, &pairs, &[0, 1, 2, 3, 4, 5, 6]);
-            for i in 0..network.params.len() {
-                let kept = network.params[i];
-                network.params[i] = kept + 1e-5;
-                let up = mean_loss(&network, &head, &pairs);
-                network.params[i] = kept - 1e-5;
-                let slope = (up - mean_loss(&network, &head, &pairs)) / 2e-5;
-                network.params[i] = kept;
-                assert!(
-                    (slope - step.gradient[i]).abs() < 1e-8 + 1e-6 * slope.abs(),
-                    "{slope} {}",
-                    step.gradient[i]
-                );
+            let rows = Rows::<f64>::of(&pairs);
+            let mut student = Student::new(&network, &head);
+            let plain = -ln_densities(&network, &head, &pairs).iter().sum::<f64>() / 7.0;
+            assert!((student.mean_loss(&rows) - plain).abs() < 1e-12);
+            student.gradient(&rows, &[0, 1, 2, 3, 4, 5, 6]);
+            let gradient = student.learner.gradient.clone();
+            for (i, g) in gradient.iter().enumerate() {
+                let kept = student.learner.params[i];
+                student.learner.params[i] = kept + 1e-5;
+                let up = student.mean_loss(&rows);
+                student.learner.params[i] = kept - 1e-5;
+                let slope = (up - student.mean_loss(&rows)) / 2e-5;
+                student.learner.params[i] = kept;
+                assert!((slope - g).abs() < 1e-8 + 1e-6 * slope.abs(), "{slope} {g}");
             }
         }
     }

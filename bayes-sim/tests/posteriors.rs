@@ -48,13 +48,12 @@ fn a_thousand_simulations_do_as_well_as_published() {
 }
 
 #[test]
-#[ignore = "the classifier takes minutes in ten dimensions: cargo test --release -p bayes-sim -- --ignored"]
 fn a_thousand_simulations_do_as_well_as_published_in_ten_dimensions() {
     as_well_as_published(&common::gaussian_linear(), 0.6945, 1, 300);
 }
 
 fn as_well_as_published(task: &Task, published: f64, most: usize, tests: usize) {
-    // Ten dimensions take the classifier minutes at ten thousand points.
+    // Ten dimensions take the classifier long.
     let points = if task.prior.dim() > 5 { 600 } else { 2000 };
     for (name, density) in all(task, 1000) {
         if name == "mdrff" && task.name == "two_moons" {

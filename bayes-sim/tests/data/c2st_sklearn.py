@@ -42,7 +42,7 @@ def c2st(x, y, seed):
 
 
 SEEDS = 6
-CHANGES = {"two_moons": ["same", "third", "unpaired"], "slcp": ["same", "scaled", "shifted", "third"]}
+CHANGES = {"two_moons": ["same", "third", "unpaired"], "slcp": ["same", "scaled", "shifted", "third", "unpaired"]}
 
 print("task,change,seed,c2st", flush=True)
 for task, names in CHANGES.items():
