@@ -67,7 +67,7 @@ fn placed(
     known: Known,
     microphones: &Microphones,
 ) -> Result<Loaded, (usize, String)> {
-    let nominal = Effects::none(setup.gravity_m_s2, restitution);
+    let mut nominal = Effects::none(setup.gravity_m_s2, restitution);
     let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
     expect_first(&mut drops, &nominal);
     let senseless = |h: &Heard| {
@@ -77,6 +77,7 @@ fn placed(
     let judged =
         judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
     let kappa = judged.spread.kappa;
+    nominal.outwards_per_m = judged.outwards_per_m;
     let mut model = BounceModel::new(setup, nominal, (judged.spread, judged.plausible), microphones.clone());
     let mut runs = Vec::new();
     for (h, linear) in heard.iter().zip(judged.drops) {
@@ -116,30 +117,18 @@ fn placed(
     Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
 }
 
-/// Where balls are expected to head first. A tilted table, or a hand, may send all of them one way; and a ball that was let go
-/// above one point heads the further out the further out it lands.
+/// Where balls are expected to land, and to head where their fall is not known: a tilted table, or a hand, may send all of them one
+/// way.
 fn expect_first(drops: &mut [Drop], nominal: &Effects) {
-    /// Fewer drops say nothing of it.
-    const FEWEST: usize = 5;
     let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.heading(0, nominal)).collect();
     let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
     let mean =
         |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);
     let (usual, middle) = (mean(&headings), mean(&places));
-    let (mut together, mut square) = (0.0, 0.0);
-    for (heading, place) in headings.iter().zip(&places) {
-        for k in 0..2 {
-            together += (heading[k] - usual[k]) * (place[k] - middle[k]);
-            square += (place[k] - middle[k]).powi(2);
-        }
-    }
-    let slope = if drops.len() >= FEWEST && square > 0.0 { together / square } else { 0.0 };
-    for (drop, place) in drops.iter_mut().zip(&places) {
-        let outwards = [0, 1].map(|k| slope * (place[k] - middle[k]));
-        if drop.height_m.is_some() {
-            drop.came = outwards;
-        } else {
-            drop.usual = [usual[0] + outwards[0], usual[1] + outwards[1]];
+    for drop in drops {
+        drop.middle_m = middle;
+        if drop.height_m.is_none() {
+            drop.usual = usual;
         }
     }
 }

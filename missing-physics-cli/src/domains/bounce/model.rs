@@ -170,6 +170,7 @@ impl BounceModel {
             slope_s_m: shared[p.slope.slot],
             drag_per_m: shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0),
             table: p.table.map_or([0.0; 2], |t| t.map(|t| shared[t.slot])),
+            outwards_per_m: self.nominal.outwards_per_m,
             friction: at(p.friction),
             clock_rate: at(p.clock),
             position_scale: at(p.position),
