@@ -9,7 +9,7 @@ use super::drop::{Drop, Effects};
 use super::experiments::{experiments, of_times};
 use super::model::{BounceModel, COPIES, Setup};
 use super::read::{Heard, Rig};
-use super::spread::{Known, judge};
+use super::spread::{Known, judge, released};
 use super::times::TimesModel;
 use crate::domains::Loaded;
 use crate::domains::reading::resolution;
@@ -30,6 +30,7 @@ pub(super) fn assemble(
         drag_unit: rig.drag_unit,
         placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
         dropped: rig.drop_height_m.is_some(),
+        released: released(heard.len()),
         unheard: [missed, heard.len()],
         microphones: microphones.places_m.len(),
     };
@@ -69,7 +70,7 @@ fn placed(
 ) -> Result<Loaded, (usize, String)> {
     let mut nominal = Effects::none(setup.gravity_m_s2, restitution);
     let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
-    expect_first(&mut drops, &nominal);
+    expect_first(&mut drops, &mut nominal);
     let senseless = |h: &Heard| {
         let label = crate::recording::quoted(&h.label);
         (h.row, format!("times and places of a bouncing ball in run {label}"))
@@ -77,7 +78,7 @@ fn placed(
     let judged =
         judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
     let kappa = judged.spread.kappa;
-    nominal.outwards_per_m = judged.outwards_per_m;
+    (nominal.heads, nominal.outwards_per_m) = (judged.heads, judged.outwards_per_m);
     let mut model = BounceModel::new(setup, nominal, (judged.spread, judged.plausible), microphones.clone());
     let mut runs = Vec::new();
     for (h, linear) in heard.iter().zip(judged.drops) {
@@ -119,17 +120,21 @@ fn placed(
 
 /// Where balls are expected to land, and to head where their fall is not known: a tilted table, or a hand, may send all of them one
 /// way.
-fn expect_first(drops: &mut [Drop], nominal: &Effects) {
+fn expect_first(drops: &mut [Drop], nominal: &mut Effects) {
     let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.heading(0, nominal)).collect();
     let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
     let mean =
         |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);
-    let (usual, middle) = (mean(&headings), mean(&places));
+    let middle = mean(&places);
+    if drops.iter().all(|d| d.height_m.is_none()) {
+        nominal.heads = mean(&headings);
+    }
+    // As balls do that are let go at one point.
+    let speeds = drops.iter().map(|d| d.leaves_m_s(nominal) / nominal.restitution);
+    let falls_m = speeds.map(|v| 0.5 * v * v / nominal.gravity_m_s2).sum::<f64>() / drops.len().max(1) as f64;
+    nominal.outwards_per_m = if released(drops.len()) { 0.5 / falls_m } else { 0.0 };
     for drop in drops {
         drop.middle_m = middle;
-        if drop.height_m.is_none() {
-            drop.usual = usual;
-        }
     }
 }
 

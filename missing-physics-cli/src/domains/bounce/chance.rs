@@ -54,7 +54,7 @@ fn fallen(like: &Drop, effects: &Effects, spread: &Spread, rng: &mut impl Rng) -
         }
         None => {
             let leaves = like.leaves_m_s(effects);
-            let [x, y] = [0, 1].map(|k| like.usual[k] + usually[k] + off[k]);
+            let [x, y] = [0, 1].map(|k| usually[k] + off[k]);
             [leaves * x, leaves * y, leaves * (1.0 - x * x - y * y).max(0.0).sqrt()]
         }
     };

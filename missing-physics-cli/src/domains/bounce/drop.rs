@@ -15,7 +15,10 @@ pub(super) struct Effects {
     pub(super) drag_per_m: f64,
     /// Slopes dz/dx and dz/dy of the table.
     pub(super) table: [f64; 2],
-    /// How much farther out balls head when they first come to the table for each metre that they land farther out, rad/m.
+    /// Where balls head on average when they first come to the table (or leave it, where their fall is not known), in the
+    /// recording's units of length and time.
+    pub(super) heads: [f64; 2],
+    /// How much farther out they head then for each metre that they land farther out, rad/m.
     pub(super) outwards_per_m: f64,
     /// Share of the speed along the table that is lost beyond the restitution.
     pub(super) friction: f64,
@@ -39,6 +42,7 @@ impl Effects {
             slope_s_m: 0.0,
             drag_per_m: 0.0,
             table: [0.0; 2],
+            heads: [0.0; 2],
             outwards_per_m: 0.0,
             friction: 0.0,
             clock_rate: 0.0,
@@ -95,13 +99,11 @@ pub(super) struct Drop {
     pub(super) height_m: Option<f64>,
     /// How far off each impact may be; empty where all are alike.
     pub(super) relative: Vec<Relative>,
-    /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known), in
-    /// the recording's units of length and time, beyond what balls do on average that land where it did.
+    /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known),
+    /// beyond what balls do on average that land where it did.
     pub(super) came: [f64; 2],
     /// Where balls land on average.
     pub(super) middle_m: [f64; 2],
-    /// Where balls head on average after the first impact, where their fall is not known.
-    pub(super) usual: [f64; 2],
     /// When each microphone heard each impact, s; empty where there are fewer than four.
     pub(super) arrivals_s: Vec<Vec<f64>>,
     /// How many impacts went unheard before the first one heard (only with a known height) and within each flight.
@@ -217,7 +219,8 @@ impl Drop {
     /// Where it headed when it first came.
     pub(super) fn comes(&self, effects: &Effects) -> [f64; 2] {
         let place = self.place(0);
-        [0, 1].map(|k| self.came[k] + effects.outwards_per_m * (place[k] - self.middle_m[k]))
+        [0, 1]
+            .map(|k| self.came[k] + effects.heads[k] + effects.outwards_per_m * (place[k] - self.middle_m[k]))
     }
 
     /// The flight from one impact to the next as the effects see it, or the part of it beside an unheard impact.
@@ -268,7 +271,7 @@ impl Drop {
                 at += 1;
             } else if self.lead() > 0 {
                 let (now, came) = (heading(&after), self.comes(effects));
-                (0..2).for_each(|k| out[k] = angles * now[k] - self.usual[k] - came[k]);
+                (0..2).for_each(|k| out[k] = angles * now[k] - came[k]);
             }
             before = Some(landing);
         }

@@ -71,6 +71,7 @@ impl Domain for Bounce {
             drag_unit: Some(0.1),
             placed: true,
             dropped: true,
+            released: false,
             unheard: [1, 10],
             microphones: 4,
         };

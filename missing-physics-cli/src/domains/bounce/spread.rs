@@ -45,21 +45,30 @@ type Change = fn(&mut Effects, f64);
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
 /// only about the likely drop.
 ///
-/// A ball that was let go above one point heads the further out the further out it lands: fitted with the rest, because the
-/// first place is measured with an error that a regression of headings on places would take for no slope at all.
-const NUISANCES: [Change; 6] = [
+/// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
+/// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
+/// take for a smaller slope.
+const NUISANCES: [Change; 8] = [
     |e, d| e.restitution += d,
     |e, d| e.slope_s_m += d,
     |e, d| e.drag_per_m += d,
     |e, d| e.table[0] += d,
     |e, d| e.table[1] += d,
+    |e, d| e.heads[0] += d,
+    |e, d| e.heads[1] += d,
     |e, d| e.outwards_per_m += d,
 ];
+/// Of the nuisances, those of the hand come last.
+const OF_THE_HAND: usize = 3;
 
-/// Of few drops nobody can say that those that landed further out headed further out.
+/// Whether there are drops enough to say how a hand lets go of balls.
+pub(super) const fn released(drops: usize) -> bool {
+    drops >= 5
+}
+
 fn nuisances(drops: usize) -> &'static [Change] {
-    const FEWEST: usize = 5;
-    if drops < FEWEST { &NUISANCES[..NUISANCES.len() - 1] } else { &NUISANCES }
+    let known = if released(drops) { 0 } else { OF_THE_HAND };
+    &NUISANCES[..NUISANCES.len() - known]
 }
 
 /// Restricted likelihood (Patterson and Thompson 1971, doi:10.1093/biomet/58.3.545) of the sigmas that are not known.
@@ -183,7 +192,8 @@ pub(super) struct Judged {
     pub(super) plausible: Vec<Spread>,
     /// Each drop about its likely course.
     pub(super) drops: Vec<Linear>,
-    /// How much farther out balls head that land farther out ([`Effects::outwards_per_m`]).
+    /// How a hand lets go of them ([`Effects::heads`], [`Effects::outwards_per_m`]).
+    pub(super) heads: [f64; 2],
     pub(super) outwards_per_m: f64,
 }
 
@@ -202,10 +212,9 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<J
         restitution: if known.time_s.is_some() { 0.0 } else { 1e-3 },
     };
     let mut plausible = vec![spread; PLAUSIBLE];
-    let mut outwards_per_m = effects.outwards_per_m;
+    let mut begin = *effects;
     let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::about_straight(d, effects)).collect();
     for _ in 0..ROUNDS {
-        let begin = Effects { outwards_per_m, ..*effects };
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, drops.len())).collect();
         let likelihood = Likelihood { drops: &parts, known, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);
@@ -215,10 +224,11 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<J
         nuisances(drops.len()).iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
         likely.friction = 0.0;
         likely.drag_per_m = likely.drag_per_m.max(0.0);
-        outwards_per_m = likely.outwards_per_m;
+        (begin.heads, begin.outwards_per_m) = (likely.heads, likely.outwards_per_m);
         linear = linear.iter().map(|l| l.likely(&likely, &spread)).collect::<Option<_>>()?;
     }
-    Some(Judged { spread, plausible, drops: linear, outwards_per_m })
+    let Effects { heads, outwards_per_m, .. } = begin;
+    Some(Judged { spread, plausible, drops: linear, heads, outwards_per_m })
 }
 
 /// A drop with its errors and what the nuisances make of them.
