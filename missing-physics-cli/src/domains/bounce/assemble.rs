@@ -31,6 +31,7 @@ pub(super) fn assemble(
         placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
         dropped: rig.drop_height_m.is_some(),
         released: released(heard.len()),
+        listened: heard.iter().any(|h| !h.drop.loudness.is_empty()),
         unheard: [missed, heard.len()],
         microphones: microphones.places_m.len(),
     };
@@ -125,14 +126,19 @@ fn expect_first(drops: &mut [Drop], nominal: &mut Effects) {
     let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
     let mean =
         |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);
-    let middle = mean(&places);
+    let (usual, middle) = (mean(&headings), mean(&places));
     if drops.iter().all(|d| d.height_m.is_none()) {
-        nominal.heads = mean(&headings);
+        nominal.heads = usual;
     }
-    // As balls do that are let go at one point.
-    let speeds = drops.iter().map(|d| d.leaves_m_s(nominal) / nominal.restitution);
-    let falls_m = speeds.map(|v| 0.5 * v * v / nominal.gravity_m_s2).sum::<f64>() / drops.len().max(1) as f64;
-    nominal.outwards_per_m = if released(drops.len()) { 0.5 / falls_m } else { 0.0 };
+    let (mut together, mut square) = (0.0, 0.0);
+    for (heading, place) in headings.iter().zip(&places) {
+        for k in 0..2 {
+            together += (heading[k] - usual[k]) * (place[k] - middle[k]);
+            square += (place[k] - middle[k]).powi(2);
+        }
+    }
+    // A beginning: places are measured with errors, which makes it too small.
+    nominal.outwards_per_m = if released(drops.len()) && square > 0.0 { together / square } else { 0.0 };
     for drop in drops {
         drop.middle_m = middle;
     }

@@ -23,6 +23,8 @@ pub(super) struct Effects {
     /// Share of the speed along the table that is lost beyond the restitution.
     pub(super) friction: f64,
     pub(super) clock_rate: f64,
+    /// By how much later a sound is heard that is louder by a factor of e, s: no ear finds weak and loud onsets alike.
+    pub(super) walk_s: f64,
     pub(super) position_scale: f64,
     /// 1: flights that hide unheard impacts are taken for what they are; 0: for one flight.
     pub(super) unheard: f64,
@@ -46,6 +48,7 @@ impl Effects {
             outwards_per_m: 0.0,
             friction: 0.0,
             clock_rate: 0.0,
+            walk_s: 0.0,
             position_scale: 0.0,
             unheard: 0.0,
             terms: [0.0; 3],
@@ -97,6 +100,8 @@ pub(super) struct Drop {
     pub(super) places_m: Vec<[f64; 2]>,
     /// Height from which it fell to the first impact that was heard, where it is known.
     pub(super) height_m: Option<f64>,
+    /// Logarithm of each impact's loudness; empty where it was not heard.
+    pub(super) loudness: Vec<f64>,
     /// How far off each impact may be; empty where all are alike.
     pub(super) relative: Vec<Relative>,
     /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known),
@@ -225,7 +230,12 @@ impl Drop {
 
     /// The flight from one impact to the next as the effects see it, or the part of it beside an unheard impact.
     fn flight(&self, index: usize, effects: &Effects, unheard: usize, part: Part) -> (Velocity, Velocity) {
-        let whole = (self.times_s[index + 1] - self.times_s[index]) / (1.0 + effects.clock_rate);
+        let louder = match (self.loudness.get(index), self.loudness.get(index + 1)) {
+            (Some(then), Some(now)) => now - then,
+            _ => 0.0,
+        };
+        let heard = self.times_s[index + 1] - self.times_s[index] - effects.walk_s * louder;
+        let whole = heard / (1.0 + effects.clock_rate);
         let duration_s = match (unheard, part) {
             (0, _) => whole,
             (m, Part::First) => parts(whole, m, effects.restitution).0,

@@ -72,6 +72,7 @@ impl Domain for Bounce {
             placed: true,
             dropped: true,
             released: false,
+            listened: false,
             unheard: [1, 10],
             microphones: 4,
         };

@@ -99,6 +99,7 @@ fn drop_of(run: usize, impacts: &[Impact], rig: &Rig) -> Heard {
         places_m: impacts.iter().filter_map(|i| i.location.map(|l| [l.x_m, l.y_m])).collect(),
         height_m: rig.drop_height_m,
         arrivals_s: impacts.iter().map(|i| i.arrivals_s.clone()).collect(),
+        loudness: impacts.iter().map(|i| i.amplitude_sigmas.max(1.0).ln()).collect(),
         unheard: vec![0; impacts.len()],
         known: vec![0; impacts.len()],
         ..Drop::default()

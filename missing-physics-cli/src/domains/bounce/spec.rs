@@ -22,6 +22,8 @@ pub(super) struct Places {
     pub(super) clock: Option<At>,
     pub(super) position: Option<At>,
     pub(super) unheard: Option<At>,
+    /// By how much later a louder sound is heard.
+    pub(super) walk: Option<At>,
     /// Offsets along x and y of a microphone, and which it is.
     pub(super) microphone: Option<[At; 3]>,
     /// Candidate terms of an unknown law: linear in x and y, and in the speed squared.

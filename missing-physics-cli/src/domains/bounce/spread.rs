@@ -48,12 +48,13 @@ type Change = fn(&mut Effects, f64);
 /// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
 /// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
 /// take for a smaller slope.
-const NUISANCES: [Change; 8] = [
+const NUISANCES: [Change; 9] = [
     |e, d| e.restitution += d,
     |e, d| e.slope_s_m += d,
     |e, d| e.drag_per_m += d,
     |e, d| e.table[0] += d,
     |e, d| e.table[1] += d,
+    |e, d| e.walk_s += d,
     |e, d| e.heads[0] += d,
     |e, d| e.heads[1] += d,
     |e, d| e.outwards_per_m += d,
