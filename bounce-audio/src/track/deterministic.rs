@@ -30,8 +30,7 @@ impl Tracker for Deterministic {
             return Some(w.within(impact.place_m[1], w.rest_z_m, impact.t_s + FIRST_S));
         };
         let before = Flight::between(&last, impact);
-        // The line through two places meets the plane wherever they lie: the baseline believes what it hears, as the thesis's.
-        if !(before.duration_s > 0.0 && before.along_m[0] != 0.0 && impact.place_m[0] < w.plane_x_m) {
+        if !(before.duration_s > 0.0 && before.along_m[0] > 0.0 && impact.place_m[0] < w.plane_x_m) {
             return None;
         }
         let e = self.restitution;
