@@ -10,7 +10,6 @@ use super::text::headline;
 
 /// Runs drawn; more say no more.
 const MOST_RUNS: usize = 4;
-const KEY: &str = "Grey: measured. Red: simulated. Blue: with what was found. Without the shaded rows the simulation would hold.";
 
 /// For each channel: data with both fits, and residuals before and after.
 pub(super) fn channels(d: &Diagnosis) -> String {
@@ -42,8 +41,31 @@ pub fn picture(d: &Diagnosis) -> String {
             d.curves.iter().find(|r| place.is_none_or(|l| l.runs.is_empty() || l.runs.contains(&r.run)));
         run.or(d.curves.first()).map(|curves| charts(d, c, curves))
     });
-    let words = [headline(d), KEY.to_owned()];
+    let shaded = by_misfit(d).first().is_some_and(|&c| interval(d, c).is_some());
+    let words = [headline(d), key(changed(d), shaded)];
     svg::picture(drawn.as_ref().map_or(&[], |pair| pair.as_slice()), &words)
+}
+
+/// What the colours mean, of those that are there.
+fn key(changed: bool, shaded: bool) -> String {
+    let mut key = "Grey: measured. Red: simulated.".to_owned();
+    if changed {
+        key.push_str(" Blue: with what was found.");
+    }
+    if shaded {
+        key.push_str(" Without the shaded rows the simulation would hold.");
+    }
+    key
+}
+
+/// Whether the diagnosis has a second fit to draw.
+fn changed(d: &Diagnosis) -> bool {
+    d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Ambiguous)
+}
+
+/// The rows that miss, along the variable of their place.
+fn interval(d: &Diagnosis, c: usize) -> Option<(f64, f64)> {
+    place(d, c).and_then(|l| Some((l.from?, l.to?))).filter(|_| !d.variables.is_empty())
 }
 
 /// The channels, those that miss first.
@@ -63,12 +85,12 @@ fn place(d: &Diagnosis, c: usize) -> Option<&Location> {
 /// One run's data with both fits, and its residuals.
 fn charts(d: &Diagnosis, c: usize, curves: &Curves) -> [String; 2] {
     let (channel, unit) = &d.channels[c];
-    let changed = d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Ambiguous);
+    let changed = changed(d);
     let place = place(d, c);
     // Plotted along the variable of the located interval, else along the first.
     let variable =
         place.and_then(|l| d.variables.iter().position(|(n, _)| Some(n) == l.variable.as_ref())).unwrap_or(0);
-    let shaded = place.and_then(|l| Some((l.from?, l.to?))).filter(|_| !d.variables.is_empty());
+    let shaded = interval(d, c);
     let axis = d.variables.get(variable).map_or_else(|| "row".to_owned(), |(n, _)| n.clone());
     let rows: Vec<f64> = match curves.inputs.get(variable) {
         Some(column) => column.clone(),

@@ -3,6 +3,8 @@
 mod envelope;
 mod experiments;
 pub mod model;
+mod spec;
+mod start;
 
 use liquid_haptics::slosh::UprightCylinder;
 use missing_physics::data::{Recording, Run};

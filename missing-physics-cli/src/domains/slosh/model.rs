@@ -1,14 +1,12 @@
 //! The full model of a decaying wave: physics from `liquid-haptics`, the arm and the sensor, and all parameters.
 
-use std::f64::consts::TAU;
-use std::sync::Arc;
-
 use liquid_haptics::slosh::{Decay, Effects, SloshError, UprightCylinder};
 use missing_physics::data::Run;
-use missing_physics::model::{DerivedPerRun, Model, PredictError, Scope, Spec};
+use missing_physics::model::{Model, PredictError, Scope, Spec};
 
 use super::cylinder;
-use crate::domains::builder::{ANY, At, Builder};
+use super::spec::{ARM_RAD_S, Places, build, second_band};
+use super::start::{first_wave, peaks, viscosity_guess};
 
 /// What was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +29,7 @@ impl Channel {
     }
 
     /// The unit as a suffix of a parameter's name.
-    fn suffix(self) -> &'static str {
+    pub(super) fn suffix(self) -> &'static str {
         if self == Self::Torque { "nm" } else { "n" }
     }
 }
@@ -55,28 +53,6 @@ pub struct Setup {
 
 /// Shares of the recorded volume that a run may have in its container, by [`Run::kind`].
 pub const FILLS: [f64; 4] = [1.0, 0.25, 0.5, 1.5];
-
-/// Where each parameter stands.
-#[derive(Debug, Clone, Copy, Default)]
-struct Places {
-    viscosity: At,
-    tension: At,
-    frequency: At,
-    friction: At,
-    quadratic: At,
-    second_omega: At,
-    second_damping: At,
-    arm_omega: At,
-    arm_damping: At,
-    lag: At,
-    cos: At,
-    sin: At,
-    second_cos: At,
-    second_sin: At,
-    arm_cos: At,
-    arm_sin: At,
-    transient: At,
-}
 
 /// The model of the domain `slosh`.
 #[derive(Debug)]
@@ -312,244 +288,7 @@ impl SloshModel {
     }
 }
 
-/// Where the second mode's frequency may lie, rad/s: surface tension raises it above that of gravity alone.
-fn second_band(cylinder: &UprightCylinder) -> [f64; 2] {
-    let omega = cylinder.angular_frequency_rad_s(1, 0.0);
-    [0.97 * omega, 1.06 * omega]
-}
-
-/// Bounds of the arm's frequency, rad/s.
-const ARM_RAD_S: [f64; 2] = [1.0, 1000.0];
 /// How many places of the envelope's search are tried.
 const ENVELOPES: usize = 8;
 /// How many peaks of a residual's spectrum are tried.
 const PEAKS: usize = 6;
-
-/// Frequencies (rad/s) at which the residual's spectrum, summed over the runs, is highest.
-fn peaks(runs: &[Run], residual: &[Vec<Vec<f64>>], [lowest, highest]: [f64; 2]) -> Vec<f64> {
-    let (mut longest, mut gap): (f64, f64) = (0.0, f64::INFINITY);
-    for run in runs {
-        let Some(times) = run.inputs.first() else { continue };
-        if let (Some(first), Some(last)) = (times.first(), times.last()) {
-            longest = longest.max(last - first);
-            gap = gap.min((last - first) / (times.len().max(2) - 1) as f64);
-        }
-    }
-    if !(longest > 0.0 && gap > 0.0) {
-        return Vec::new();
-    }
-    let step = 0.25 * TAU / longest;
-    let (lowest, highest) = (lowest.max(4.0 * step), highest.min(0.5 * TAU / gap));
-    let frequencies: Vec<f64> =
-        (0..20_000).map(|k| lowest + f64::from(k) * step).take_while(|w| *w < highest).collect();
-    let power: Vec<f64> = frequencies
-        .iter()
-        .map(|w| {
-            runs.iter()
-                .zip(residual)
-                .map(|(run, left)| {
-                    let (mut re, mut im) = (0.0, 0.0);
-                    for (t, r) in run.inputs[0].iter().zip(&left[0]).filter(|(_, r)| r.is_finite()) {
-                        let (s, c) = (w * t).sin_cos();
-                        (re, im) = (re + r * c, im + r * s);
-                    }
-                    re * re + im * im
-                })
-                .sum()
-        })
-        .collect();
-    let mut tops: Vec<usize> = (1..power.len().saturating_sub(1))
-        .filter(|&i| power[i] >= power[i - 1] && power[i] > power[i + 1])
-        .collect();
-    tops.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
-    tops.into_iter().map(|i| frequencies[i]).collect()
-}
-
-/// Amplitudes at t = 0 of the cosine and the sine of a run's wave: least squares of a decaying sine over its first cycles.
-fn first_wave(cylinder: &UprightCylinder, viscosity: f64, run: &Run) -> Option<[f64; 2]> {
-    /// So many that noise averages out, so few that what bends the decay has not begun to.
-    const CYCLES: f64 = 3.0;
-    let (times, values) = (run.inputs.first()?, run.outputs.first()?);
-    let (w, ratio) = (cylinder.angular_frequency_rad_s(0, 0.0), cylinder.damping_ratio(viscosity).min(0.5));
-    let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (t, y) in times.iter().zip(values).filter(|(t, y)| **t < CYCLES * TAU / w && y.is_finite()) {
-        let fade = (-ratio * w * t).exp();
-        let (s, c) = (w * (1.0 - ratio * ratio).sqrt() * t).sin_cos();
-        let (s, c) = (fade * s, fade * c);
-        (cc, cs, ss, cy, sy) = (cc + c * c, cs + c * s, ss + s * s, cy + c * y, sy + s * y);
-    }
-    let determinant = cc * ss - cs * cs;
-    (determinant > 1e-9 * cc * ss)
-        .then(|| [(cy * ss - sy * cs) / determinant, (sy * cc - cy * cs) / determinant])
-}
-
-/// A viscosity to begin with: from how much of the wave is left in the later half of the runs.
-fn viscosity_guess(cylinder: &UprightCylinder, runs: &[Run]) -> f64 {
-    let w = cylinder.angular_frequency_rad_s(0, 0.0);
-    let mut ratios: Vec<f64> = runs
-        .iter()
-        .filter_map(|run| {
-            let (times, values) = (run.inputs.first()?, run.outputs.first()?);
-            let span = times.last()? - times.first()?;
-            let middle = times.first()? + 0.3 * span;
-            let power = |early: bool| {
-                let part = times.iter().zip(values).filter(|(t, v)| (**t < middle) == early && v.is_finite());
-                let (sum, n) = part.fold((0.0, 0.0), |(s, n), (_, v)| (s + v * v, n + 1.0));
-                sum / f64::max(n, 1.0)
-            };
-            // Mean powers half a run apart fall by exp(-gamma omega span).
-            let fall = (power(true) / power(false)).ln() / (w * span);
-            (fall.is_finite() && fall > 0.0).then_some(fall)
-        })
-        .collect();
-    ratios.sort_by(f64::total_cmp);
-    let ratio = ratios.get(ratios.len() / 2).copied().unwrap_or(0.01).clamp(1e-4, 0.3);
-    cylinder.kinematic_viscosity_m2_s(ratio)
-}
-
-fn build(setup: &Setup, cylinder: &UprightCylinder, largest: f64, viscosity: f64) -> (Spec, Places) {
-    let mut b = Builder::default();
-    let mut p = Places::default();
-    let (unit, suffix) = (setup.channel.unit(), setup.channel.suffix());
-    let amplitude = 0.1 * largest;
-    b.spec.baseline = "the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase".into();
-    p.viscosity = b.shared(
-        "kinematic_viscosity_m2_s",
-        "m^2/s",
-        viscosity,
-        [1e-12, cylinder.kinematic_viscosity_m2_s(0.9)],
-        viscosity,
-    );
-    p.cos = b.own(&format!("cos_{suffix}"), unit, ANY, largest);
-    p.sin = b.own(&format!("sin_{suffix}"), unit, ANY, largest);
-    let (omega, at_rest) = (cylinder.angular_frequency_rad_s(0, 0.0), 0.02);
-    // Liquids near room temperature have 0.015 to 0.073 N/m, liquid metals up to 0.6.
-    let strongest = if setup.density_kg_m3 > 5000.0 { 0.7 } else { 0.09 };
-    p.tension = b.shared("surface_tension_n_m", "N/m", 0.0, [0.0, strongest], 0.03);
-    b.mechanism(
-        "surface-tension",
-        &[p.tension],
-        [
-            "surface tension",
-            "The surface's tension stiffens the wave, more so in narrow containers.",
-            "omega^2 = (g k + sigma k^3 / rho) tanh(k h), k = 1.841 / R",
-            "Ibrahim 2005, Liquid Sloshing Dynamics, doi:10.1017/CBO9780511536656, ch. 1",
-        ],
-        &["nonlinear-frequency"],
-    );
-    p.frequency = b.shared("coefficient", "", 0.0, [-0.3, 0.3], 0.01);
-    b.mechanism(
-        "nonlinear-frequency",
-        &[p.frequency],
-        [
-            "frequency that depends on the amplitude",
-            "High waves are slower or faster than low ones.",
-            "omega (1 + c A^2 / A_max^2), A_max the largest amplitude of a run",
-            "Miles 1984, doi:10.1017/S0022112084002834",
-        ],
-        &["surface-tension"],
-    );
-    p.friction = b.shared(&format!("friction_{suffix}"), unit, 0.0, [0.0, largest], at_rest * largest);
-    b.mechanism(
-        "contact-line-friction",
-        &[p.friction],
-        [
-            "friction of the contact line",
-            "The edge of the surface sticks to the wall: the amplitude falls in a straight line and stops.",
-            "x'' + 2 gamma omega x' + omega^2 (x + f sign x') = 0; a cycle loses 4 f",
-            "Hocking 1987, doi:10.1017/S0022112087001514; Cocciaro, Faetti and Festa 1993, doi:10.1017/S0022112093000035",
-        ],
-        &["quadratic-damping"],
-    );
-    p.quadratic = b.shared(
-        &format!("coefficient_per_{suffix}"),
-        &format!("1/({unit})"),
-        0.0,
-        [0.0, 10.0 / largest],
-        0.02 / largest,
-    );
-    b.mechanism(
-        "quadratic-damping",
-        &[p.quadratic],
-        [
-            "quadratic damping",
-            "Eddies and breaking take more from high waves than from low ones.",
-            "x'' + 2 gamma omega x' + c |x'| x' + omega^2 x = 0",
-            "Faltinsen and Timokha 2009, Sloshing, ISBN 978-0-521-88111-1, ch. 6",
-        ],
-        &["contact-line-friction"],
-    );
-    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
-    p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3, 100.0], 1.0 / omega);
-    p.transient = b.own(&format!("transient_{suffix}"), unit, ANY, amplitude);
-    let mechanism = b.mechanism(
-        "sensor-lag",
-        &[p.lag],
-        [
-            "lag of the sensor",
-            "The sensor follows the load with a delay; what is left of its reading at t = 0 dies away.",
-            "tau y' + y = x: the same mode at another amplitude and phase, plus c exp(-t / tau)",
-            "Doebelin 2003, Measurement Systems, ISBN 978-0-07-243886-3, ch. 3",
-        ],
-        &["arm-compliance"],
-    );
-    mechanism.companions = vec![p.transient.index];
-    mechanism.shapes = vec![p.lag.index];
-    (b.spec, p)
-}
-
-fn modes(
-    b: &mut Builder,
-    p: &mut Places,
-    cylinder: &UprightCylinder,
-    (unit, suffix): (&str, &str),
-    amplitude: f64,
-) {
-    let [low, high] = second_band(cylinder);
-    p.second_omega =
-        b.shared("omega_rad_s", "rad/s", cylinder.angular_frequency_rad_s(1, 0.0), [low, high], 0.3);
-    p.second_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.5], 0.01);
-    p.second_cos = b.own(&format!("second_cos_{suffix}"), unit, ANY, amplitude);
-    p.second_sin = b.own(&format!("second_sin_{suffix}"), unit, ANY, amplitude);
-    let second = b.mechanism(
-        "second-mode",
-        &[p.second_omega, p.second_damping],
-        [
-            "second slosh mode",
-            "A second antisymmetric wave is on the surface, at the frequency that theory gives it.",
-            "+ A2 exp(-gamma2 omega2 t) cos(omega2 t + phi2), omega2^2 = g k2 tanh(k2 h), k2 = 5.331 / R",
-            "Ibrahim 2005, Liquid Sloshing Dynamics, doi:10.1017/CBO9780511536656, ch. 1",
-        ],
-        &["arm-compliance", "sensor-lag"],
-    );
-    second.companions = vec![p.second_cos.index, p.second_sin.index];
-    second.derived_per_run = vec![amplitude_of(p.second_cos, p.second_sin, suffix, unit)];
-    second.shapes = vec![p.second_omega.index, p.second_damping.index];
-    p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
-    p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
-    p.arm_cos = b.own(&format!("arm_cos_{suffix}"), unit, ANY, amplitude);
-    p.arm_sin = b.own(&format!("arm_sin_{suffix}"), unit, ANY, amplitude);
-    let arm = b.mechanism(
-        "arm-compliance",
-        &[p.arm_omega, p.arm_damping],
-        [
-            "compliance of the arm",
-            "Arm and gripper ring at a frequency of their own.",
-            "+ A exp(-gamma omega t) cos(omega t + phi)",
-            "Siciliano et al. 2009, Robotics, doi:10.1007/978-1-84628-642-1, ch. 7",
-        ],
-        &["second-mode"],
-    );
-    arm.companions = vec![p.arm_cos.index, p.arm_sin.index];
-    arm.derived_per_run = vec![amplitude_of(p.arm_cos, p.arm_sin, suffix, unit)];
-    arm.shapes = vec![p.arm_omega.index, p.arm_damping.index];
-}
-
-/// The amplitude at t = 0 of a wave that each run has in two parts.
-fn amplitude_of(cos: At, sin: At, suffix: &str, unit: &str) -> DerivedPerRun {
-    DerivedPerRun {
-        name: format!("amplitude_{suffix}"),
-        unit: unit.into(),
-        value: Arc::new(move |_, own| own[cos.slot].hypot(own[sin.slot])),
-    }
-}

@@ -1,0 +1,195 @@
+//! A robot does what the tool proposes: something is hidden about a bottle, or about a soft body; the rig tilts or presses until the
+//! tool is sure what it is, against random actions and an even grid of them.
+//!
+//! `cargo run --release -p examples --example 11_next_experiment` (50 worlds a rig; `--small`: 1, of two experiments at most)
+#![allow(clippy::print_stdout, reason = "printing is what an example is for")]
+
+mod contact;
+mod liquid;
+
+use std::error::Error;
+
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use rand::{RngExt as _, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
+
+/// How sure is sure.
+const SURE: f64 = 0.95;
+/// Worlds looked at for one whose first answer is ambiguous.
+const DRAWN: u64 = 20;
+
+/// A rig, what may be hidden about it, and what it can do.
+trait Rig {
+    /// What is hidden.
+    type Hidden: Copy + Send + Sync;
+    /// What it does.
+    type Action: Copy + Send + Sync;
+    /// In the table.
+    const NAME: &'static str;
+    /// First line of the data.
+    const COLUMNS: &'static str;
+
+    /// The recording's header.
+    fn header() -> String;
+    /// Hides something.
+    fn draw(rng: &mut ChaCha8Rng) -> Self::Hidden;
+    /// Its name in the tool.
+    fn id(hidden: Self::Hidden) -> &'static str;
+    /// What is done at first.
+    fn first() -> Self::Action;
+    /// What can be done then; the tool proposes out of the like.
+    fn actions() -> Vec<Self::Action>;
+    /// A proposal's values as an action of this rig.
+    fn proposed(before: Self::Action, value: &dyn Fn(&str) -> Option<f64>) -> Option<Self::Action>;
+    /// Rows of the recording of one action, done through the rig's traits.
+    fn act(action: Self::Action, hidden: Self::Hidden, label: usize, seed: u64) -> Outcome<String>;
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Policy {
+    Proposed,
+    Random,
+    Grid,
+}
+
+/// Experiments after which a rig gives up.
+fn patience() -> usize {
+    if examples::small() { 2 } else { 8 }
+}
+
+fn ask<R: Rig>(rows: &str, seed: u64) -> Outcome<Diagnosis> {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("recording.toml"), R::header())?;
+    std::fs::write(folder.path().join("data.csv"), format!("{}\n{rows}", R::COLUMNS))?;
+    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    let options = Options { seed, replicates: 199, ..Options::default() };
+    Ok(diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?)
+}
+
+/// One rig with something hidden about it, and what it has recorded.
+struct World<R: Rig> {
+    hidden: R::Hidden,
+    seed: u64,
+    last: R::Action,
+    rows: String,
+    done: usize,
+    answer: Diagnosis,
+}
+
+impl<R: Rig> World<R> {
+    fn new(seed: u64) -> Outcome<Self> {
+        let hidden = R::draw(&mut ChaCha8Rng::seed_from_u64(seed));
+        let last = R::first();
+        let rows = R::act(last, hidden, 1, seed)?;
+        let answer = ask::<R>(&rows, seed)?;
+        Ok(Self { hidden, seed, last, rows, done: 0, answer })
+    }
+
+    /// How probable the tool thinks that what is hidden is at work.
+    fn belief(&self) -> f64 {
+        let id = R::id(self.hidden);
+        self.answer.mechanisms.iter().find(|m| m.id == id).map_or(0.0, |m| m.probability)
+    }
+
+    fn act(&mut self, action: R::Action) -> Outcome<()> {
+        self.done += 1;
+        let noise = self.seed ^ (self.done as u64) << 32;
+        self.rows += &R::act(action, self.hidden, self.done + 1, noise)?;
+        self.last = action;
+        self.answer = ask::<R>(&self.rows, self.seed)?;
+        Ok(())
+    }
+
+    /// The action that the tool proposes, if it does.
+    fn proposed(&self) -> Option<R::Action> {
+        let next = self.answer.next_experiment.as_ref()?;
+        R::proposed(self.last, &|name| next.action.iter().find(|(n, _)| n == name).map(|(_, v)| *v))
+    }
+
+    /// Experiments until the tool is sure of the truth ([`patience`] where it never was).
+    fn until_sure(mut self, policy: Policy, told: bool) -> Outcome<usize> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0xdead);
+        let all = R::actions();
+        while self.done < patience() {
+            let sure = self.belief() >= SURE;
+            if told {
+                self.tell();
+            }
+            if sure {
+                break;
+            }
+            let any = all[rng.random_range(0..all.len())];
+            let action = match policy {
+                Policy::Proposed => self.proposed().unwrap_or(any),
+                Policy::Random => any,
+                Policy::Grid => all[self.done % all.len()],
+            };
+            self.act(action)?;
+        }
+        Ok(self.done)
+    }
+
+    fn tell(&self) {
+        println!("  {}, P({}) = {:.2}", self.answer.verdict.word(), R::id(self.hidden), self.belief());
+        if let (true, Some(next)) = (self.belief() < SURE, &self.answer.next_experiment) {
+            println!("  proposed: {}", next.words);
+        }
+    }
+
+    /// The first of some worlds whose first answer is ambiguous, and how many were looked at.
+    fn ambiguous(from: u64) -> Outcome<(Option<Self>, u64)> {
+        for looked in 0..DRAWN {
+            let world = Self::new(from + looked)?;
+            if world.answer.verdict.word() == "ambiguous" {
+                return Ok((Some(world), looked + 1));
+            }
+        }
+        Ok((None, DRAWN))
+    }
+}
+
+/// The table of one rig.
+fn race<R: Rig>(worlds: u64) -> Outcome<()> {
+    println!("{}: one world, step by step", R::NAME);
+    if let (Some(world), _) = World::<R>::ambiguous(1 << 20)? {
+        world.until_sure(Policy::Proposed, true)?;
+    }
+    let started: Vec<(u64, u64, bool)> = (0..worlds)
+        .into_par_iter()
+        .map(|w| {
+            let from = w * DRAWN;
+            let (world, looked) = World::<R>::ambiguous(from)?;
+            Ok((from + looked - 1, looked, world.is_some()))
+        })
+        .collect::<Outcome<_>>()?;
+    let seeds: Vec<u64> = started.iter().filter(|s| s.2).map(|s| s.0).collect();
+    let drawn: u64 = started.iter().map(|s| s.1).sum();
+    println!("  {} worlds whose first answer is ambiguous, of {drawn} drawn", seeds.len());
+    println!("  {:10} {:>6} {:>8} {:>6} {:>6}", "policy", "mean", "median", "most", "never");
+    for policy in [Policy::Proposed, Policy::Random, Policy::Grid] {
+        let mut counts: Vec<usize> = seeds
+            .par_iter()
+            .map(|seed| World::<R>::new(*seed)?.until_sure(policy, false))
+            .collect::<Outcome<_>>()?;
+        counts.sort_unstable();
+        let mean = counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
+        let never = counts.iter().filter(|n| **n == patience()).count();
+        let middle = counts.get(counts.len() / 2).copied().unwrap_or(0);
+        let most = counts.last().copied().unwrap_or(0);
+        println!("  {:10} {mean:6.2} {middle:8} {most:6} {never:6}", format!("{policy:?}").to_lowercase());
+    }
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    let worlds = if examples::small() { 1 } else { 50 };
+    println!("Experiments beyond the first until P(what is hidden) >= {SURE}\n");
+    race::<liquid::Liquid>(worlds)?;
+    println!();
+    race::<contact::Contact>(worlds)
+}
