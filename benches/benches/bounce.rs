@@ -72,6 +72,16 @@ fn hearing(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
     let found = localiser.locate(&cut)?;
     let off = (found.x_m - place[0]).hypot(found.y_m - place[1]);
     println!("bounce/localise: {:.2} mm off", 1e3 * off);
+    let delays = localiser.delays_s(&cut)?;
+    let straight =
+        microphones.iter().map(|m| (0..3).map(|k| (m[k] - place[k]).powi(2)).sum::<f64>().sqrt() / 343.0);
+    let true_s: Vec<f64> = straight.collect();
+    let mean = true_s.iter().sum::<f64>() / true_s.len() as f64;
+    let worst = delays.iter().zip(&true_s).map(|(d, t)| (d - t + mean).abs()).fold(0.0, f64::max);
+    println!("bounce/gcc_phat: delays {:.1} us off at most", 1e6 * worst);
+    c.bench_function("bounce/gcc_phat/3x485", |b| {
+        b.iter(|| localiser.delays_s(black_box(&cut)).map(<[f64]>::len))
+    });
     c.bench_function("bounce/localise/3x485", |b| b.iter(|| localiser.locate(black_box(&cut))));
     let mut pair = Localiser::new(&microphones[..3], RATE_HZ, 343.0, 2 * BUFFER)?;
     let long: Vec<&[f64]> = channels.iter().map(|x| &x[start..start + 2 * BUFFER]).collect();

@@ -161,6 +161,15 @@ impl Localiser {
     /// # Errors
     /// [`LocaliseError::Channels`], [`LocaliseError::Length`], [`LocaliseError::Energy`].
     pub fn locate(&mut self, channels: &[&[f64]]) -> Result<Location, LocaliseError> {
+        self.delays_s(channels)?;
+        Ok(self.place())
+    }
+
+    /// The time delays alone: when the sound in the buffer reached each microphone, s from the mean of all of them.
+    ///
+    /// # Errors
+    /// As [`Localiser::locate`].
+    pub fn delays_s(&mut self, channels: &[&[f64]]) -> Result<&[f64], LocaliseError> {
         let (expected, got) = (self.arrivals_s.len(), channels.len());
         if expected != got {
             return Err(LocaliseError::Channels { expected, got });
@@ -172,7 +181,8 @@ impl Localiser {
             }
         }
         self.correlator.listen(|channel| channels[channel])?;
-        Ok(self.place())
+        self.settle();
+        Ok(&self.arrivals_s)
     }
 
     /// As [`Localiser::locate`], from channels that lie one after another.
@@ -186,15 +196,21 @@ impl Localiser {
             return Err(LocaliseError::Length { channel: 0, expected, got: samples.len() });
         }
         self.correlator.listen(|channel| &samples[channel * buffer..][..buffer])?;
+        self.settle();
         Ok(self.place())
     }
 
-    /// The place that fits the correlations.
-    fn place(&mut self) -> Location {
+    /// One arrival a microphone from the lags of all pairs, by least squares.
+    fn settle(&mut self) {
         let n = self.arrivals_s.len();
         for i in 0..n {
             self.arrivals_s[i] = (0..n).map(|j| self.correlator.lag_s(i, j)).sum::<f64>() / n as f64;
         }
+    }
+
+    /// The place that fits the arrivals.
+    fn place(&self) -> Location {
+        let n = self.arrivals_s.len();
         let mut open = 0.0;
         for i in 0..n {
             for j in 0..i {

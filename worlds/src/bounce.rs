@@ -1,6 +1,7 @@
 //! A ball that bounces on a table, as its impacts are heard.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -27,7 +28,7 @@ pub struct Effects {
     pub position_scale: f64,
     /// Share of the runs in which one impact after the first goes unheard.
     pub unheard: f64,
-    /// Unlisted: the restitution is less by this much where x is above 2 cm.
+    /// Unlisted: the restitution is less by this much where x is above [`BounceWorld::dead_from_m`].
     pub dead_side: f64,
 }
 
@@ -52,6 +53,8 @@ pub struct BounceWorld {
     pub noise: [f64; 2],
     /// Whether these are stated.
     pub noise_known: bool,
+    /// Where the dead side of the table begins, if it has one, along x in m; balls are let go above 0.
+    pub dead_from_m: f64,
     /// What acts.
     pub effects: Effects,
 }
@@ -69,6 +72,7 @@ impl BounceWorld {
             release_m_s: 0.05,
             noise: [3e-5, 6e-3],
             noise_known: true,
+            dead_from_m: 0.02,
             effects: Effects::default(),
         }
     }
@@ -97,7 +101,7 @@ impl BounceWorld {
                 .then(|| rng.random_range(1..self.impacts.max(3) - 1));
             runs_unheard += usize::from(unheard.is_some());
             let impacts = self.impacts + usize::from(unheard.is_some());
-            let heard = self.drop(self.height_m * spread, impacts, &mut rng);
+            let heard = self.drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
             for (number, (_, [t, x, y])) in kept.enumerate() {
                 let _ = writeln!(data, "{run},{},{t:.7},{x:.5},{y:.5}", number + 1);
@@ -106,15 +110,21 @@ impl BounceWorld {
         ([header, data], runs_unheard)
     }
 
-    /// Time and place of each impact of one drop, as they are heard.
-    fn drop(&self, height_m: f64, impacts: usize, rng: &mut ChaCha8Rng) -> Vec<Vec3> {
+    /// Time and place of each impact, as they are heard, of a ball that is let go above a place at some time in `begin_s`.
+    pub(crate) fn drop(
+        &self,
+        from_m: [f64; 2],
+        height_m: f64,
+        begin_s: Range<f64>,
+        impacts: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> Vec<Vec3> {
         let e = &self.effects;
         let normal = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
-        let mut place = [0.0; 3];
-        let mut velocity = [self.release_m_s * normal(rng), self.release_m_s * normal(rng), 0.0];
         // The stated height is that above the place where it lands.
-        place[2] = height_m;
-        let mut t = rng.random_range(0.0..1.0);
+        let mut place = [from_m[0], from_m[1], height_m];
+        let mut velocity = [self.release_m_s * normal(rng), self.release_m_s * normal(rng), 0.0];
+        let mut t = rng.random_range(begin_s);
         let mut level = Self { effects: *e, ..*self };
         level.effects.table = [0.0; 2];
         let mut heard = Vec::with_capacity(impacts);
@@ -180,7 +190,7 @@ impl BounceWorld {
         let e = &self.effects;
         let speed = norm(v);
         let mut restitution = self.restitution - e.slope_s_m * (speed - 1.0);
-        if place[0] > 0.02 {
+        if place[0] > self.dead_from_m {
             restitution -= e.dead_side;
         }
         let up = unit(&[-e.table[0], -e.table[1], 1.0]);

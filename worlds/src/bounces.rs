@@ -11,7 +11,7 @@ use crate::concealed::{Concealed, Hidden, Key, Maker};
 #[derive(Debug, Clone, Copy)]
 pub struct Bounces;
 
-const LISTED: usize = 7;
+pub(crate) const LISTED: usize = 7;
 
 impl Maker for Bounces {
     fn domain(&self) -> &'static str {
@@ -47,7 +47,7 @@ impl Maker for Bounces {
     }
 }
 
-fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
+pub(crate) fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
     let e: &mut Effects = &mut world.effects;
     match which {
         0 => {

@@ -28,7 +28,7 @@ impl Hidden {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concealed {
     /// The files of the recording's folder: name and contents.
-    pub files: Vec<(String, String)>,
+    pub files: Vec<(String, Vec<u8>)>,
     /// The answer.
     pub key: Key,
 }
@@ -36,7 +36,8 @@ pub struct Concealed {
 impl Concealed {
     /// A recording of one table.
     pub(crate) fn table(header: String, data: String, key: Key) -> Self {
-        Self { files: vec![("recording.toml".into(), header), ("data.csv".into(), data)], key }
+        let files = [("recording.toml", header), ("data.csv", data)];
+        Self { files: files.map(|(name, text)| (name.to_owned(), text.into_bytes())).into(), key }
     }
 }
 
@@ -88,6 +89,11 @@ pub trait Maker: Sync {
     /// The domain.
     fn domain(&self) -> &'static str;
 
+    /// What its worlds are called: as the domain, unless the domain has recordings of several kinds.
+    fn name(&self) -> &'static str {
+        self.domain()
+    }
+
     /// Draws a world in which something of the given kind is hidden: its strength from faint to strong on a log scale, the
     /// noise, the nuisances and the numbers of runs and rows as people have them. The same seed gives the same bits.
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed;
@@ -98,6 +104,7 @@ pub fn makers() -> &'static [&'static dyn Maker] {
     &[
         &crate::flights::Flights,
         &crate::bounces::Bounces,
+        &crate::sounds::Sounds,
         &crate::waves::Waves,
         &crate::tilts::Tilts,
         &crate::presses::Presses,
@@ -212,7 +219,8 @@ mod tests {
     }
 
     fn file<'a>(world: &'a Concealed, name: &str) -> &'a str {
-        world.files.iter().find(|(n, _)| n == name).map_or("", |(_, text)| text)
+        let found = world.files.iter().find(|(n, _)| n == name);
+        found.map_or("", |(_, text)| std::str::from_utf8(text).unwrap())
     }
 
     #[test]
@@ -234,6 +242,10 @@ mod tests {
                 let header = file(world, "recording.toml");
                 assert!(header.starts_with("format = 1\n"), "{header}");
                 assert!(header.contains(&format!("domain = \"{domain}\"\n")), "{header}");
+                if world.files.len() > 2 {
+                    sounds_are_well_formed(world);
+                    continue;
+                }
                 assert!(header.contains("data = \"data.csv\"\n"), "{header}");
                 let mut rows = file(world, "data.csv").lines();
                 let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
@@ -260,6 +272,19 @@ mod tests {
                 once.dedup();
                 assert!(runs.len() >= 2 && once.len() == runs.len(), "{domain}");
             }
+        }
+    }
+
+    /// Every file but the header is a sound that the header names, of one rate, whose samples are not all nought or clipped.
+    fn sounds_are_well_formed(world: &Concealed) {
+        let header = file(world, "recording.toml");
+        for (name, bytes) in world.files.iter().filter(|(name, _)| name != "recording.toml") {
+            assert!(header.contains(&format!("\"{name}\"")), "{name}: {header}");
+            let mut sound = hound::WavReader::new(bytes.as_slice()).unwrap();
+            assert_eq!(usize::from(sound.spec().channels), header.matches("0.0762]").count());
+            let samples: Vec<i16> = sound.samples::<i16>().map(Result::unwrap).collect();
+            let loudest = samples.iter().map(|s| s.unsigned_abs()).max().unwrap();
+            assert!((3_000..32_700).contains(&loudest), "{name}: {loudest}");
         }
     }
 

@@ -16,6 +16,8 @@ pub mod presses;
 mod quadrature;
 mod set_up;
 mod sizing;
+pub mod sound;
+pub mod sounds;
 pub mod tilt;
 pub mod tilts;
 pub mod wave;

@@ -9,6 +9,8 @@ pub(super) const OVERSAMPLING: usize = 2;
 const RIVALS: (usize, f64) = (3, 0.7);
 /// Newton steps on a peak.
 const STEPS: usize = 5;
+/// Frequencies that are turned at once: each waits for its own last turn alone.
+const LANES: usize = 8;
 
 /// Lags (s) of the highest peaks on the lattice, highest first; a peak on the edge counts.
 pub(super) fn candidates(
@@ -56,19 +58,7 @@ impl Peak {
         let bound = 0.1 * TAU / (radians * (first + cross.len()) as f64);
         for round in 0..=STEPS {
             let t = peak.lag_s;
-            let turn = Complex64::from_polar(1.0, radians * t);
-            let mut phase = Complex64::from_polar(1.0, radians * first as f64 * t);
-            let (mut height, mut slope, mut curvature, mut scatter) = (0.0, 0.0, 0.0, 0.0);
-            for (k, g) in cross.iter().enumerate() {
-                let omega = radians * (first + k) as f64;
-                let z = g * phase;
-                phase *= turn;
-                let part = omega * z.im;
-                height += z.re;
-                slope -= part;
-                curvature += omega * omega * z.re;
-                scatter += part * part;
-            }
+            let [height, slope, curvature, scatter] = at_lag(cross, first, radians, t);
             (peak.height, peak.curvature, peak.scatter) = (height, curvature, scatter);
             if round == STEPS || !(curvature > 0.0) {
                 break;
@@ -82,4 +72,26 @@ impl Peak {
         }
         peak
     }
+}
+
+/// A correlation at a lag: its height, slope, minus its second derivative, and the sum of the squares of the slope's parts.
+fn at_lag(cross: &[Complex64], first: usize, radians: f64, lag_s: f64) -> [f64; 4] {
+    let turn = Complex64::from_polar(1.0, radians * LANES as f64 * lag_s);
+    let omega = |k: usize| radians * (first + k) as f64;
+    let mut phases: [Complex64; LANES] =
+        std::array::from_fn(|lane| Complex64::from_polar(1.0, omega(lane) * lag_s));
+    let mut sums = [[0.0; LANES]; 4];
+    for (chunk, at) in cross.chunks(LANES).zip((0..).step_by(LANES)) {
+        for (lane, (g, phase)) in chunk.iter().zip(&mut phases).enumerate() {
+            let omega = omega(at + lane);
+            let z = g * *phase;
+            *phase *= turn;
+            let part = omega * z.im;
+            sums[0][lane] += z.re;
+            sums[1][lane] -= part;
+            sums[2][lane] += omega * omega * z.re;
+            sums[3][lane] += part * part;
+        }
+    }
+    sums.map(|lanes| lanes.iter().sum())
 }

@@ -28,7 +28,7 @@ pub enum CommandError {
 }
 
 /// Writes a file whole or not at all.
-pub(crate) fn write_whole(path: &std::path::Path, text: &str) -> Result<(), CommandError> {
+pub(crate) fn write_whole(path: &std::path::Path, contents: impl AsRef<[u8]>) -> Result<(), CommandError> {
     let fail = |e: std::io::Error| CommandError::Other(format!("{}: {e}", path.display()));
     let Some(name) = path.file_name() else {
         return Err(CommandError::Other(format!("{}: not the name of a file", path.display())));
@@ -37,7 +37,7 @@ pub(crate) fn write_whole(path: &std::path::Path, text: &str) -> Result<(), Comm
     hidden.push(name);
     hidden.push(format!(".{}.part", std::process::id()));
     let part = path.with_file_name(hidden);
-    std::fs::write(&part, text).map_err(fail)?;
+    std::fs::write(&part, contents).map_err(fail)?;
     std::fs::rename(&part, path).map_err(|e| {
         // The half that was written is of no use to anybody; that it cannot be removed changes nothing.
         let _ = std::fs::remove_file(&part);

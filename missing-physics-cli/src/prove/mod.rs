@@ -61,7 +61,7 @@ struct Plan {
 
 /// The domains of which worlds can be drawn.
 pub fn provable() -> Vec<&'static str> {
-    makers().iter().map(|m| m.domain()).collect()
+    makers().iter().map(|m| m.name()).collect()
 }
 
 /// Draws the worlds, seals their answers, diagnoses each from its files, opens the seal and scores; goes on where a proof of the same
@@ -73,7 +73,7 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
     let chosen: Vec<&'static dyn Maker> = makers()
         .iter()
         .copied()
-        .filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.domain()))
+        .filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name()))
         .collect();
     if chosen.is_empty() {
         let asked = crate::recording::quoted(arguments.domain.as_deref().unwrap_or_default());
@@ -107,7 +107,7 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
     let plan = Plan {
         format: 1,
         version: env!("CARGO_PKG_VERSION").into(),
-        domains: chosen.iter().map(|m| m.domain().to_owned()).collect(),
+        domains: chosen.iter().map(|m| m.name().to_owned()).collect(),
         worlds: arguments.worlds,
         seed: arguments.seed,
         seal: seal(&keys),

@@ -86,7 +86,7 @@ pub(super) struct Judged {
 
 impl World {
     pub(super) fn new(maker: &'static dyn Maker, number: usize, seed: u64, folder: &Path) -> Self {
-        let name = format!("{}/{number:04}", maker.domain());
+        let name = format!("{}/{number:04}", maker.name());
         // FNV-1a of the name, so that a domain's worlds do not depend on which others are asked for.
         let hash =
             name.bytes().fold(0xcbf2_9ce4_8422_2325 ^ seed.wrapping_mul(0x9e37_79b9_7f4a_7c15), |h, b| {
@@ -155,7 +155,7 @@ impl World {
             return Err(missing("told.json"));
         }
         let outcome = read(&self.folder.join("outcome.json")).ok_or_else(|| missing("outcome.json"))?;
-        Ok(Judged { domain: self.maker.domain(), name: self.name.clone(), key, outcome, best })
+        Ok(Judged { domain: self.maker.name(), name: self.name.clone(), key, outcome, best })
     }
 
     fn recording(&self) -> PathBuf {

@@ -9,7 +9,7 @@ use super::drop::{Drop, Effects};
 use super::experiments::{experiments, of_times};
 use super::model::{BounceModel, COPIES, Setup};
 use super::read::{Heard, Rig};
-use super::spread::{Known, judge};
+use super::spread::{Known, judge, released};
 use super::times::TimesModel;
 use crate::domains::Loaded;
 use crate::domains::reading::resolution;
@@ -30,6 +30,8 @@ pub(super) fn assemble(
         drag_unit: rig.drag_unit,
         placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
         dropped: rig.drop_height_m.is_some(),
+        released: released(heard.len()),
+        listened: heard.iter().any(|h| !h.drop.loudness.is_empty()),
         unheard: [missed, heard.len()],
         microphones: microphones.places_m.len(),
     };
@@ -67,9 +69,9 @@ fn placed(
     known: Known,
     microphones: &Microphones,
 ) -> Result<Loaded, (usize, String)> {
-    let nominal = Effects::none(setup.gravity_m_s2, restitution);
+    let mut nominal = Effects::none(setup.gravity_m_s2, restitution);
     let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
-    expect_first(&mut drops, &nominal);
+    expect_first(&mut drops, &mut nominal);
     let senseless = |h: &Heard| {
         let label = crate::recording::quoted(&h.label);
         (h.row, format!("times and places of a bouncing ball in run {label}"))
@@ -77,6 +79,7 @@ fn placed(
     let judged =
         judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
     let kappa = judged.spread.kappa;
+    (nominal.heads, nominal.outwards_per_m) = (judged.heads, judged.outwards_per_m);
     let mut model = BounceModel::new(setup, nominal, (judged.spread, judged.plausible), microphones.clone());
     let mut runs = Vec::new();
     for (h, linear) in heard.iter().zip(judged.drops) {
@@ -116,16 +119,17 @@ fn placed(
     Ok(Loaded { recording, model: Box::new(model), experiments, undetermined, impacts: Vec::new() })
 }
 
-/// Where balls are expected to head first. A tilted table, or a hand, may send all of them one way; and a ball that was let go
-/// above one point heads the further out the further out it lands.
-fn expect_first(drops: &mut [Drop], nominal: &Effects) {
-    /// Fewer drops say nothing of it.
-    const FEWEST: usize = 5;
+/// Where balls are expected to land, and to head where their fall is not known: a tilted table, or a hand, may send all of them one
+/// way.
+fn expect_first(drops: &mut [Drop], nominal: &mut Effects) {
     let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.heading(0, nominal)).collect();
     let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
     let mean =
         |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);
     let (usual, middle) = (mean(&headings), mean(&places));
+    if drops.iter().all(|d| d.height_m.is_none()) {
+        nominal.heads = usual;
+    }
     let (mut together, mut square) = (0.0, 0.0);
     for (heading, place) in headings.iter().zip(&places) {
         for k in 0..2 {
@@ -133,14 +137,10 @@ fn expect_first(drops: &mut [Drop], nominal: &Effects) {
             square += (place[k] - middle[k]).powi(2);
         }
     }
-    let slope = if drops.len() >= FEWEST && square > 0.0 { together / square } else { 0.0 };
-    for (drop, place) in drops.iter_mut().zip(&places) {
-        let outwards = [0, 1].map(|k| slope * (place[k] - middle[k]));
-        if drop.height_m.is_some() {
-            drop.came = outwards;
-        } else {
-            drop.usual = [usual[0] + outwards[0], usual[1] + outwards[1]];
-        }
+    // A beginning: places are measured with errors, which makes it too small.
+    nominal.outwards_per_m = if released(drops.len()) && square > 0.0 { together / square } else { 0.0 };
+    for drop in drops {
+        drop.middle_m = middle;
     }
 }
 

@@ -44,24 +44,28 @@ fn fallen(like: &Drop, effects: &Effects, spread: &Spread, rng: &mut impl Rng) -
     let mut drop = like.clone();
     let gravity = effects.gravity_m_s2;
     let hidden = |place: usize| like.unheard.get(place).copied().unwrap_or(0);
+    let usually = like.comes(effects);
     let off = [0, 1].map(|_| spread.came_rad * normal(rng));
     let mut velocity: Velocity = match like.height_m {
         Some(height) => {
             let falls = speed_after_drop(height, gravity, 0.0) * effects.restitution.powi(hidden(0) as i32);
-            let came = [0, 1].map(|k| falls * (like.came[k] + off[k]));
+            let came = [0, 1].map(|k| falls * (usually[k] + off[k]));
             rebound(&[came[0], came[1], -falls], effects, spread, rng)?
         }
         None => {
             let leaves = like.leaves_m_s(effects);
-            let [x, y] = [0, 1].map(|k| like.usual[k] + off[k]);
+            let [x, y] = [0, 1].map(|k| usually[k] + off[k]);
             [leaves * x, leaves * y, leaves * (1.0 - x * x - y * y).max(0.0).sqrt()]
         }
     };
     let mut place = like.places_m.first().copied()?;
     let mut time = like.times_s.first().copied()?;
     for impact in 0..like.times_s.len() {
-        drop.times_s[impact] = time + spread.time_s * normal(rng);
-        drop.places_m[impact] = [0, 1].map(|k| place[k] + spread.place_m[k] * normal(rng));
+        let relative = like.relative(impact);
+        drop.times_s[impact] = time + spread.time_s * relative.time * normal(rng);
+        let [a, b] = [0, 1].map(|_| normal(rng));
+        drop.places_m[impact] = [0, 1]
+            .map(|k| place[k] + spread.place_m[k] * (relative.place[k][0] * a + relative.place[k][1] * b));
         for flight in 0..=hidden(impact + 1) {
             if impact + flight > 0 {
                 let falling = [velocity[0], velocity[1], -velocity[2]];

@@ -15,9 +15,16 @@ pub(super) struct Effects {
     pub(super) drag_per_m: f64,
     /// Slopes dz/dx and dz/dy of the table.
     pub(super) table: [f64; 2],
+    /// Where balls head on average when they first come to the table (or leave it, where their fall is not known), in the
+    /// recording's units of length and time.
+    pub(super) heads: [f64; 2],
+    /// How much farther out they head then for each metre that they land farther out, rad/m.
+    pub(super) outwards_per_m: f64,
     /// Share of the speed along the table that is lost beyond the restitution.
     pub(super) friction: f64,
     pub(super) clock_rate: f64,
+    /// By how much later a sound is heard that is louder by a factor of e, s: no ear finds weak and loud onsets alike.
+    pub(super) walk_s: f64,
     pub(super) position_scale: f64,
     /// 1: flights that hide unheard impacts are taken for what they are; 0: for one flight.
     pub(super) unheard: f64,
@@ -37,8 +44,11 @@ impl Effects {
             slope_s_m: 0.0,
             drag_per_m: 0.0,
             table: [0.0; 2],
+            heads: [0.0; 2],
+            outwards_per_m: 0.0,
             friction: 0.0,
             clock_rate: 0.0,
+            walk_s: 0.0,
             position_scale: 0.0,
             unheard: 0.0,
             terms: [0.0; 3],
@@ -69,6 +79,19 @@ pub(super) enum Measured {
     Came(usize),
 }
 
+/// How far off an impact may be, beside a typical one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Relative {
+    /// Its time.
+    pub(super) time: f64,
+    /// Its place: the lower triangular root of its covariance.
+    pub(super) place: [[f64; 2]; 2],
+}
+
+impl Relative {
+    pub(super) const TYPICAL: Self = Self { time: 1.0, place: [[1.0, 0.0], [0.0, 1.0]] };
+}
+
 /// A drop: when and where the ball was heard.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Drop {
@@ -77,11 +100,15 @@ pub(super) struct Drop {
     pub(super) places_m: Vec<[f64; 2]>,
     /// Height from which it fell to the first impact that was heard, where it is known.
     pub(super) height_m: Option<f64>,
-    /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known), in
-    /// the recording's units of length and time.
+    /// Logarithm of each impact's loudness; empty where it was not heard.
+    pub(super) loudness: Vec<f64>,
+    /// How far off each impact may be; empty where all are alike.
+    pub(super) relative: Vec<Relative>,
+    /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known),
+    /// beyond what balls do on average that land where it did.
     pub(super) came: [f64; 2],
-    /// Where balls head on average after the first impact, where their fall is not known.
-    pub(super) usual: [f64; 2],
+    /// Where balls land on average.
+    pub(super) middle_m: [f64; 2],
     /// When each microphone heard each impact, s; empty where there are fewer than four.
     pub(super) arrivals_s: Vec<Vec<f64>>,
     /// How many impacts went unheard before the first one heard (only with a known height) and within each flight.
@@ -189,9 +216,26 @@ impl Drop {
         self.places_m.get(impact).copied().unwrap_or_default()
     }
 
+    /// How far off an impact may be.
+    pub(super) fn relative(&self, impact: usize) -> Relative {
+        self.relative.get(impact).copied().unwrap_or(Relative::TYPICAL)
+    }
+
+    /// Where it headed when it first came.
+    pub(super) fn comes(&self, effects: &Effects) -> [f64; 2] {
+        let place = self.place(0);
+        [0, 1]
+            .map(|k| self.came[k] + effects.heads[k] + effects.outwards_per_m * (place[k] - self.middle_m[k]))
+    }
+
     /// The flight from one impact to the next as the effects see it, or the part of it beside an unheard impact.
     fn flight(&self, index: usize, effects: &Effects, unheard: usize, part: Part) -> (Velocity, Velocity) {
-        let whole = (self.times_s[index + 1] - self.times_s[index]) / (1.0 + effects.clock_rate);
+        let louder = match (self.loudness.get(index), self.loudness.get(index + 1)) {
+            (Some(then), Some(now)) => now - then,
+            _ => 0.0,
+        };
+        let heard = self.times_s[index + 1] - self.times_s[index] - effects.walk_s * louder;
+        let whole = heard / (1.0 + effects.clock_rate);
         let duration_s = match (unheard, part) {
             (0, _) => whole,
             (m, Part::First) => parts(whole, m, effects.restitution).0,
@@ -216,7 +260,8 @@ impl Drop {
         let mut before: Option<Velocity> = self.height_m.map(|height| {
             let speed = speed_after_drop(height, effects.gravity_m_s2, effects.drag_per_m);
             let speed = speed * effects.restitution.powi(hidden(0) as i32);
-            [speed * self.came[0] / angles, speed * self.came[1] / angles, -speed]
+            let [x, y] = self.comes(effects);
+            [speed * x / angles, speed * y / angles, -speed]
         });
         let mut at = 0;
         for impact in 0..self.times_s.len() - 1 {
@@ -235,8 +280,8 @@ impl Drop {
                 values.iter().enumerate().for_each(|(c, v)| out[self.row(at, c)] = *v);
                 at += 1;
             } else if self.lead() > 0 {
-                let now = heading(&after);
-                (0..2).for_each(|k| out[k] = angles * now[k] - self.usual[k] - self.came[k]);
+                let (now, came) = (heading(&after), self.comes(effects));
+                (0..2).for_each(|k| out[k] = angles * now[k] - came[k]);
             }
             before = Some(landing);
         }

@@ -71,6 +71,8 @@ impl Domain for Bounce {
             drag_unit: Some(0.1),
             placed: true,
             dropped: true,
+            released: false,
+            listened: false,
             unheard: [1, 10],
             microphones: 4,
         };
@@ -89,13 +91,15 @@ impl Domain for Bounce {
         let rig = Rig::read(header)?;
         let noise = header.section("noise")?;
         let sigma = |name: &str| noise.number(name, f64::MIN_POSITIVE, 1e3);
-        let known = Known { time_s: sigma("t_s")?, place_m: [sigma("x_m")?, sigma("y_m")?] };
+        let known = Known { time_s: sigma("t_s")?, place_m: [sigma("x_m")?, sigma("y_m")?], said: None };
         if let Some(listened) = sound::listen(header, &rig)? {
+            let known = Known { said: listened.said, ..known };
             let impacts = sound::impacts(&listened.heard);
             let unfit = |(_, expected): (usize, String)| header.root().unfit("audio", "sound", expected);
             let mut loaded =
                 assemble::assemble(listened.heard, &rig, known, &listened.microphones).map_err(unfit)?;
             loaded.impacts = impacts;
+            loaded.undetermined.extend(listened.strays);
             if listened.microphones.places_m.len() == 3 {
                 loaded.undetermined.push(THREE_MICROPHONES.into());
             }

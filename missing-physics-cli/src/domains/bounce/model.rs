@@ -11,7 +11,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use super::array::{Microphones, Wrong};
 use super::chance::errors_by_chance;
 use super::drop::{Drop, Effects, PER_IMPACT};
-use super::spec::{Places, build};
+use super::spec::{Places, build, hand};
 use super::weights::{Linear, Spread, Weights};
 use crate::domains::builder::At;
 
@@ -25,6 +25,10 @@ pub(super) struct Setup {
     pub(super) placed: bool,
     /// Whether the height of the drop is known.
     pub(super) dropped: bool,
+    /// Whether there are drops enough to say how a hand lets go of balls.
+    pub(super) released: bool,
+    /// Whether the impacts come from sound, with their loudness.
+    pub(super) listened: bool,
     /// Runs in which an impact went unheard, and runs.
     pub(super) unheard: [usize; 2],
     /// Microphones whose places are known.
@@ -66,7 +70,13 @@ impl BounceModel {
         (spread, plausible): (Spread, Vec<Spread>),
         microphones: Microphones,
     ) -> Self {
-        let (builder, places) = build(&setup, nominal.restitution);
+        let (mut builder, mut places) = build(&setup, nominal.restitution);
+        if setup.dropped && setup.released {
+            places.hand = Some(hand(&mut builder, &nominal));
+        }
+        if setup.listened {
+            places.walk = Some(builder.shared("onset_walk_s", "s", 0.0, [-1e-4, 1e-4], 1e-6));
+        }
         Self {
             setup,
             spec: builder.spec,
@@ -170,6 +180,9 @@ impl BounceModel {
             slope_s_m: shared[p.slope.slot],
             drag_per_m: shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0),
             table: p.table.map_or([0.0; 2], |t| t.map(|t| shared[t.slot])),
+            walk_s: at(p.walk),
+            heads: p.hand.map_or(self.nominal.heads, |[x, y, _]| [shared[x.slot], shared[y.slot]]),
+            outwards_per_m: p.hand.map_or(self.nominal.outwards_per_m, |[.., out]| shared[out.slot]),
             friction: at(p.friction),
             clock_rate: at(p.clock),
             position_scale: at(p.position),

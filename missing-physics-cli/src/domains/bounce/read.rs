@@ -74,11 +74,9 @@ pub(super) fn heard(table: &Table, rig: &Rig) -> Result<Vec<Heard>, ReadError> {
             times_s: rows.iter().map(|&r| times[r]).collect(),
             places_m: places.map(|(x, y)| rows.iter().map(|&r| [x[r], y[r]]).collect()).unwrap_or_default(),
             height_m: rig.drop_height_m,
-            came: [0.0; 2],
-            usual: [0.0; 2],
-            arrivals_s: Vec::new(),
             unheard: known.clone(),
             known,
+            ..Drop::default()
         };
         let numbers = rows.iter().map(|&r| numbers[r]).collect();
         all.push(Heard { label, row: rows[0], drop, numbers });

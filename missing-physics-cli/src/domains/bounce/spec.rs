@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use missing_physics::model::{Derived, Quantity, Term};
 
+use super::drop::Effects;
 use super::model::Setup;
 use crate::domains::builder::{At, Builder};
 
@@ -15,9 +16,14 @@ pub(super) struct Places {
     pub(super) drag: At,
     pub(super) table: Option<[At; 2]>,
     pub(super) friction: Option<At>,
+    /// Where balls head on average when they first come to the table, and how much farther out for each metre that they land
+    /// farther out.
+    pub(super) hand: Option<[At; 3]>,
     pub(super) clock: Option<At>,
     pub(super) position: Option<At>,
     pub(super) unheard: Option<At>,
+    /// By how much later a louder sound is heard.
+    pub(super) walk: Option<At>,
     /// Offsets along x and y of a microphone, and which it is.
     pub(super) microphone: Option<[At; 3]>,
     /// Candidate terms of an unknown law: linear in x and y, and in the speed squared.
@@ -95,6 +101,16 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
     }
     terms(&mut b, &mut p, setup.placed);
     (b, p)
+}
+
+/// How a hand lets go of balls whose height is known: nobody states that it gives them no velocity of its own.
+pub(super) fn hand(b: &mut Builder, nominal: &Effects) -> [At; 3] {
+    let [x, y] = nominal.heads;
+    [
+        b.shared("heads_x_rad", "rad", x, [-1.0, 1.0], 0.005),
+        b.shared("heads_y_rad", "rad", y, [-1.0, 1.0], 0.005),
+        b.shared("outwards_rad_m", "rad/m", nominal.outwards_per_m, [-50.0, 50.0], 0.1),
+    ]
 }
 
 fn air_and_speed(b: &mut Builder, p: &mut Places, setup: &Setup) {

@@ -15,6 +15,20 @@ use super::weights::{Linear, Spread};
 pub(super) struct Known {
     pub(super) time_s: Option<f64>,
     pub(super) place_m: [Option<f64>; 2],
+    /// What the ear says of its own sigmas, of times and of places: right to a factor.
+    pub(super) said: Option<[f64; 2]>,
+}
+
+impl Known {
+    /// Minus twice the logarithm of what the ear's word makes of a spread.
+    fn doubt(&self, spread: &Spread) -> f64 {
+        /// One sigma of the factor's logarithm, on sounds with echoes and without.
+        const FACTOR: f64 = 0.5;
+        self.said.map_or(0.0, |[time, place]| {
+            let off = [spread.time_s / time, spread.place_m[0] / place].map(|factor| factor.ln() / FACTOR);
+            off[0] * off[0] + off[1] * off[1]
+        })
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -26,15 +40,37 @@ enum Unknown {
     Came,
 }
 
+type Change = fn(&mut Effects, f64);
+
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
 /// only about the likely drop.
-const NUISANCES: [fn(&mut Effects, f64); 5] = [
+///
+/// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
+/// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
+/// take for a smaller slope.
+const NUISANCES: [Change; 9] = [
     |e, d| e.restitution += d,
     |e, d| e.slope_s_m += d,
     |e, d| e.drag_per_m += d,
     |e, d| e.table[0] += d,
     |e, d| e.table[1] += d,
+    |e, d| e.walk_s += d,
+    |e, d| e.heads[0] += d,
+    |e, d| e.heads[1] += d,
+    |e, d| e.outwards_per_m += d,
 ];
+/// Of the nuisances, those of the hand come last.
+const OF_THE_HAND: usize = 3;
+
+/// Whether there are drops enough to say how a hand lets go of balls.
+pub(super) const fn released(drops: usize) -> bool {
+    drops >= 5
+}
+
+fn nuisances(drops: usize) -> &'static [Change] {
+    let known = if released(drops) { 0 } else { OF_THE_HAND };
+    &NUISANCES[..NUISANCES.len() - known]
+}
 
 /// Restricted likelihood (Patterson and Thompson 1971, doi:10.1093/biomet/58.3.545) of the sigmas that are not known.
 #[derive(Clone, Copy)]
@@ -113,7 +149,7 @@ impl Likelihood<'_> {
 
     /// Minus twice the logarithm, up to a constant, and the nuisances' best values.
     fn value(&self, spread: &Spread) -> Option<(f64, DVector<f64>)> {
-        let columns = NUISANCES.len();
+        let columns = nuisances(self.drops.len()).len();
         let (mut total, mut squares) = (0.0, 0.0);
         let mut normal = DMatrix::identity(columns, columns) * 1e-9;
         let mut pull = DVector::zeros(columns);
@@ -132,7 +168,8 @@ impl Likelihood<'_> {
         let lower = factor.l_dirty();
         let determinant: f64 = (0..columns).map(|i| lower[(i, i)].ln()).sum();
         let best = factor.solve(&pull);
-        Some((total + squares - pull.dot(&best) + 2.0 * determinant, -best))
+        let doubt = self.known.doubt(spread);
+        Some((total + squares - pull.dot(&best) + 2.0 * determinant + doubt, -best))
     }
 }
 
@@ -156,6 +193,9 @@ pub(super) struct Judged {
     pub(super) plausible: Vec<Spread>,
     /// Each drop about its likely course.
     pub(super) drops: Vec<Linear>,
+    /// How a hand lets go of them ([`Effects::heads`], [`Effects::outwards_per_m`]).
+    pub(super) heads: [f64; 2],
+    pub(super) outwards_per_m: f64,
 }
 
 /// How many plausible spreads are drawn.
@@ -164,35 +204,39 @@ const PLAUSIBLE: usize = 16;
 /// The spread of all drops and each drop about its likely course; `None` where a drop makes no sense.
 pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<Judged> {
     let [x, y] = known.place_m;
+    let [time_s, place_m] = known.said.unwrap_or([1e-4, 5e-3]);
     let mut spread = Spread {
-        time_s: known.time_s.unwrap_or(1e-4),
-        place_m: [x.or(y).unwrap_or(5e-3), y.or(x).unwrap_or(5e-3)],
+        time_s: known.time_s.unwrap_or(time_s),
+        place_m: [x.or(y).unwrap_or(place_m), y.or(x).unwrap_or(place_m)],
         kappa: 3e3,
         came_rad: 0.03,
         restitution: if known.time_s.is_some() { 0.0 } else { 1e-3 },
     };
     let mut plausible = vec![spread; PLAUSIBLE];
+    let mut begin = *effects;
     let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::about_straight(d, effects)).collect();
     for _ in 0..ROUNDS {
-        let parts: Vec<_> = linear.iter().map(|l| with_design(l, effects)).collect();
+        let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, drops.len())).collect();
         let likelihood = Likelihood { drops: &parts, known, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);
         let (_, moved) = likelihood.value(&spread)?;
         plausible = Likelihood { start: spread, ..likelihood }.plausible();
-        let mut likely = *effects;
-        NUISANCES.iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
+        let mut likely = begin;
+        nuisances(drops.len()).iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
         likely.friction = 0.0;
         likely.drag_per_m = likely.drag_per_m.max(0.0);
+        (begin.heads, begin.outwards_per_m) = (likely.heads, likely.outwards_per_m);
         linear = linear.iter().map(|l| l.likely(&likely, &spread)).collect::<Option<_>>()?;
     }
-    Some(Judged { spread, plausible, drops: linear })
+    let Effects { heads, outwards_per_m, .. } = begin;
+    Some(Judged { spread, plausible, drops: linear, heads, outwards_per_m })
 }
 
 /// A drop with its errors and what the nuisances make of them.
-fn with_design(linear: &Linear, effects: &Effects) -> (Linear, DVector<f64>, DMatrix<f64>) {
+fn with_design(linear: &Linear, effects: &Effects, drops: usize) -> (Linear, DVector<f64>, DMatrix<f64>) {
     const STEP: f64 = 1e-4;
     let errors = linear.errors(effects);
-    let columns: Vec<DVector<f64>> = NUISANCES
+    let columns: Vec<DVector<f64>> = nuisances(drops)
         .iter()
         .map(|change| {
             let mut moved = *effects;

@@ -81,23 +81,27 @@ impl Linear {
         out + &self.curved
     }
 
-    /// Sigma of each measured value.
-    fn sigmas(&self, spread: &Spread) -> DVector<f64> {
-        DVector::from_fn(self.drop.measured(), |i, _| match self.drop.quantity(i) {
-            Measured::Time(_) => spread.time_s,
-            Measured::Place(_, axis) => spread.place_m[axis],
-            Measured::Came(_) => spread.came_rad,
-        })
+    /// Takes independent standard normal values to errors of the measured values.
+    fn root(&self, spread: &Spread) -> DMatrix<f64> {
+        let n = self.drop.measured();
+        let mut root = DMatrix::zeros(n, n);
+        for i in 0..n {
+            match self.drop.quantity(i) {
+                Measured::Time(k) => root[(i, i)] = spread.time_s * self.drop.relative(k).time,
+                Measured::Place(k, axis) => (0..=axis).for_each(|j| {
+                    root[(i, i - axis + j)] = spread.place_m[axis] * self.drop.relative(k).place[axis][j];
+                }),
+                Measured::Came(_) => root[(i, i)] = spread.came_rad,
+            }
+        }
+        root
     }
 
-    /// Derivatives of the errors with respect to the measured values, each in units of its sigma.
+    /// Derivatives of the errors with respect to those independent values.
     fn scaled(&self, spread: &Spread, friction: f64) -> DMatrix<f64> {
         let [free, change] = &self.sensitivity;
-        let mut scaled = if friction == 0.0 { free.clone() } else { free + change * friction };
-        for (mut column, sigma) in scaled.column_iter_mut().zip(self.sigmas(spread).iter()) {
-            column *= *sigma;
-        }
-        scaled
+        let root = self.root(spread);
+        if friction == 0.0 { free * root } else { (free + change * friction) * root }
     }
 
     /// Covariance of the errors, factored.
@@ -140,14 +144,11 @@ impl Linear {
     /// The same about the likely drop: the one whose errors are as small as they should be. `None` where it makes no sense.
     pub(super) fn likely(&self, effects: &Effects, spread: &Spread) -> Option<Self> {
         let effects = Effects { friction: 0.0, ..*effects };
-        let sigmas = self.sigmas(spread);
         let (told, factor) = self.telling(spread)?;
         let errors = self.errors(&effects).rows(0, told.nrows()).into_owned();
-        let pulled = told.tr_mul(&factor.solve(&errors));
+        let pulled = self.root(spread) * told.tr_mul(&factor.solve(&errors));
         let mut drop = self.measured.clone();
-        for (i, (pull, sigma)) in pulled.iter().zip(sigmas.iter()).enumerate() {
-            drop.nudge(i, -pull * sigma);
-        }
+        pulled.iter().enumerate().for_each(|(i, pull)| drop.nudge(i, -pull));
         if drop.times_s.windows(2).any(|w| w[1] <= w[0]) {
             return None;
         }
@@ -164,13 +165,11 @@ impl Linear {
         factor.l_dirty().solve_lower_triangular_mut(&mut told).then_some(())?;
         let n = told.ncols();
         let eigen = SymmetricEigen::new(DMatrix::identity(n, n) - told.tr_mul(&told));
-        let sigmas = self.sigmas(spread);
+        let root = self.root(spread);
         // Steps of half a sigma keep times in their order.
         const STEP: f64 = 0.5;
         let axes: Vec<DVector<f64>> = (0..n)
-            .map(|k| {
-                eigen.eigenvectors.column(k).component_mul(&sigmas) * eigen.eigenvalues[k].max(0.0).sqrt()
-            })
+            .map(|k| &root * eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt())
             .collect();
         let rows = self.curved.len();
         let at = |step: &DVector<f64>| {

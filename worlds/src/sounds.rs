@@ -1,0 +1,205 @@
+//! Bouncing balls with concealed effects, as microphones around the table record them.
+
+use std::fmt::Write as _;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::GRAVITY_M_S2;
+use crate::bounce::BounceWorld;
+use crate::bounces::{LISTED, listed};
+use crate::concealed::draw::{between, choose, log_between, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker};
+use crate::sound::{Room, Voice, add_noise, wav};
+
+/// The domain `bounce`, from sound.
+#[derive(Debug, Clone, Copy)]
+pub struct Sounds;
+
+/// Of what a [`BounceWorld`] can hide, a fast clock is no effect of its own here: it is a wrong speed of sound as well.
+const CLOCK: usize = 4;
+const SCALE: usize = 5;
+/// Only of sounds.
+const MICROPHONE: usize = LISTED;
+
+impl Maker for Sounds {
+    fn domain(&self) -> &'static str {
+        "bounce"
+    }
+
+    fn name(&self) -> &'static str {
+        "bounce-audio"
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let mut world = SoundWorld::new(&mut rng);
+        let what: Vec<usize> = (0..=MICROPHONE).filter(|&which| which != CLOCK).collect();
+        for which in choose(&mut rng, what.len(), hidden.listed()).into_iter().map(|k| what[k]) {
+            world.hide(which, &mut key, &mut rng);
+        }
+        if hidden == Hidden::Unlisted {
+            world.ball.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
+            key.unlisted = Some("a table that is softer on one side".into());
+        }
+        let (files, unheard) = world.files(&mut rng);
+        // The format asks for the share of these very runs.
+        let share = unheard as f64 / world.ball.runs as f64;
+        key.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact").for_each(|p| p.value = share);
+        Concealed { files, key }
+    }
+}
+
+/// Height of the microphones above the table, m.
+const HEIGHT_M: f64 = 0.0762;
+/// Corners of the table about which they stand, m.
+const SIDE_M: f64 = 0.55;
+
+/// A ball, a room, and what is stated of it.
+struct SoundWorld {
+    ball: BounceWorld,
+    room: Room,
+    stated_m: Vec<[f64; 3]>,
+    stated_k: f64,
+    rate_hz: u32,
+    /// Of the quietest impact's first 5 ms at half a metre, dB.
+    snr_db: f64,
+    /// Clicks from elsewhere in a run, on average.
+    clicks: f64,
+}
+
+impl SoundWorld {
+    fn new(rng: &mut ChaCha8Rng) -> Self {
+        let ball = BounceWorld {
+            runs: whole(rng, 6, 14),
+            impacts: whole(rng, 4, 6),
+            height_m: between(rng, 0.08, 0.35),
+            height_known: whole(rng, 0, 1) == 1,
+            restitution: between(rng, 0.7, 0.88),
+            kappa: log_between(rng, 1e3, 3e4),
+            noise: [0.0; 2],
+            dead_from_m: 0.5 * SIDE_M,
+            ..BounceWorld::drops()
+        };
+        let stated_k = between(rng, 285.0, 303.0);
+        let rate_hz = [22_050, 44_100, 48_000][whole(rng, 0, 2)];
+        let size_m = [between(rng, 3.5, 5.5), between(rng, 4.0, 6.0), between(rng, 2.4, 3.0)];
+        let room = Room {
+            size_m,
+            table_m: [0.35 * size_m[0], 0.4 * size_m[1], 0.72],
+            rt60_s: between(rng, 0.15, 0.45),
+            speed_m_s: 331.3 * (stated_k / 273.15).sqrt(),
+            rate_hz: f64::from(rate_hz),
+            microphones_m: Vec::new(),
+        };
+        let (snr_db, clicks) = (between(rng, 14.0, 26.0), 0.2);
+        let mut world = Self { ball, room, stated_m: Vec::new(), stated_k, rate_hz, snr_db, clicks };
+        let four = whole(rng, 0, 1) == 1;
+        world.place_microphones(four, rng);
+        world
+    }
+
+    /// To a millimetre, as people measure them.
+    fn place_microphones(&mut self, four: bool, rng: &mut ChaCha8Rng) {
+        let corners: &[[f64; 2]] = if four {
+            &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+        } else {
+            &[[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]
+        };
+        let mut at = |share: f64| (1e3 * (share * SIDE_M + between(rng, -0.025, 0.025))).round() / 1e3;
+        self.stated_m = corners.iter().map(|[x, y]| [at(*x), at(*y), HEIGHT_M]).collect();
+        self.room.microphones_m = self.stated_m.clone();
+    }
+
+    fn hide(&mut self, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
+        if which < SCALE || which + 1 == LISTED {
+            return listed(&mut self.ball, which, key, rng);
+        }
+        // A fourth microphone shows what three cannot.
+        if self.stated_m.len() < 4 {
+            self.place_microphones(true, rng);
+        }
+        if which == SCALE {
+            listed(&mut self.ball, which, key, rng);
+            // It is heard, not added to places.
+            self.room.speed_m_s /= 1.0 + std::mem::take(&mut self.ball.effects.position_scale);
+        } else {
+            let (size, turn) = (log_between(rng, 0.003, 0.03), between(rng, 0.0, std::f64::consts::TAU));
+            let (microphone, offset) = (whole(rng, 0, 3), [size * turn.cos(), size * turn.sin()]);
+            for (stands, by) in self.room.microphones_m[microphone].iter_mut().zip(offset) {
+                *stands += by;
+            }
+            let [x, y] = offset;
+            key.add("microphone-offset", &[("offset_m", size), ("offset_x_m", x), ("offset_y_m", y)]);
+        }
+    }
+
+    /// The files, and in how many of them an impact cannot be heard.
+    fn files(&self, rng: &mut ChaCha8Rng) -> (Vec<(String, Vec<u8>)>, usize) {
+        let voice = Voice::new(0.42 * self.room.rate_hz.min(22e3), rng);
+        let mut unheard = 0;
+        let mut files = Vec::new();
+        for run in 0..self.ball.runs {
+            let silent = (rng.random::<f64>() < self.ball.effects.unheard)
+                .then(|| rng.random_range(1..self.ball.impacts.max(3) - 1));
+            unheard += usize::from(silent.is_some());
+            files.push((format!("drop-{run:02}.wav"), self.sound(&voice, silent, rng)));
+        }
+        let names: Vec<String> = files.iter().map(|(name, _)| format!("{name:?}")).collect();
+        let mut header = format!(
+            "format = 1\ndomain = \"bounce\"\n\n[audio]\nfiles = [{}]\nmicrophones_m = {:?}\ntemperature_k = {}\n",
+            names.join(", "),
+            self.stated_m,
+            self.stated_k
+        );
+        if self.ball.height_known {
+            let _ = write!(header, "\n[rig]\ndrop_height_m = {}\n", self.ball.height_m);
+        }
+        files.insert(0, ("recording.toml".into(), header.into_bytes()));
+        (files, unheard)
+    }
+
+    /// One run; an impact of this number makes no sound.
+    fn sound(&self, voice: &Voice, silent: Option<usize>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+        let from = [between(rng, 0.25, 0.75) * SIDE_M, between(rng, 0.25, 0.75) * SIDE_M];
+        let height = self.ball.height_m * if self.ball.height_known { 1.0 } else { between(rng, 0.7, 1.3) };
+        let impacts = self.ball.impacts + usize::from(silent.is_some());
+        let mut events = self.ball.drop(from, height, 0.0..1e-3, impacts, rng);
+        let early = events[0][0] - between(rng, 0.03, 0.12);
+        events.iter_mut().for_each(|e| e[0] -= early);
+        let last = events.last().map_or(0.0, |e| e[0]);
+        let length = ((last + 0.15) * self.room.rate_hz) as usize;
+        let mut channels = vec![vec![0.0; length]; self.stated_m.len()];
+        let mut speed = (2.0 * GRAVITY_M_S2 * height).sqrt();
+        let mut loudness = 0.0;
+        for (number, [t, x, y]) in events.iter().enumerate() {
+            if let Some(next) = events.get(number + 1).filter(|_| number > 0) {
+                speed = 0.5 * GRAVITY_M_S2 * (next[0] - t) / self.ball.restitution;
+            }
+            if Some(number) != silent {
+                let burst = voice.struck(speed, self.room.rate_hz, rng);
+                loudness = burst.loudness();
+                let z = self.ball.effects.table[0] * x + self.ball.effects.table[1] * y;
+                self.room.play(&burst, [*x, *y, z], *t, rng, &mut channels);
+            }
+        }
+        if rng.random::<f64>() < self.clicks {
+            self.click(&events, rng, &mut channels);
+        }
+        let sigma = 2.0 * loudness * 10f64.powf(-self.snr_db / 20.0);
+        add_noise(sigma, self.room.rate_hz, rng, &mut channels);
+        wav(&channels, self.rate_hz, between(rng, 0.3, 0.9))
+    }
+
+    /// A sound from elsewhere in the room, between two impacts.
+    fn click(&self, events: &[[f64; 3]], rng: &mut ChaCha8Rng, channels: &mut [Vec<f64>]) {
+        let (turn, away) = (between(rng, 0.0, std::f64::consts::TAU), between(rng, 1.2, 1.4));
+        let place =
+            [0.5 * SIDE_M + away * turn.cos(), 0.5 * SIDE_M + away * turn.sin(), between(rng, 0.2, 1.0)];
+        let gap = whole(rng, 0, events.len() - 2);
+        let t = events[gap][0] + between(rng, 0.35, 0.65) * (events[gap + 1][0] - events[gap][0]);
+        let burst = Voice::new(0.42 * self.room.rate_hz.min(22e3), rng).struck(1.0, self.room.rate_hz, rng);
+        self.room.play(&burst, place, t, rng, channels);
+    }
+}
