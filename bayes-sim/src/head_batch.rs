@@ -1,4 +1,5 @@
 //! The loss of [`Head`] and its derivative for a batch at a time, one unit's values side by side: what training spends its time on.
+#![allow(clippy::needless_range_loop, reason = "a lane of several arrays at once")]
 
 use pulp::Arch;
 

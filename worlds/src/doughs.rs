@@ -389,8 +389,13 @@ mod tests {
         let mut inside = 0;
         for seed in 0..24 {
             let world = Doughs.conceal(Hidden::One, seed);
-            let file =
-                |name: &str| world.files.iter().find(|(n, _)| n == name).map(|(_, text)| text.as_str());
+            let file = |name: &str| {
+                world
+                    .files
+                    .iter()
+                    .find(|(n, _)| n == name)
+                    .map(|(_, text)| std::str::from_utf8(text).unwrap())
+            };
             let header = file("recording.toml").unwrap();
             assert_eq!(header.contains("training"), file("train.csv").is_some());
             let table = file("train.csv").or(file("data.csv")).unwrap();

@@ -116,7 +116,7 @@ pub(crate) fn conceal<S: SetUp>(hidden: Hidden, seed: u64) -> Concealed {
     let beside = set_up.beside(&mut rng);
     let [header, data] = set_up.files(effects, &mut rng);
     let mut concealed = Concealed::table(header, data, key);
-    concealed.files.extend(beside);
+    concealed.files.extend(beside.into_iter().map(|(name, text)| (name, text.into_bytes())));
     concealed
 }
 

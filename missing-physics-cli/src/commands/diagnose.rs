@@ -68,16 +68,16 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
         impacts: loaded.impacts,
     };
     if let Some(path) = &arguments.json {
-        write_whole(path, &report::json(&diagnosis, &context))?;
+        write_whole(path, report::json(&diagnosis, &context))?;
     }
     if let Some(path) = &arguments.html {
-        write_whole(path, &report::html(&diagnosis, &context))?;
+        write_whole(path, report::html(&diagnosis, &context))?;
     }
     if let Some(path) = &arguments.svg {
-        write_whole(path, &report::picture(&diagnosis))?;
+        write_whole(path, report::picture(&diagnosis))?;
     }
     if let Some(path) = &arguments.model {
-        write_whole(path, &Repair::new(domain, &diagnosis).to_json())?;
+        write_whole(path, Repair::new(domain, &diagnosis).to_json())?;
     }
     Ok(report::text(&diagnosis, &context))
 }

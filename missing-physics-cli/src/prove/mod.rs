@@ -115,13 +115,13 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
     begin(&arguments.folder, &plan)?;
     each(&pool, &worlds, "diagnosing", observer, World::diagnose)?;
     // Only now are the answers opened.
-    write_whole(&arguments.folder.join("keys.jsonl"), &keys.concat())?;
+    write_whole(&arguments.folder.join("keys.jsonl"), keys.concat())?;
     each(&pool, &worlds, "fitting the truth", observer, World::tell_truth)?;
     let judged = worlds.iter().map(World::judged).collect::<Result<Vec<_>, _>>()?;
     let score = Score::of(&plan.domains, &judged);
     let folder = &arguments.folder;
-    write_whole(&folder.join("score.json"), &score.to_json(&plan.seal, plan.seed, plan.worlds))?;
-    write_whole(&folder.join("score.html"), &page::page(&score, &judged, &plan.seal, plan.seed))?;
+    write_whole(&folder.join("score.json"), score.to_json(&plan.seal, plan.seed, plan.worlds))?;
+    write_whole(&folder.join("score.html"), page::page(&score, &judged, &plan.seal, plan.seed))?;
     Ok(format!(
         "{} worlds of each domain, seed {}; answers sealed as {}\n\n{}\n{}: ten worlds with their reports, the matrix and the power curves\n",
         plan.worlds,

@@ -128,8 +128,8 @@ impl World {
             title: self.name.clone(),
             impacts: loaded.impacts,
         };
-        write_whole(&self.folder.join("answer.json"), &report::json(&found, &context))?;
-        write_whole(&self.folder.join("report.html"), &report::html(&found, &context))?;
+        write_whole(&self.folder.join("answer.json"), report::json(&found, &context))?;
+        write_whole(&self.folder.join("report.html"), report::html(&found, &context))?;
         write(&path, &Outcome::of(&found, &loaded.recording, seconds))
     }
 
