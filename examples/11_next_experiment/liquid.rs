@@ -108,7 +108,7 @@ impl Rig for Liquid {
             rate_rad_s: 0.3,
             settle_s: 20.0,
             patience_s: 20.0,
-            readings: 2000,
+            readings: 100,
         };
         let mut rows = String::new();
         for pose in run(&mut wrist, &programme)? {
