@@ -24,6 +24,8 @@ struct Normals {
     binned: Vec<DMatrix<f64>>,
     /// The other channels' rows.
     others: DMatrix<f64>,
+    /// All rows, where nothing departs.
+    whole: DMatrix<f64>,
 }
 
 /// A channel along one variable.
@@ -105,11 +107,8 @@ impl Scan {
     /// Fits the linearised baseline to the rows outside the bins: sum of squares there, and each run's coefficients.
     fn outside(&self, (from, to): (usize, usize)) -> (f64, Vec<Vec<f64>>) {
         let gram = |run: &Normals| {
-            let mut gram = run.others.clone();
-            for (_, g) in run.binned.iter().enumerate().filter(|(b, _)| *b < from || *b >= to) {
-                gram += g;
-            }
-            gram
+            let others = run.others.clone();
+            run.binned[..from].iter().chain(&run.binned[to..]).fold(others, |sum, g| sum + g)
         };
         solve(self.normals.iter().map(gram), self.n_own, self.n_shared)
     }
@@ -117,18 +116,13 @@ impl Scan {
     /// Fits the linearised baseline and a smooth departure inside the bins to all rows: sum of squares.
     fn departing(&self, (from, to): (usize, usize)) -> f64 {
         let first = self.n_own + self.n_shared;
+        let last = first + SMOOTH;
         let gram = |run: &Normals| {
-            let mut gram = run.others.clone();
-            for (b, g) in run.binned.iter().enumerate() {
-                if b >= from && b < to {
-                    gram += g;
-                    continue;
-                }
-                let known = || (0..g.ncols()).filter(|k| !(first..first + SMOOTH).contains(k));
-                for column in known() {
-                    for row in known().filter(|row| *row >= column) {
-                        gram[(row, column)] += g[(row, column)];
-                    }
+            let mut gram = run.whole.clone();
+            for g in &run.binned[from..to] {
+                for ((row, column), size) in [((first, 0), (SMOOTH, last)), ((last, first), (1, SMOOTH))] {
+                    let mut block = gram.view_mut((row, column), size);
+                    block += g.view((row, column), size);
                 }
             }
             gram
@@ -303,7 +297,11 @@ fn normals(
                 k += 1;
             }
         }
-        Normals { binned, others }
+        let mut whole = binned.iter().fold(others.clone(), |sum, g| sum + g);
+        let known = columns.len() - 1;
+        whole.rows_mut(known, SMOOTH).fill(0.0);
+        whole.columns_mut(known, SMOOTH).fill(0.0);
+        Normals { binned, others, whole }
     };
     columns.iter().enumerate().map(of_run).collect()
 }
