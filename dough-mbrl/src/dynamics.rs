@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use crate::features::Polynomial;
 use crate::filter::{Noise, Step};
 use crate::learning::{Learned, learn};
-use crate::sensitivity::{OWN, sensitivity};
+use crate::sensitivity::{COURSES, OWN, sensitivity};
 
 /// Length, width and height of a dough, m.
 pub type State = [f64; 3];
@@ -18,6 +18,8 @@ pub type Action = [f64; 2];
 /// Degree of the polynomial, and of its remainder.
 const DEGREE: u8 = 2;
 const REMAINDER: u8 = 4;
+/// By which part a roll is held to do more or less before anything is learned.
+const SCATTER: f64 = 0.01;
 
 /// One roll as it was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,12 +143,28 @@ impl Surface {
     }
 }
 
+/// Variances of what each dough does for itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Own {
+    /// Of each course ([`courses`](crate::sensitivity::courses)) along its rolls, by dimension, m^2.
+    pub courses: Vector3<f64>,
+    /// Of the part by which all its rolls do more or less.
+    pub softness: f64,
+}
+
+impl Own {
+    /// Of one of the [`OWN`] columns.
+    pub(crate) fn of(&self, column: usize) -> f64 {
+        if column < 3 * COURSES { self.courses[column % 3] } else { self.softness }
+    }
+}
+
 /// Learned dynamics.
 #[derive(Debug, Clone)]
 pub struct Dynamics {
     surface: Surface,
     noise: Noise,
-    own: Vector3<f64>,
+    own: Own,
     precision: Cholesky<f64, Dyn>,
 }
 
@@ -163,7 +181,7 @@ impl Dynamics {
         let rolls: Vec<&Roll> = doughs.iter().flatten().collect();
         let surface = Surface::measured(&rolls)?;
         let measured = twice_measured(doughs, &surface.left);
-        let noise = Noise { measured, process: 0.1 * measured[1] };
+        let noise = Noise { measured, process: 0.1 * measured[1], scatter: SCATTER.powi(2) };
         let Learned { surface, noise, own, precision } = learn(doughs, surface, noise)?;
         Ok(Self { surface, noise, own, precision })
     }
@@ -178,10 +196,9 @@ impl Dynamics {
         &self.noise
     }
 
-    /// Sigma of what each dough does for itself, by dimension: a level and a slope ([`courses`](crate::sensitivity::courses)) along its
-    /// rolls, m a roll.
-    pub fn own(&self) -> [f64; 3] {
-        self.own.map(f64::sqrt).into()
+    /// What each dough does for itself.
+    pub fn own(&self) -> &Own {
+        &self.own
     }
 
     /// By how much the innovations of a dough ([`white`](crate::sensitivity::white)) answer what was not learned: directions
@@ -195,7 +212,7 @@ impl Dynamics {
         let mut turned = all.transpose();
         self.precision.l_dirty().solve_lower_triangular_mut(&mut turned.rows_mut(0, 3 * p));
         for k in 0..OWN {
-            turned.row_mut(3 * p + k).scale_mut(self.own[k % 3].sqrt());
+            turned.row_mut(3 * p + k).scale_mut(self.own.of(k).sqrt());
         }
         turned.transpose()
     }
@@ -209,7 +226,8 @@ impl Dynamics {
             let mut told = DVector::zeros(3 * p);
             told.rows_mut(k * p, p).copy_from(&terms);
             self.precision.l_dirty().solve_lower_triangular_mut(&mut told);
-            let variance = told.norm_squared() + self.noise.process[k] + self.noise.measured[1][k];
+            let scatter = self.noise.scatter * change[k] * change[k];
+            let variance = told.norm_squared() + self.noise.process[k] + scatter + self.noise.measured[1][k];
             Prediction { mean: state[k] + change[k], sigma: variance.sqrt() }
         })
     }

@@ -12,6 +12,8 @@ pub struct Noise {
     pub measured: [Vector3<f64>; 2],
     /// Of what a roll does beyond its dynamics.
     pub process: Vector3<f64>,
+    /// Of the part by which a roll does more or less than its dynamics say, all dimensions alike; of one, not of m^2.
+    pub scatter: f64,
 }
 
 /// What is known of a fresh dough.
@@ -76,6 +78,8 @@ pub struct Step {
     pub state: Vector3<f64>,
     /// See `state`.
     pub covariance: Matrix3<f64>,
+    /// What the roll is to change.
+    pub change: Vector3<f64>,
     /// Derivative of the state after it with respect to the state before.
     pub gradient: Matrix3<f64>,
     /// Of the measurement after it.
@@ -106,7 +110,9 @@ pub fn follow(
             moved[k] += STEP_M;
             gradient.set_column(k, &((next(i, &moved) - there) / STEP_M));
         }
-        p = gradient * p * gradient.transpose() + Matrix3::from_diagonal(&noise.process);
+        let change = there - x;
+        let scatter = change * change.transpose() * noise.scatter;
+        p = gradient * p * gradient.transpose() + Matrix3::from_diagonal(&noise.process) + scatter;
         x = there;
         let after = innovation(&Vector3::from(roll.next), &x, &p, &noise.measured[1]);
         (x, p) = updated(&x, &p, &after);
@@ -114,7 +120,7 @@ pub fn follow(
             x = (1.0 - undone) * x + undone * state;
             p *= (1.0 - undone).powi(2);
         }
-        steps.push(Step { before, state, covariance, gradient, after });
+        steps.push(Step { before, state, covariance, change, gradient, after });
     }
     steps
 }

@@ -5,7 +5,7 @@
 use argmin::core::{CostFunction, Error, Executor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
-use crate::dynamics::{LearnError, Roll, Surface};
+use crate::dynamics::{LearnError, Own, Roll, Surface};
 use crate::filter::{Fresh, Noise, Step, follow};
 use crate::powell::Powell;
 use crate::sensitivity::{COURSES, OWN, PER_ROLL, courses, sensitivity, white};
@@ -18,14 +18,15 @@ const UPDATES: usize = 6;
 const DOUGHS: usize = 3;
 /// Logarithm of the variance of what a roll does beyond its dynamics, over that of a measurement.
 const LOG_PROCESS: [f64; 2] = [-7.0, 4.0];
+/// Logarithm of the variance of the part by which a roll does more or less: 0.3 to 30 %.
+const LOG_SCATTER: [f64; 2] = [-11.6, -2.4];
 
 /// What was learned.
 #[derive(Debug, Clone)]
 pub(crate) struct Learned {
     pub(crate) surface: Surface,
     pub(crate) noise: Noise,
-    /// Variance of each dough's own level and slope, by dimension.
-    pub(crate) own: Vector3<f64>,
+    pub(crate) own: Own,
     /// Factor of the precision of all coefficients.
     pub(crate) precision: Cholesky<f64, Dyn>,
 }
@@ -35,11 +36,11 @@ struct Learning<'a> {
     doughs: &'a [Vec<Roll>],
     surface: Surface,
     noise: Noise,
-    own: Vector3<f64>,
+    own: Own,
     /// Variances of the coefficients of each degree of the remainder, by dimension.
     remainder: Vec<Vector3<f64>>,
-    /// Each dough's own level and slope.
-    courses: Vec<[Vector3<f64>; COURSES]>,
+    /// What each dough does for itself.
+    found: Vec<Found>,
     /// How many numbers were learned, those that the prior holds counted in part.
     learned: f64,
     /// Mean square change of a roll, m^2.
@@ -51,6 +52,13 @@ struct Sums {
     square: DMatrix<f64>,
     pull: DVector<f64>,
     own: Vec<OwnSums>,
+}
+
+/// What a dough was found to do for itself.
+#[derive(Debug, Clone, Copy, Default)]
+struct Found {
+    courses: [Vector3<f64>; COURSES],
+    softness: f64,
 }
 
 /// Sums over the rows of a dough that can do something for itself.
@@ -79,10 +87,10 @@ pub(crate) fn learn(doughs: &[Vec<Roll>], surface: Surface, noise: Noise) -> Res
     let rolls = doughs.iter().map(Vec::len).sum::<usize>().max(1) as f64;
     let change = changes.sum::<f64>() / rolls;
     let remainder = PARTS.iter().map(|part| Vector3::repeat(part * part * change)).collect();
-    let own =
-        if doughs.len() < DOUGHS { Vector3::zeros() } else { Vector3::repeat(OWN_PART.powi(2) * change) };
-    let courses = vec![[Vector3::zeros(); COURSES]; doughs.len()];
-    let mut learning = Learning { doughs, surface, noise, own, remainder, courses, learned: 0.0, change };
+    let held = if doughs.len() < DOUGHS { 0.0 } else { OWN_PART.powi(2) };
+    let own = Own { courses: Vector3::repeat(held * change), softness: held };
+    let found = vec![Found::default(); doughs.len()];
+    let mut learning = Learning { doughs, surface, noise, own, remainder, found, learned: 0.0, change };
     let mut precision = None;
     for _ in 0..ROUNDS {
         learning.size_of_process();
@@ -131,7 +139,7 @@ impl Learning<'_> {
 
     /// Coefficients at the sizes as they are, then the sizes at these coefficients.
     fn update(&mut self, sums: &Sums, before: &DVector<f64>) -> Result<Cholesky<f64, Dyn>, LearnError> {
-        let sigma = DMatrix::from_diagonal(&DVector::from_fn(OWN, |k, _| self.own[k % 3].sqrt()));
+        let sigma = DMatrix::from_diagonal(&DVector::from_fn(OWN, |k, _| self.own.of(k).sqrt()));
         let shrinks: Vec<DMatrix<f64>> = sums
             .own
             .iter()
@@ -202,24 +210,31 @@ impl Learning<'_> {
         moved: &DVector<f64>,
         covariance: &DMatrix<f64>,
     ) {
-        let (mut sum, mut count) = (Vector3::<f64>::zeros(), 0.0);
+        let (mut sum, mut count, mut soft) = (Vector3::<f64>::zeros(), 0.0, 0.0);
         for (own, shrink) in sums.own.iter().zip(shrinks) {
             let part = &own.cross * shrink;
             let mean = -shrink * (&own.pull + own.cross.tr_mul(moved));
             let spread = shrink + part.tr_mul(&(covariance * &part));
+            let square = |at: usize| mean[at] * mean[at] + spread[(at, at)];
+            let told = |at: usize| (1.0 - spread[(at, at)] / self.own.of(at).max(f64::MIN_POSITIVE)).max(0.0);
+            let found = &mut self.found[own.dough];
             for c in 0..own.courses {
                 for k in 0..3 {
                     let at = 3 * c + k;
-                    self.courses[own.dough][c][k] = mean[at];
-                    sum[k] += mean[at] * mean[at] + spread[(at, at)];
-                    self.learned += (1.0 - spread[(at, at)] / self.own[k].max(f64::MIN_POSITIVE)).max(0.0);
+                    found.courses[c][k] = mean[at];
+                    sum[k] += square(at);
+                    self.learned += told(at);
                 }
                 count += 1.0;
             }
+            found.softness = mean[OWN - 1];
+            soft += square(OWN - 1);
+            self.learned += told(OWN - 1);
         }
         if count > 0.0 {
-            let held = HELD * OWN_PART.powi(2) * self.change;
-            self.own = sum.map(|s| (s + held) / (count + HELD));
+            let held = HELD * OWN_PART.powi(2);
+            self.own.courses = sum.map(|s| (s + held * self.change) / (count + HELD));
+            self.own.softness = (soft + held) / (sums.own.len() as f64 + HELD);
         }
     }
 
@@ -227,8 +242,13 @@ impl Learning<'_> {
     fn size_of_process(&mut self) {
         let problem = Process { learning: self, least: self.noise.measured[1] };
         let now = self.noise.process.zip_map(&self.noise.measured[1], |q, r| (q / r).max(1e-9).ln());
-        let start: Vec<f64> = now.iter().map(|v| v.clamp(LOG_PROCESS[0], LOG_PROCESS[1])).collect();
-        let Ok(powell) = Powell::new(vec![LOG_PROCESS[0]; 3], vec![LOG_PROCESS[1]; 3], 1e-4) else { return };
+        let [low, high]: [Vec<f64>; 2] = [0, 1].map(|at| {
+            let three = std::iter::repeat_n(LOG_PROCESS[at], 3);
+            three.chain([LOG_SCATTER[at]]).collect()
+        });
+        let now = now.iter().copied().chain([self.noise.scatter.ln()]);
+        let start: Vec<f64> = now.zip(low.iter().zip(&high)).map(|(v, (l, h))| v.clamp(*l, *h)).collect();
+        let Ok(powell) = Powell::new(low, high, 1e-4) else { return };
         let found = Executor::new(problem, powell.with_lines(8, 0.02))
             .configure(|s| s.param(start).max_iters(1))
             .timer(false)
@@ -237,11 +257,12 @@ impl Learning<'_> {
         let best = found.ok().and_then(|mut r| r.state.take_best_param());
         if let Some(log) = best {
             self.noise.process = Vector3::from_fn(|k, _| log[k].exp() * self.noise.measured[1][k]);
+            self.noise.scatter = log[3].exp();
         }
     }
 }
 
-/// Minus twice the logarithm of the likelihood, by the logarithm of the process over the measurements' variance.
+/// Minus twice the logarithm of the likelihood, by the logarithms of the process over the measurements' variance, and of the scatter.
 struct Process<'a, 'b> {
     learning: &'a Learning<'b>,
     least: Vector3<f64>,
@@ -253,14 +274,15 @@ impl CostFunction for Process<'_, '_> {
 
     fn cost(&self, log: &Vec<f64>) -> Result<f64, Error> {
         let Learning { doughs, surface, noise, .. } = self.learning;
-        let noise = Noise { process: Vector3::from_fn(|k, _| log[k].exp() * self.least[k]), ..*noise };
+        let process = Vector3::from_fn(|k, _| log[k].exp() * self.least[k]);
+        let noise = Noise { process, scatter: log[3].exp(), ..*noise };
         let fresh = self.learning.fresh(&noise);
         let (mut spread, mut square) = (0.0, 0.0);
-        for (dough, own) in doughs.iter().zip(&self.learning.courses) {
+        for (dough, own) in doughs.iter().zip(&self.learning.found) {
             let courses = courses(dough.len());
             let next = |i: usize, x: &Vector3<f64>| {
-                let own: Vector3<f64> = own.iter().zip(&courses).map(|(own, c)| own * c[i]).sum();
-                x + surface.change(x, &dough[i].action) + own
+                let level: Vector3<f64> = own.courses.iter().zip(&courses).map(|(own, c)| own * c[i]).sum();
+                x + (1.0 + own.softness) * surface.change(x, &dough[i].action) + level
             };
             for Step { before, after, .. } in follow(dough, &fresh, &noise, 0.0, next) {
                 for innovation in [before, after] {

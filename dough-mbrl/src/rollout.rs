@@ -95,6 +95,9 @@ impl Setup {
 
     /// One roll of a policy: looks, acts, rolls, looks again.
     ///
+    /// The state after a roll is not taken for the one before the next: dough springs back, and only two pictures of one dough tell
+    /// the camera's noise from what rolls do.
+    ///
     /// # Errors
     /// [`RolloutError`].
     pub fn step<R: Arm + Gripper + DepthCamera + Clock>(
@@ -102,14 +105,14 @@ impl Setup {
         rig: &mut R,
         policy: &mut dyn Policy,
         goal: &Goal,
-        before: &Shape,
         rng: &mut dyn Rng,
     ) -> Result<(Rolled, Shape), RolloutError> {
         let mut rng = rng;
+        let before = self.look(rig)?;
         let state = before.state();
         let action = policy.act(&state, goal, &self.limits, rng)?;
         let t_s = rig.now_s().map_err(crate::roll::device("reading the clock"))?;
-        let motion = Motion::constrained(before, action);
+        let motion = Motion::constrained(&before, action);
         self.handling.roll(rig, before.ground_m, &motion, Side::draw(&mut rng))?;
         let after = self.look(rig)?;
         let roll = Roll { state, action, next: after.state() };
@@ -140,7 +143,7 @@ impl Setup {
             } else if rolls.len() >= self.most_rolls {
                 End::OutOfRolls
             } else {
-                let (rolled, after) = self.step(rig, policy, goal, &shape, rng)?;
+                let (rolled, after) = self.step(rig, policy, goal, rng)?;
                 rolls.push(rolled);
                 shape = after;
                 continue;

@@ -8,8 +8,8 @@ use crate::filter::Step;
 pub const PER_ROLL: usize = 6;
 /// Courses of a dough of its own: a level, and half a cosine, a whole one, one and a half along its rolls.
 pub const COURSES: usize = 4;
-/// What a dough may do for itself: a course of each dimension's change.
-pub const OWN: usize = 3 * COURSES;
+/// What a dough may do for itself: a course of each dimension's change, and (the last) a part of every change, as softer dough does.
+pub const OWN: usize = 3 * COURSES + 1;
 
 /// The innovations of a dough, standardised: independent and of variance one where dynamics and noise are right.
 pub fn white(steps: &[Step]) -> DVector<f64> {
@@ -18,7 +18,7 @@ pub fn white(steps: &[Step]) -> DVector<f64> {
 }
 
 /// Derivatives of [`white`]: with respect to the coefficients of each dimension's change, one dimension after the other, and (the last
-/// [`OWN`] columns) to the dough's own level and slope of each.
+/// [`OWN`] columns) to what the dough does for itself.
 ///
 /// `terms(i)` are what the coefficients of roll `i`'s change multiply, `response(i)` is what of the change takes place.
 pub fn sensitivity(
@@ -45,6 +45,9 @@ pub fn sensitivity(
             }
             for (c, course) in courses.iter().enumerate() {
                 moved[(k, 3 * p + 3 * c + k)] += response * course[i];
+            }
+            if !courses.is_empty() {
+                moved[(k, columns - 1)] += step.change[k];
             }
         }
         write(&mut all, row, &step.after.factor, &moved);

@@ -139,7 +139,7 @@ fn innovations_are_white() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let doughs = doughs(200, 0.0, SIGMA, &mut rng);
     let variance = nalgebra::Vector3::repeat(SIGMA * SIGMA);
-    let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros() };
+    let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros(), scatter: 0.0 };
     let first: Vec<[f64; 3]> = doughs.iter().map(|d| d[0].state).collect();
     let fresh = Fresh::of(&first, &noise);
     let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);

@@ -37,7 +37,7 @@ pub fn explore(
             doughs.push(Vec::new());
             shape = setup.look(&mut rig)?;
         }
-        match setup.step(&mut rig, &mut Explore, &goal, &shape, &mut rng) {
+        match setup.step(&mut rig, &mut Explore, &goal, &mut rng) {
             Ok((rolled, after)) => {
                 if let Some(last) = doughs.last_mut() {
                     last.push(rolled);
