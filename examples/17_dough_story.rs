@@ -19,6 +19,7 @@ use dough_mbrl::predictor::{Predictor, Refit};
 use dough_mbrl::repair::{Repaired, Response};
 use dough_mbrl::ridge::Ridge;
 use dough_mbrl::rollout::{End, Rolled, RolloutError, Setup};
+use examples::bars::Bars;
 use examples::dough::{mean_and_half, rollouts, rolls};
 use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
@@ -56,8 +57,8 @@ impl Size {
             let (trained, recorded) = ([8, 16], [4, 12]);
             Self { trained, recorded, days: 1, goals: vec![4.0], rollouts: 2, replicates: 19 }
         } else {
-            let (trained, recorded) = ([20, 24], [10, 16]);
-            Self { trained, recorded, days: 4, goals: vec![4.0, 5.0, 6.0], rollouts: 4, replicates: 199 }
+            let (trained, recorded) = ([20, 24], [5, 12]);
+            Self { trained, recorded, days: 4, goals: vec![4.0, 5.0, 6.0], rollouts: 3, replicates: 199 }
         }
     }
 }
@@ -68,7 +69,7 @@ struct Day {
     model: Ridge,
     response: Response,
     /// Rolls by model and goal.
-    bars: Vec<Bars>,
+    bars: Vec<Done>,
 }
 
 fn main() -> Outcome<()> {
@@ -87,15 +88,17 @@ fn main() -> Outcome<()> {
     print!("{:34}", "model");
     size.goals.iter().for_each(|g| print!("{:>14}", format!("{g} in")));
     println!("{:>9}{:>8}", "all", "missed");
-    let all: Vec<Bars> = (0..MODELS.len()).map(|m| Bars::sum(days.iter().map(|d| &d.bars[m]))).collect();
-    all.iter().for_each(Bars::print);
-    let fewer = |bars: &[Bars]| 100.0 * (1.0 - bars[2].mean() / bars[0].mean());
+    let all: Vec<Done> = (0..MODELS.len()).map(|m| Done::sum(days.iter().map(|d| &d.bars[m]))).collect();
+    all.iter().for_each(Done::print);
+    let fewer = |bars: &[Done]| 100.0 * (1.0 - bars[2].mean() / bars[0].mean());
     let each: Vec<String> = days.iter().map(|d| format!("{:.0} %", fewer(&d.bars))).collect();
     println!("repaired: {:.0} % fewer rolls than as learned (day by day: {})", fewer(&all), each.join(", "));
     if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
         let day = &days[0];
         let parts = answered(&day.recorded, &day.model, &band);
-        std::fs::write(&file, picture::draw(&all, &size.goals, &parts, &day.response))?;
+        let rows: Vec<Bars> = all.iter().map(Done::bars).collect();
+        let goals: Vec<String> = size.goals.iter().map(|g| format!("{g} in")).collect();
+        std::fs::write(&file, picture::draw(&rows, &goals, &parts, &day.response))?;
         println!("\ndrawn: {file}");
     }
     Ok(())
@@ -119,11 +122,11 @@ fn live(day: u64, size: &Size, band: Band) -> Outcome<Day> {
     // What a robot could have learned instead, had it rolled as many dry doughs.
     let anew = Ridge::learn(&rolls(&doughs(DRY, size.trained, seed + 4)?), 2, 1e-3)?;
     let bars = vec![
-        Bars::roll(0, size, DRY, day, &model, None)?,
-        Bars::roll(1, size, DRY, day, &model, Some(5))?,
-        Bars::roll(2, size, DRY, day, &repaired, None)?,
-        Bars::roll(3, size, DRY, day, &anew, None)?,
-        Bars::roll(4, size, USUAL, day, &model, None)?,
+        Done::roll(0, size, DRY, day, &model, None)?,
+        Done::roll(1, size, DRY, day, &model, Some(5))?,
+        Done::roll(2, size, DRY, day, &repaired, None)?,
+        Done::roll(3, size, DRY, day, &anew, None)?,
+        Done::roll(4, size, USUAL, day, &model, None)?,
     ];
     Ok(Day { recorded, model, response, bars })
 }
@@ -234,14 +237,12 @@ fn told(answer: &Diagnosis) -> String {
 
 /// What the controller can use of an answer.
 fn response(answer: &Diagnosis, band: Band) -> Response {
-    let found = |id: &str| {
+    let value = |id: &str| {
         let chosen = answer.mechanisms.iter().find(|m| m.id == id && answer.chosen.contains(&m.id));
-        chosen.and_then(|m| m.parameters.first())
+        chosen.and_then(|m| m.parameters.first()).map(|p| p.value)
     };
-    let factor = found("stiffness-change").map_or(1.0, |p| p.value);
-    let (slip_n, slip_sigma_n) =
-        found("slip").map_or((0.0, 0.0), |p| (p.value, (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96)));
-    Response { factor, slip_n, slip_sigma_n, band }
+    let factor = value("stiffness-change").unwrap_or(1.0);
+    Response { factor, slip_n: value("slip").unwrap_or(0.0), band }
 }
 
 const MODELS: [&str; 5] = [
@@ -253,13 +254,13 @@ const MODELS: [&str; 5] = [
 ];
 
 /// A model's rolls to each goal, and how many doughs missed it.
-struct Bars {
+struct Done {
     name: &'static str,
     values: Vec<Vec<f64>>,
     missed: usize,
 }
 
-impl Bars {
+impl Done {
     /// Rolls dough to each goal.
     fn roll<M: Refit + Clone + Sync + 'static>(
         which: usize,
@@ -300,6 +301,10 @@ impl Bars {
         mean_and_half(&self.values.concat()).0
     }
 
+    fn bars(&self) -> Bars {
+        Bars { name: self.name.into(), values: self.values.iter().map(|v| mean_and_half(v)).collect() }
+    }
+
     fn print(&self) {
         print!("{:34}", self.name);
         for values in &self.values {
@@ -327,16 +332,16 @@ mod picture {
 
     use dough_mbrl::repair::Response;
 
-    use super::{Bars, mean_and_half};
+    use examples::bars::{self, Bars, Stand};
 
-    const COLOURS: [&str; 5] = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#999"];
-
-    pub(super) fn draw(bars: &[Bars], goals: &[f64], parts: &[[f64; 2]], response: &Response) -> String {
+    pub(super) fn draw(rows: &[Bars], goals: &[String], parts: &[[f64; 2]], response: &Response) -> String {
         let mut svg = String::from(
             "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 800 340' font-family='sans-serif' font-size='12'><rect width='800' height='340' fill='white'/>",
         );
         found(&mut svg, parts, response);
-        used(&mut svg, bars, goals);
+        svg.push_str("<text x='430' y='24'>rolls to the goal, a drier dough</text>");
+        let stand = Stand { left: 430.0, bottom: 290.0, height: 140.0, step: [120.0, 21.0], legend: 44.0 };
+        bars::draw(&mut svg, rows, goals, &stand);
         svg.push_str("</svg>\n");
         svg
     }
@@ -366,42 +371,5 @@ mod picture {
             y(response.factor),
             response.factor
         );
-    }
-
-    /// Rolls to the goals, by model.
-    fn used(svg: &mut String, bars: &[Bars], goals: &[f64]) {
-        let most = bars
-            .iter()
-            .flat_map(|b| &b.values)
-            .map(|v| mean_and_half(v))
-            .map(|v| v.0 + v.1)
-            .fold(1.0, f64::max);
-        let height = |v: f64| 150.0 * v / most;
-        let _ = write!(svg, "<text x='430' y='24'>rolls to the goal, a drier dough</text>");
-        for (b, bar) in bars.iter().enumerate() {
-            let colour = COLOURS[b % COLOURS.len()];
-            for (g, (mean, half)) in bar.values.iter().map(|v| mean_and_half(v)).enumerate() {
-                let x = 430.0 + 120.0 * g as f64 + 21.0 * b as f64;
-                let _ = write!(
-                    svg,
-                    "<rect x='{x}' y='{:.1}' width='18' height='{:.1}' fill='{colour}'/><path d='M{:.1} {:.1}V{:.1}' stroke='black'/><text x='{x}' y='{:.1}' font-size='10'>{mean:.0}</text>",
-                    290.0 - height(mean),
-                    height(mean),
-                    x + 9.0,
-                    290.0 - height(mean + half),
-                    290.0 - height((mean - half).max(0.0)),
-                    286.0 - height(mean + half),
-                );
-            }
-            let _ = write!(
-                svg,
-                "<text x='440' y='{:.0}' fill='{colour}'>{}</text>",
-                44.0 + 15.0 * b as f64,
-                bar.name
-            );
-        }
-        for (g, goal) in goals.iter().enumerate() {
-            let _ = write!(svg, "<text x='{:.0}' y='308'>{goal} in</text>", 465.0 + 120.0 * g as f64);
-        }
     }
 }

@@ -45,7 +45,9 @@ fn dough(c: &mut Criterion) {
     }
     c.bench_function("dough/features/100000", |b| b.iter(|| view.find(black_box(&cloud))));
 
-    let Ok(doughs) = examples::dough::explore(DoughKind::A, Effects::default(), 600, 1) else { return };
+    let Ok(doughs) = examples::dough::explore(DoughKind::A, Effects::default(), 600, usize::MAX, 1) else {
+        return;
+    };
     let rolls: Vec<Roll> = examples::dough::rolls(&doughs);
     let Ok(ridge) = Ridge::learn(&rolls, 2, 1e-3) else { return };
     let (state, action) = ([0.09, 0.026, 0.026], [0.09, 0.015]);

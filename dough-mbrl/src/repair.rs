@@ -12,35 +12,20 @@ pub struct Response {
     pub factor: f64,
     /// Force (N) below which the band slips and changes nothing; 0: it never slips.
     pub slip_n: f64,
-    /// One sigma (N) of that force: how near it a plan may count on a grip. 0: it is exact.
-    pub slip_sigma_n: f64,
     /// The band that makes the force.
     pub band: Band,
 }
 
 impl Default for Response {
     fn default() -> Self {
-        Self { factor: 1.0, slip_n: 0.0, slip_sigma_n: 0.0, band: Band::default() }
+        Self { factor: 1.0, slip_n: 0.0, band: Band::default() }
     }
 }
 
 impl Response {
-    /// Strain over the learned strain of a roll: what is to be expected.
+    /// Strain over the learned strain of a roll.
     pub fn of(&self, action: &Action) -> f64 {
-        self.factor * self.grips(action)
-    }
-
-    /// How probable it is that the band grips: a logistic law of the standard deviation of the slip force.
-    fn grips(&self, action: &Action) -> f64 {
-        let over_n = self.band.force_n(action[0], action[1]) - self.slip_n;
-        if self.slip_n == 0.0 || (self.slip_sigma_n == 0.0 && over_n >= 0.0) {
-            1.0
-        } else if self.slip_sigma_n == 0.0 {
-            0.0
-        } else {
-            let scale_n = self.slip_sigma_n * 3.0_f64.sqrt() / std::f64::consts::PI;
-            1.0 / (1.0 + (-over_n / scale_n).exp())
-        }
+        if self.band.force_n(action[0], action[1]) < self.slip_n { 0.0 } else { self.factor }
     }
 }
 
@@ -67,11 +52,9 @@ impl<M> Repaired<M> {
     /// # Errors
     /// [`PlanError::Setting`].
     pub fn new(learned: M, response: Response) -> Result<Self, PlanError> {
-        let Response { factor, slip_n, slip_sigma_n, .. } = response;
+        let Response { factor, slip_n, .. } = response;
         PlanError::setting("factor", factor, factor > 0.0 && factor.is_finite(), "above 0, finite")?;
-        for (name, value) in [("slip_n", slip_n), ("slip_sigma_n", slip_sigma_n)] {
-            PlanError::setting(name, value, value >= 0.0 && value.is_finite(), "at least 0, finite")?;
-        }
+        PlanError::setting("slip_n", slip_n, slip_n >= 0.0 && slip_n.is_finite(), "at least 0, finite")?;
         Ok(Self { learned, response })
     }
 }
@@ -93,14 +76,14 @@ impl<M: Predictor> Predictor for Repaired<M> {
 /// A further roll teaches the learned dynamics what it would have done without the response.
 impl<M: Refit> Refit for Repaired<M> {
     fn add(&mut self, roll: &Roll, weight: f64) -> Result<(), LearnError> {
+        let response = self.response.of(&roll.action);
         // A roll that slipped says nothing of the rest.
-        if self.response.grips(&roll.action) < 0.5 {
+        if response == 0.0 {
             return Ok(());
         }
-        let factor = self.response.factor;
-        let next = answered(&roll.state, &roll.next, 1.0 / factor);
+        let next = answered(&roll.state, &roll.next, 1.0 / response);
         // The noise is divided too.
-        self.learned.add(&Roll { next, ..*roll }, weight * factor * factor)
+        self.learned.add(&Roll { next, ..*roll }, weight * response * response)
     }
 
     fn refit(&mut self) -> Result<(), LearnError> {
@@ -153,19 +136,6 @@ mod tests {
         );
     }
 
-    /// Half at the force itself, 86 % one sigma above it (a logistic law), all of it far above.
-    #[test]
-    fn near_a_slip_force_that_is_not_exact_a_grip_is_a_chance() {
-        let band = Band::default();
-        let response =
-            Response { slip_n: band.force_n(0.08, 0.01), slip_sigma_n: 0.1, ..Response::default() };
-        approx::assert_relative_eq!(response.of(&[0.08, 0.01]), 0.5, max_relative = 1e-12);
-        let above = Response { slip_n: response.slip_n - 0.1, ..response };
-        let chance = 1.0 / (1.0 + (-std::f64::consts::PI / 3.0_f64.sqrt()).exp());
-        approx::assert_relative_eq!(above.of(&[0.08, 0.01]), chance, max_relative = 1e-9);
-        assert!(response.of(&[0.12, 0.03]) > 1.0 - 1e-9 && response.of(&[0.08, 1e-3]) < 1e-3);
-    }
-
     #[test]
     fn further_rolls_that_obey_the_response_change_nothing() {
         let response = Response { factor: 0.5, slip_n: 1.0, ..Response::default() };
@@ -198,14 +168,8 @@ mod tests {
 
     #[test]
     fn responses_that_are_none_are_refused() {
-        for [factor, slip_n, slip_sigma_n] in [
-            [0.0; 3],
-            [f64::NAN, 0.0, 0.0],
-            [1.0, -1.0, 0.0],
-            [1.0, f64::INFINITY, 0.0],
-            [1.0, 1.0, f64::NAN],
-        ] {
-            let response = Response { factor, slip_n, slip_sigma_n, ..Response::default() };
+        for (factor, slip_n) in [(0.0, 0.0), (f64::NAN, 0.0), (1.0, -1.0), (1.0, f64::INFINITY)] {
+            let response = Response { factor, slip_n, ..Response::default() };
             assert!(matches!(Repaired::new(learned(0.4), response), Err(PlanError::Setting { .. })));
         }
     }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// A dough is put aside once it is this long: further on it leaves the picture.
 const LONGEST_M: f64 = 0.26;
 
-/// Random rolls on fresh doughs, one list a dough.
+/// Random rolls on fresh doughs, one list a dough; each is rolled at most so many times.
 ///
 /// # Errors
 /// [`RolloutError`].
@@ -22,6 +22,7 @@ pub fn explore(
     kind: DoughKind,
     effects: Effects,
     rolls: usize,
+    each: usize,
     seed: u64,
 ) -> Result<Vec<Vec<Rolled>>, RolloutError> {
     let mut rig = FakeRig::new(kind, effects, seed);
@@ -29,25 +30,21 @@ pub fn explore(
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Random rolls look at no goal.
     let goal = Goal::cylinder(LONGEST_M, kind.volume_m3)?;
-    let (mut doughs, mut left) = (vec![Vec::new()], rolls);
-    let mut shape = setup.look(&mut rig)?;
+    let (mut doughs, mut left, mut long) = (vec![Vec::new()], rolls, false);
     while left > 0 {
-        if shape.length_m > LONGEST_M {
+        if long || doughs.last().is_some_and(|d| d.len() >= each) {
             rig.renew(kind);
             doughs.push(Vec::new());
-            shape = setup.look(&mut rig)?;
         }
         match setup.step(&mut rig, &mut Explore, &goal, &mut rng) {
             Ok((rolled, after)) => {
                 if let Some(last) = doughs.last_mut() {
                     last.push(rolled);
                 }
-                (shape, left) = (after, left - 1);
+                (long, left) = (after.length_m > LONGEST_M, left - 1);
             }
             // The last roll took it out of the picture: the next dough.
-            Err(RolloutError::Rig(RigError::Dough(DoughError::CutOff { .. }))) => {
-                shape.length_m = f64::INFINITY
-            }
+            Err(RolloutError::Rig(RigError::Dough(DoughError::CutOff { .. }))) => long = true,
             Err(error) => return Err(error),
         }
     }

@@ -1,5 +1,6 @@
 //! What the examples share: worlds put before the engine, many at a time, with a progress bar.
 
+pub mod bars;
 pub mod dough;
 pub mod grains;
 
