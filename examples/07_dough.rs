@@ -173,7 +173,7 @@ fn figure_7_4(size: &Size, a: &[Roll], model: &Ridge) -> Result<Vec<Bars>, Failu
     println!("  direct, cautious, than heuristic   {:>38}", fewer(1, &all[4].values));
     println!("  direct, Gaussian process, than heur. {:>36}", fewer(1, &all[5].values));
     let least: Vec<(f64, f64)> = least.into_iter().map(|n| (n, 0.0)).collect();
-    println!("  strongest: no policy can gain more {:>38}", fewer(1, &least));
+    println!("  strongest rolls, goal passed or not {:>37}", fewer(1, &least));
     Ok(all)
 }
 
