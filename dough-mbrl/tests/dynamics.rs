@@ -19,8 +19,23 @@ fn law(state: [f64; 3], action: [f64; 2], cubic: f64) -> [f64; 3] {
     [l + push, w - 0.3 * push, h - 0.4 * push * (w / 0.04)]
 }
 
-/// Doughs that are rolled eight times each; states are measured twice, after a roll and before the next.
 fn doughs(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Roll>> {
+    uneven(n, cubic, sigma, [0.0; 2], rng)
+}
+
+/// Doughs that are rolled eight times each; states are measured twice, after a roll and before the next. Each roll, and each dough in all
+/// its rolls, does more or less than the law by parts of these sigmas.
+fn uneven(
+    n: usize,
+    cubic: f64,
+    sigma: f64,
+    [scatter, softness]: [f64; 2],
+    rng: &mut ChaCha8Rng,
+) -> Vec<Vec<Roll>> {
+    let part = |sigma: f64, rng: &mut ChaCha8Rng| -> f64 {
+        // What does not scatter draws nothing.
+        if sigma == 0.0 { 1.0 } else { 1.0 + sigma * rand_distr::Normal::new(0.0, 1.0).unwrap().sample(rng) }
+    };
     let measured = |state: [f64; 3], rng: &mut ChaCha8Rng| {
         state.map(|x| {
             let z: f64 = StandardNormal.sample(rng);
@@ -34,11 +49,14 @@ fn doughs(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Rol
                 rng.random_range(0.038..0.042),
                 rng.random_range(0.038..0.042),
             ];
+            let soft = part(softness, rng);
             (0..8)
                 .map(|_| {
                     let action = [rng.random_range(0.04..0.12), rng.random_range(0.01..0.04)];
                     let before = measured(state, rng);
-                    state = law(state, action, cubic);
+                    let next = law(state, action, cubic);
+                    let does = soft * part(scatter, rng);
+                    state = std::array::from_fn(|k| state[k] + does * (next[k] - state[k]));
                     Roll { state: before, action, next: measured(state, rng) }
                 })
                 .collect()
@@ -131,6 +149,22 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
     assert!((0.9..1.1).contains(&(square / count)), "{}", square / count);
     // Here no dough does anything for itself, and some is held possible: half of what is allowed for, measured.
     assert!((0.35..1.2).contains(&(levels / doughs_seen)), "{}", levels / doughs_seen);
+}
+
+/// How unevenly rolls do what they do, and how doughs differ, is learned from sixty doughs.
+#[test]
+fn scatter_of_rolls_and_softness_of_doughs_are_told_apart() {
+    for [scatter, softness] in [[0.1, 0.0], [0.0, 0.1]] {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let dynamics = Dynamics::learn(&uneven(60, 0.0, SIGMA, [scatter, softness], &mut rng)).unwrap();
+        for (name, found, is) in [
+            ("scatter", dynamics.noise().scatter.sqrt(), scatter),
+            ("softness", dynamics.own().softness.sqrt(), softness),
+        ] {
+            let held = if is > 0.0 { (0.7 * is)..(1.3 * is) } else { 0.0..0.04 };
+            assert!(held.contains(&found), "{name}: {found} of {is}");
+        }
+    }
 }
 
 /// A filter that knows the law and the noise leaves innovations that are white.
