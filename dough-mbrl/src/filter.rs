@@ -26,9 +26,11 @@ pub struct Fresh {
 }
 
 impl Fresh {
-    /// From the measured first states of several doughs; their own spread is what the noise leaves of theirs.
+    /// From the measured first states of several doughs, with the noise that is in them.
     ///
-    /// With fewer than four doughs nothing is held to be known: the spread is as wide as the state itself.
+    /// The noise is not taken out: of a few doughs too little may be left, and a dough that begins elsewhere than is held possible stays off
+    /// through all its rolls. What is too wide is narrowed by the first measurement. With fewer than four doughs nothing is held to be
+    /// known: the spread is as wide as the state itself.
     pub fn of(first: &[State], noise: &Noise) -> Self {
         let n = first.len().max(1) as f64;
         let mean = first.iter().map(|s| Vector3::from(*s)).sum::<Vector3<f64>>() / n;
@@ -40,14 +42,9 @@ impl Fresh {
             d * d.transpose()
         };
         let spread = first.iter().map(scatter).sum::<Matrix3<f64>>() / (n - 1.0);
-        let eigen = (spread - Matrix3::from_diagonal(&noise.measured[0])).symmetric_eigen();
-        // What the noise hides of the spread: a hundredth of the noise at least.
-        let least = 1e-2 * noise.measured[0].mean();
-        let values = eigen.eigenvalues.map(|v| v.max(least));
-        let covariance =
-            eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose();
-        // The mean itself is known from so many doughs.
-        Self { mean, covariance: covariance + spread / n }
+        // The mean itself is known from so many doughs; readings that are all alike still have noise.
+        let covariance = spread * (1.0 + 1.0 / n) + Matrix3::from_diagonal(&noise.measured[0]);
+        Self { mean, covariance }
     }
 }
 
