@@ -121,9 +121,17 @@ impl<T: Number> Place<T> {
         }
     }
 
-    /// On along a straight line in time to a later time and depth, `part` (0 to 1) of the way; times may be equal: a jump.
-    fn to(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
-        let (lasts, way_m) = ((end.0 - self.time_s) * part, (end.1 - self.depth_m) * part);
+    /// On along a straight line in time to a later time and depth; times may be equal: a jump.
+    fn to(&self, tau_s: T, end: (T, T)) -> (Self, Step<T>) {
+        self.by(tau_s, end.0 - self.time_s, end.1 - self.depth_m)
+    }
+
+    /// The same a part (0 to 1) of the way.
+    fn to_part(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
+        self.by(tau_s, (end.0 - self.time_s) * part, (end.1 - self.depth_m) * part)
+    }
+
+    fn by(&self, tau_s: T, lasts: T, way_m: T) -> (Self, Step<T>) {
         let x = lasts / tau_s;
         let step = Step { way_m, left: decay(x), moments: moments(x) };
         let place = Self {
@@ -136,14 +144,16 @@ impl<T: Number> Place<T> {
 }
 
 impl<T: Number> Point<T> {
-    /// As [`Place::to`], with the elastic force as a parabola in time, which the exponential is integrated against exactly.
-    fn to<L: Law<T>>(&self, law: &L, tau_s: T, end: (T, T), part: T) -> Self {
-        let (place, Step { way_m, left, moments: (first, second) }) = self.place.to(tau_s, end, part);
+    /// On to a place, with the elastic force as a parabola in time, which the exponential is integrated against exactly.
+    fn with<L: Law<T>>(&self, law: &L, (place, step): (Place<T>, Step<T>)) -> Self {
+        let Step { way_m, left, moments: (first, second) } = step;
         let force_n = law.force(place.depth_m);
         let middle = law.force(self.place.depth_m + way_m * 0.5);
-        let slope_0 = middle * 4.0 - self.force_n * 3.0 - force_n;
-        let slope_1 = self.force_n - middle * 4.0 + force_n * 3.0;
-        let force_memory = left * self.force_memory + slope_0 * (first - second) + slope_1 * second;
+        // Slopes 4 m - 3 f_0 - f_1 at the start and f_0 - 4 m + 3 f_1 at the end, times (first - second) and second.
+        let (start, middle_weight, end) =
+            (second * 4.0 - first * 3.0, first * 4.0 - second * 8.0, second * 4.0 - first);
+        let force_memory =
+            left * self.force_memory + self.force_n * start + middle * middle_weight + force_n * end;
         Self { place, force_n, force_memory }
     }
 }
@@ -195,16 +205,16 @@ impl<T: Number> LinearSolid<T> {
                     continue;
                 }
             };
-            let point = start.to(law, self.tau_s, (T::from(time), depth), T::from(1.0));
+            let point = start.with(law, start.place.to(self.tau_s, (T::from(time), depth)));
             now = Some(point);
             *out = match contact {
-                Contact::Fixed => self.sum(&point, &point),
+                Contact::Fixed => self.here(&point),
                 Contact::Shrinks => {
                     let last = grown.len() - 1;
                     if plain.moved(&grown[last].place.re(), &point.place.re()) >= 0.0 {
                         grown.push(point);
                         at = last + 1;
-                        self.sum(&point, &point)
+                        self.here(&point)
                     } else {
                         self.shrunk(law, grown, &mut at, &point)
                     }
@@ -219,6 +229,11 @@ impl<T: Number> LinearSolid<T> {
 
     fn re(&self) -> LinearSolid<f64> {
         LinearSolid { relaxed_fraction: self.relaxed_fraction.re(), tau_s: self.tau_s.re() }
+    }
+
+    /// `int psi(t - s) d f` up to now.
+    fn here(&self, now: &Point<T>) -> T {
+        now.force_n - self.relaxed_fraction * (now.force_n - now.force_memory)
     }
 
     /// `int psi(t - s) d f` up to `then`, seen from `now`.
@@ -237,7 +252,7 @@ impl<T: Number> LinearSolid<T> {
 
     /// Minus [`Self::moved`] to `now` from a part of the way to `end`, and its slope: both rise.
     fn part(&self, from: &Place<T>, end: (T, T), part: T, now: &Place<T>) -> (T, T) {
-        let (place, _) = from.to(self.tau_s, end, part);
+        let (place, _) = from.to_part(self.tau_s, end, part);
         let slope = self.remaining(now.time_s - place.time_s) * (end.1 - from.depth_m);
         (-self.moved(&place, now), slope)
     }
@@ -264,7 +279,7 @@ impl<T: Number> LinearSolid<T> {
         // The root is looked for in plain numbers; only its last step carries derivatives.
         let root = plain.parted(&from.place.re(), &next.re(), &now.place.re());
         let part = polish(T::from(root), |part| self.part(&from.place, end, part, &now.place));
-        self.sum(&from.to(law, self.tau_s, end, part), now)
+        self.sum(&from.with(law, from.place.to_part(self.tau_s, end, part)), now)
     }
 }
 
