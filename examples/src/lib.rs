@@ -2,6 +2,7 @@
 
 pub mod dough;
 pub mod grains;
+pub mod plot;
 
 use indicatif::{ParallelProgressIterator, ProgressStyle};
 use missing_physics::data::{Recording, Run};
