@@ -16,7 +16,7 @@ const PRESSURES_PA: [f64; 8] = [0.0, 1000.0, 2000.0, 3000.0, 4500.0, 6140.0, 900
 const NOISE_N: f64 = 2e-3;
 
 /// Figure 5.5: force over depth under the ball (a) and a plate (c), and the moduli behind them (d).
-pub fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
+pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
     println!("Effective modulus (figure 5.5 d; the thesis: 4.4 to 46.1 kPa over its pressures)");
     println!("{:>9} {:>9} {:>19} {:>8} {:>11}", "p (kPa)", "E (kPa)", "95 % interval", "misfit", "plate (kPa)");
     let mut rng = ChaCha8Rng::seed_from_u64(55);
@@ -65,7 +65,7 @@ fn pressed(pressure_pa: f64, probe_m: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, V
 }
 
 /// Figure 5.6: the valve's duty goes up and down; the force on a probe that just touches without pressure. Then 222 cycles at 1 Hz.
-pub fn cycles() -> Panel {
+pub(crate) fn cycles() -> Panel {
     let dome = Dome::thesis();
     // The valve's opening at which pressure comes to rest at 6.14 kPa.
     let top = 0.27;
@@ -106,7 +106,7 @@ fn triangle(phase: f64) -> f64 {
 }
 
 /// Figure 5.7: the smallest indentation that the camera shows, and the force that it takes.
-pub fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
+pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
     println!("\nSmallest force that shows (figure 5.7), by the camera's noise and by the thesis's 0.6 mm");
     println!("{:>9} {:>10} {:>8} {:>16} {:>14}", "p (kPa)", "gain", "markers", "delta_min (um)", "F_min (mN)");
     let mut panel = Panel::new("5.7: smallest force (mN)", "pressure (kPa)", "");

@@ -14,7 +14,7 @@ use super::Outcome;
 const GRAVITY: f64 = 9.80665;
 
 /// Figure 5.11: beads are poured in until the camera sees shear.
-pub fn slips(stiffness: &Stiffness, panels: &mut Vec<Panel>) -> Outcome<()> {
+pub(crate) fn slips(stiffness: &Stiffness, panels: &mut Vec<Panel>) -> Outcome<()> {
     let (trials, pressures): (u64, &[f64]) = if examples::small() {
         (2, &[0.0, 3000.0])
     } else {
@@ -93,7 +93,7 @@ fn mass_at_slip_kg(pressure_pa: f64, seed: u64) -> Outcome<f64> {
 }
 
 /// The task of section 5.5.
-pub fn demonstration() -> Outcome<Panel> {
+pub(crate) fn demonstration() -> Outcome<Panel> {
     let mut bench = Bench::thesis(9);
     bench.pour_kg_s = 10e-3;
     let mut grasp = Grasp::new::<FakeError>(GraspSettings::default())?;

@@ -20,7 +20,7 @@ fn bench(pressure_pa: f64, seed: u64) -> Bench {
 }
 
 /// Figure 5.2: traces of the markers, and what the motion is called.
-pub fn traces() -> Outcome<Vec<Panel>> {
+pub(crate) fn traces() -> Outcome<Vec<Panel>> {
     println!("What moved (figure 5.2)");
     println!("{:>8} {:>7} {:>14} {:>11} {:>11}", "done", "shear", "press", "twist", "residual");
     let none = Touch { indentation_m: 3e-3, ..Touch::none() };
@@ -79,7 +79,7 @@ fn shear_of(bench: &Bench, load_n: f64) -> Option<f64> {
 }
 
 /// Figure 5.9: displacement along the shear under 0.8 N, by pressure, in mm at the skin's middle.
-pub fn contours(panels: &mut Vec<Panel>) -> Outcome<()> {
+pub(crate) fn contours(panels: &mut Vec<Panel>) -> Outcome<()> {
     println!("\nShear under 0.8 N (figure 5.9): the firmer tip gives way less");
     println!("{:>9} {:>12} {:>14}", "p (kPa)", "box (mm)", "largest (px)");
     for p in [0.0, 1500.0, 3000.0] {
@@ -115,7 +115,7 @@ pub fn contours(panels: &mut Vec<Panel>) -> Outcome<()> {
 }
 
 /// Figure 5.10: load against mean shear as the camera sees it, learned at four pressures, asked at others.
-pub fn shear_loads() -> Outcome<Panel> {
+pub(crate) fn shear_loads() -> Outcome<Panel> {
     let at = |pressure_pa: f64, shear_m: f64, seed: u64| -> Outcome<Sheared> {
         let mut bench = bench(pressure_pa, seed);
         let mut tracker = Tracker::new(&bench.picture()?.value, TrackerSettings::default())?;

@@ -86,7 +86,9 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
                 (size - radius, Vector4::new(d[0], d[1], d[2], 1.0))
             })
             .collect();
-        let Some(Robust { step, sigma, scatter }) = robust_step(&rows) else { return Err(flat) };
+        let Some(Robust { step, sigma, scatter }) = robust_step(&rows, &[0.0; 4], &[0.0; 4]) else {
+            return Err(flat);
+        };
         centre += step.fixed_rows::<3>(0);
         radius += step[3];
         result = (scatter, sigma[3]);
@@ -113,10 +115,15 @@ struct Robust<const N: usize> {
     scatter: f64,
 }
 
-/// One step on residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights.
-fn robust_step<const N: usize>(rows: &[(f64, SVector<f64, N>)]) -> Option<Robust<N>> {
-    let off: Vec<f64> = rows.iter().map(|r| r.0).collect();
-    let scatter = spread(&off);
+/// One step on residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights; `known` is the precision
+/// with which each parameter is known before, and `off` how far it is below that.
+fn robust_step<const N: usize>(
+    rows: &[(f64, SVector<f64, N>)],
+    known: &[f64; N],
+    off: &[f64; N],
+) -> Option<Robust<N>> {
+    let residuals: Vec<f64> = rows.iter().map(|r| r.0).collect();
+    let scatter = spread(&residuals);
     let cut = TUKEY * scatter.max(1e-9);
     let (mut gram, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
     let (mut weight, mut square) = (0.0, 0.0);
@@ -127,8 +134,12 @@ fn robust_step<const N: usize>(rows: &[(f64, SVector<f64, N>)]) -> Option<Robust
         weight += w;
         square += w * r * r;
     }
-    let inverse = gram.try_inverse()?;
     let variance = square / (weight - N as f64).max(1.0);
+    for k in 0..N {
+        gram[(k, k)] += known[k] * variance;
+        right[k] += known[k] * variance * off[k];
+    }
+    let inverse = gram.try_inverse()?;
     let sigma = inverse.diagonal().map(|v| (v * variance).max(0.0).sqrt());
     Some(Robust { step: inverse * right, sigma, scatter })
 }
@@ -190,7 +201,7 @@ pub fn points(cloud: &Cloud, states: &[State]) -> Vec<[f64; 3]> {
 /// and falls like the logarithm of the distance, `h(rho) = h(a) + a h'(a) ln(rho / a)`.
 ///
 /// # Errors
-/// [`ContactError`].
+/// [`ContactError`]; [`ContactError::Flat`] where so little of the ball shows that its edge, and with it the radius, stays open.
 pub fn cap(cloud: &Cloud, states: &[State]) -> Result<Ball, ContactError> {
     let touching = points(cloud, states);
     let whole = ball(&touching)?;
@@ -201,9 +212,17 @@ pub fn cap(cloud: &Cloud, states: &[State]) -> Result<Ball, ContactError> {
     let rough = *distances.select_nth_unstable_by(outer, f64::total_cmp).1;
     let all = (0..states.len()).filter_map(|i| cloud.raw_point(i));
     let near: Vec<[f64; 3]> = all.filter(|p| from_axis(p) < FLANK * rough).collect();
-    Ok(Cap::start(&whole, rough).fit(&near).unwrap_or(whole))
+    match Cap::start(&whole, rough).fit(&near, rough) {
+        Some(found) if found.radius_m > 3.0 * found.radius_sigma_m => Ok(found),
+        Some(open) => Err(ContactError::Flat { radius_m: open.radius_m, sigma_m: open.radius_sigma_m }),
+        // Far around the ball its own points tell enough.
+        None if rough > WRAPPED * whole.radius_m => Ok(whole),
+        None => Err(ContactError::Flat { radius_m: whole.radius_m, sigma_m: f64::INFINITY }),
+    }
 }
 
+/// Contact's radius over the ball's from which on the edge need not be told from the flank.
+const WRAPPED: f64 = 0.7;
 /// How far the flank is looked at, of the contact's rough radius: near the edge a membrane of any tensions and frame is alike.
 const FLANK: f64 = 1.2;
 
@@ -244,8 +263,17 @@ impl Cap {
         (z, slopes.into())
     }
 
+    /// Precision and mean of what is known before: the edge lies about where the contact seems to end, and a flank of any tensions
+    /// bends little. A cap that is too small to tell its edge then says so in the radius's standard deviation.
+    fn prior(rough: f64) -> [(f64, f64); 7] {
+        let free = (0.0, 0.0);
+        let edge = ((0.3 * rough).powi(-2), 0.7 * rough);
+        [free, free, free, free, edge, (1.0, 0.0), (1.0, 0.0)]
+    }
+
     /// Gauss-Newton with Tukey's weights; none where it does not settle within the contact.
-    fn fit(mut self, near: &[[f64; 3]]) -> Option<Ball> {
+    fn fit(mut self, near: &[[f64; 3]], rough: f64) -> Option<Ball> {
+        let prior = Self::prior(rough);
         for _ in 0..60 {
             let rows: Vec<(f64, SVector<f64, 7>)> = near
                 .iter()
@@ -254,7 +282,9 @@ impl Cap {
                     (p[2] - z, slope)
                 })
                 .collect();
-            let Robust { step, sigma, scatter } = robust_step(&rows)?;
+            let known = prior.map(|(precision, _)| precision);
+            let off = std::array::from_fn(|k| prior[k].1 - self.0[k]);
+            let Robust { step, sigma, scatter } = robust_step(&rows, &known, &off)?;
             // Radius and edge by a quarter at most, so that the edge stays inside the ball.
             let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(1.0, f64::min);
             self.0 += part * step;
@@ -262,11 +292,9 @@ impl Cap {
             if !(radius_m.is_finite() && radius_m > 0.0 && edge > 0.05 * radius_m && edge < 0.97 * radius_m) {
                 return None;
             }
-            if step.fixed_rows::<5>(0).norm() < 1e-8 * radius_m {
+            if step.fixed_rows::<5>(0).norm() < 1e-7 * radius_m {
                 let (radius_sigma_m, scatter_m) = (sigma[3], scatter);
-                let settled = radius_m > 3.0 * radius_sigma_m;
-                let centre_m = [x, y, top + radius_m];
-                return settled.then_some(Ball { centre_m, radius_m, radius_sigma_m, scatter_m });
+                return Some(Ball { centre_m: [x, y, top + radius_m], radius_m, radius_sigma_m, scatter_m });
             }
         }
         None

@@ -106,6 +106,47 @@ impl Segmenter {
         &self.curvature
     }
 
+    /// The ratio of the tensions that the last cloud's free membrane shows, and its standard deviation; none where too little of it is
+    /// curved.
+    ///
+    /// Where nothing touches, `k_j + r k_i` is zero: r is the line through the origin nearest to the pairs of curvatures of the deformed
+    /// pixels (both have the same noise: total least squares). Smoothing ties neighbours together, so the standard deviation is that of
+    /// leaving out each of eight sectors about the contact in turn. The tensions depend on the stretch and hardly on the
+    /// object: one press of anything, not too deep, finds r for a stretch.
+    pub fn tension_ratio(&self, cloud: &Cloud) -> Option<(f64, f64)> {
+        let columns = cloud.columns().max(1);
+        let at = |k: usize| ((k % columns) as f64, (k / columns) as f64);
+        let touching = || (0..self.states.len()).filter(|k| self.states[*k] == State::Contact);
+        let n = touching().count() as f64;
+        let sum = touching().map(at).fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        let middle = (sum.0 / n, sum.1 / n);
+        let reach = (n / std::f64::consts::PI).sqrt();
+        // Beside the contact the smoothing takes in some of it; far away there is noise alone.
+        let near = [reach + 2.0 * cloud.step as f64, 2.2 * reach + 2.0 * cloud.step as f64];
+        let mut sectors = [[0.0; 3]; 8];
+        for k in (0..self.states.len()).filter(|k| self.states[*k] == State::Deformed) {
+            let (i, j) = (f64::from(self.curvature.i[k]), f64::from(self.curvature.j[k]));
+            let (u, v) = (at(k).0 - middle.0, at(k).1 - middle.1);
+            if !(i + j).is_finite() || !(near[0]..near[1]).contains(&u.hypot(v)) {
+                continue;
+            }
+            let sector = ((v.atan2(u) / std::f64::consts::TAU + 0.5) * 8.0) as usize % 8;
+            for (s, x) in sectors[sector].iter_mut().zip([i * i, i * j, j * j]) {
+                *s += x;
+            }
+        }
+        let total = |left_out: usize| {
+            let kept = sectors.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, s)| s);
+            slope(kept.fold([0.0; 3], |t, s| [t[0] + s[0], t[1] + s[1], t[2] + s[2]]))
+        };
+        let ratio = total(8)?;
+        let parts: Option<Vec<f64>> = (0..8).map(total).collect();
+        let parts = parts?;
+        let mean = parts.iter().sum::<f64>() / 8.0;
+        let sigma = (parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() * 7.0 / 8.0).sqrt();
+        (sigma < 0.5 * ratio).then_some((ratio, sigma))
+    }
+
     /// Smoothing widens a contact; where the signal is half of the contact's median, its edge was.
     fn trim(&mut self, settings: &SegmentSettings) {
         let at = |k: usize| settings.rule.signal(self.curvature.i[k], self.curvature.j[k]);
@@ -200,4 +241,12 @@ impl Segmenter {
             }
         }
     }
+}
+
+/// r of `k_j + r k_i = 0` from the sums of `k_i^2`, `k_i k_j`, `k_j^2`: the direction along which the pairs scatter least is `(r, 1)`.
+fn slope([ii, ij, jj]: [f64; 3]) -> Option<f64> {
+    let half = 0.5 * (ii - jj);
+    // The eigenvector of the smaller eigenvalue of [[ii, ij], [ij, jj]].
+    let ratio = -ij / (half + half.hypot(ij));
+    (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
 }
