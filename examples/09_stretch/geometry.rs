@@ -29,7 +29,8 @@ pub(crate) fn section(panels: &mut Vec<Panel>) -> Outcome<()> {
     panels.push(panel);
     println!("Ratio of the tensions across and along, as one picture's free membrane shows it");
     println!("{:>13} {:>16} {:>6}", "stretch (mm)", "seen", "true");
-    for stretch_m in stretches() {
+    let all = stretches();
+    for &stretch_m in if examples::small() { &all[..1] } else { &all[..] } {
         let (cloud, segmenter) = look(&mut rig, stretch_m, at(0.0, -0.012))?;
         let [along, across] = rig.membrane().tension_n_m;
         let seen = segmenter.tension_ratio(&cloud);
@@ -52,7 +53,7 @@ fn face(diameter_m: f64, stretch_m: f64, depth_m: f64) -> Errors {
 /// Figure 6.4: errors of cylinders' diameters over depth and stretch, and those of a ball with their intervals.
 pub(crate) fn faces(panels: &mut Vec<Panel>) {
     let (diameters_mm, depths_mm): (Vec<f64>, Vec<f64>) = if examples::small() {
-        (vec![20.0], vec![3.0, 6.0, 12.0])
+        (vec![20.0], vec![3.0, 12.0])
     } else {
         (vec![10.0, 15.0, 20.0, 25.0, 30.0], vec![1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.0, 15.0])
     };

@@ -25,9 +25,9 @@ pub struct Panel {
     equal: bool,
 }
 
-/// A colour of a row of `n`.
+/// A colour of a row of `n`, from blue to red.
 pub fn hue(k: usize, n: usize) -> String {
-    format!("hsl({:.0},70%,40%)", 250.0 * k as f64 / (n.max(2) - 1) as f64)
+    format!("hsl({:.0},70%,40%)", 240.0 - 240.0 * k as f64 / (n.max(2) - 1) as f64)
 }
 
 /// A colour for a value from 0 (pale) to 1 (dark).

@@ -28,7 +28,8 @@ pub enum State {
 /// When a curvature counts as contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// `k_j + r k_i` above the threshold, r being the tension across over that along the stretch.
+    /// `k_j + r k_i` above the threshold, r being the tension across over that along the stretch. [`Segmenter::tension_ratio`] finds it;
+    /// the default, which is larger than most membranes', leaves out more of the flank, and finds balls and faces as well or better.
     Load {
         /// r, above 0.
         ratio: f32,
@@ -111,8 +112,7 @@ impl Segmenter {
     ///
     /// Where nothing touches, `k_j + r k_i` is zero: r is the line through the origin nearest to the pairs of curvatures of the deformed
     /// pixels (both have the same noise: total least squares). Smoothing ties neighbours together, so the standard deviation is that of
-    /// leaving out each of eight sectors about the contact in turn. The tensions depend on the stretch and hardly on the
-    /// object: one press of anything, not too deep, finds r for a stretch.
+    /// leaving out each of eight sectors about the contact in turn.
     pub fn tension_ratio(&self, cloud: &Cloud) -> Option<(f64, f64)> {
         let columns = cloud.columns().max(1);
         let at = |k: usize| ((k % columns) as f64, (k / columns) as f64);
