@@ -18,7 +18,10 @@ const NOISE_N: f64 = 2e-3;
 /// Figure 5.5: force over depth under the ball (a) and a plate (c), and the moduli behind them (d).
 pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
     println!("Effective modulus (figure 5.5 d; the thesis: 4.4 to 46.1 kPa over its pressures)");
-    println!("{:>9} {:>9} {:>19} {:>8} {:>11}", "p (kPa)", "E (kPa)", "95 % interval", "misfit", "plate (kPa)");
+    println!(
+        "{:>9} {:>9} {:>19} {:>8} {:>11}",
+        "p (kPa)", "E (kPa)", "95 % interval", "misfit", "plate (kPa)"
+    );
     let mut rng = ChaCha8Rng::seed_from_u64(55);
     let mut moduli = Panel::new("5.5 d: effective modulus (kPa)", "pressure (kPa)", "");
     let mut states = Vec::new();
@@ -108,7 +111,10 @@ fn triangle(phase: f64) -> f64 {
 /// Figure 5.7: the smallest indentation that the camera shows, and the force that it takes.
 pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
     println!("\nSmallest force that shows (figure 5.7), by the camera's noise and by the thesis's 0.6 mm");
-    println!("{:>9} {:>10} {:>8} {:>16} {:>14}", "p (kPa)", "gain", "markers", "delta_min (um)", "F_min (mN)");
+    println!(
+        "{:>9} {:>10} {:>8} {:>16} {:>14}",
+        "p (kPa)", "gain", "markers", "delta_min (um)", "F_min (mN)"
+    );
     let mut panel = Panel::new("5.7: smallest force (mN)", "pressure (kPa)", "");
     let (mut seen, mut printed) = (Vec::new(), Vec::new());
     for p in PRESSURES_PA {
@@ -128,8 +134,14 @@ pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
         seen.push([1e-3 * p, 100.0 * ours]);
         printed.push([1e-3 * p, thesis]);
     }
-    panel.line(seen.clone(), "steelblue").dots(seen, "steelblue").name("camera's noise, times 100", "steelblue");
-    panel.line(printed.clone(), "crimson").dots(printed, "crimson").name("0.6 mm, as in the thesis", "crimson");
+    panel
+        .line(seen.clone(), "steelblue")
+        .dots(seen, "steelblue")
+        .name("camera's noise, times 100", "steelblue");
+    panel
+        .line(printed.clone(), "crimson")
+        .dots(printed, "crimson")
+        .name("0.6 mm, as in the thesis", "crimson");
     Ok(panel)
 }
 
@@ -141,8 +153,12 @@ fn sight(pressure_pa: f64) -> Outcome<(f64, f64, usize)> {
     bench.touch = Touch::none();
     let mut tracker = Tracker::new(&bench.picture()?.value, TrackerSettings::default())?;
     let square = |tracker: &Tracker| {
-        let seen: Vec<f64> =
-            tracker.tracks().iter().filter(|t| t.seen()).map(|t| t.by_px().map(|v| v * v).iter().sum()).collect();
+        let seen: Vec<f64> = tracker
+            .tracks()
+            .iter()
+            .filter(|t| t.seen())
+            .map(|t| t.by_px().map(|v| v * v).iter().sum())
+            .collect();
         (seen.iter().sum::<f64>() / seen.len().max(1) as f64, seen.len())
     };
     // Both axes, and the first picture's own noise.

@@ -38,7 +38,8 @@ pub(crate) fn traces() -> Outcome<Vec<Panel>> {
         let mut lines: Vec<Vec<[f64; 2]>> = tracker.tracks().iter().map(|t| vec![t.at_px]).collect();
         for k in 1..=8 {
             let part = f64::from(k) / 8.0;
-            bench.touch.indentation_m = start.indentation_m + part * (end.indentation_m - start.indentation_m);
+            bench.touch.indentation_m =
+                start.indentation_m + part * (end.indentation_m - start.indentation_m);
             bench.touch.shear_m = end.shear_m.map(|s| part * s);
             bench.touch.turn_rad = part * end.turn_rad;
             tracker.next(&bench.picture()?.value)?;

@@ -31,8 +31,11 @@ fn presses(shape: Shape, stretch_m: f64) -> Vec<(f64, f64)> {
 pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Surface> {
     let stretches = stretches();
     let n = stretches.len();
-    let [ball, rod, cone] =
-        [Indenter::Sphere { radius_m: 0.01 }, Indenter::Cylinder { radius_m: 0.01 }, Indenter::Cone { angle_rad: 0.785 }];
+    let [ball, rod, cone] = [
+        Indenter::Sphere { radius_m: 0.01 },
+        Indenter::Cylinder { radius_m: 0.01 },
+        Indenter::Cone { angle_rad: 0.785 },
+    ];
     let three = [
         ("6.3 a: force (N), ball of 20 mm", ball, Shape::Ball { radius_m: 0.01 }),
         ("6.3 b: force (N), cylinder of 20 mm", rod, Shape::Cylinder { radius_m: 0.01 }),
@@ -72,7 +75,8 @@ pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Surface> {
 
 /// Presses of all balls at all stretches.
 fn balls(stretches: &[f64]) -> Vec<Press> {
-    let states: Vec<(f64, f64)> = RADII_M.iter().flat_map(|r| stretches.iter().map(move |x| (*r, *x))).collect();
+    let states: Vec<(f64, f64)> =
+        RADII_M.iter().flat_map(|r| stretches.iter().map(move |x| (*r, *x))).collect();
     let of = |(radius_m, stretch_m): (f64, f64)| -> Vec<Press> {
         presses(Shape::Ball { radius_m }, stretch_m)
             .into_iter()
@@ -96,7 +100,9 @@ fn by_diameter(balls: &[Press]) -> Panel {
 
 /// Figures 6.3 e and 6.5 a: the modulus by diameter and stretch, and the error with a radius left out.
 fn moduli(surface: &Surface, balls: &[Press], stretches: &[f64], panels: &mut Vec<Panel>) -> Outcome<()> {
-    println!("\nEffective modulus E* of balls (kPa); rows: stretch (mm), columns: diameter (mm) (figure 6.3 e)");
+    println!(
+        "\nEffective modulus E* of balls (kPa); rows: stretch (mm), columns: diameter (mm) (figure 6.3 e)"
+    );
     println!("{:>4}{}", "", RADII_M.iter().map(|r| format!("{:>9.0}", 2e3 * r)).collect::<String>());
     let mut over_stretch = Panel::new("6.3 e: E* (kPa) by diameter", "stretch (mm)", "");
     let mut over_diameter = Panel::new("6.5 a: E* (kPa) by stretch, a + b exp(-D/c)", "diameter (mm)", "");
@@ -111,16 +117,18 @@ fn moduli(surface: &Surface, balls: &[Press], stretches: &[f64], panels: &mut Ve
         let colour = hue(l, stretches.len());
         over_diameter.dots(RADII_M.iter().zip(&cells).map(|(r, e)| [2e3 * r, *e]), &colour);
         let line = (0..=32).map(|i| 0.008 + 5e-4 * f64::from(i));
-        over_diameter.line(
-            line.filter_map(|r| surface.modulus_pa(r, x).ok().map(|e| [2e3 * r, 1e-3 * e])),
-            &colour,
-        );
+        over_diameter
+            .line(line.filter_map(|r| surface.modulus_pa(r, x).ok().map(|e| [2e3 * r, 1e-3 * e])), &colour);
         over_diameter.name(format!("{:.0} mm", 1e3 * x), &colour);
     }
     for (k, r) in RADII_M.into_iter().enumerate() {
         let colour = hue(k, RADII_M.len());
-        let points = stretches.iter().map(|x| Ok([1e3 * x, own(r, *x)?])).collect::<Outcome<Vec<[f64; 2]>>>()?;
-        over_stretch.line(points.clone(), &colour).dots(points, &colour).name(format!("{:.0} mm", 2e3 * r), &colour);
+        let points =
+            stretches.iter().map(|x| Ok([1e3 * x, own(r, *x)?])).collect::<Outcome<Vec<[f64; 2]>>>()?;
+        over_stretch
+            .line(points.clone(), &colour)
+            .dots(points, &colour)
+            .name(format!("{:.0} mm", 2e3 * r), &colour);
     }
     panels.extend([over_stretch, over_diameter]);
     let (mean, spread) = surface.left_out_error_n();
@@ -153,9 +161,13 @@ fn interpolated(surface: &Surface, stretches: &[f64], panels: &mut Vec<Panel>) -
         let fine: Vec<f64> = (0..=30).map(|i| 5e-4 * f64::from(i)).collect();
         let line = curve(surface, ASKED_M, x, &fine)?;
         forces.line(fine.iter().zip(line).map(|(d, f)| [1e3 * d, f]), &colour);
-        forces.dots(pressed.iter().map(|p| [1e3 * p.0, p.1]), &colour).name(format!("{:.0} mm", 1e3 * x), &colour);
+        forces
+            .dots(pressed.iter().map(|p| [1e3 * p.0, p.1]), &colour)
+            .name(format!("{:.0} mm", 1e3 * x), &colour);
     }
-    println!("a ball of 25 mm, not among those pressed: F(delta) is off by {worst:.3} N at most (figure 6.5 c)");
+    println!(
+        "a ball of 25 mm, not among those pressed: F(delta) is off by {worst:.3} N at most (figure 6.5 c)"
+    );
     panels.extend([rising, forces]);
     Ok(())
 }

@@ -64,14 +64,17 @@ pub(crate) fn faces(panels: &mut Vec<Panel>) {
         .collect();
     let errors: Vec<Errors> =
         states.par_iter().map(|&(d, x, depth)| face(1e-3 * d, x, 1e-3 * depth)).collect();
-    let of = |d: f64, x: f64, depth: f64| {
-        states.iter().position(|s| *s == (d, x, depth)).and_then(|k| errors[k])
-    };
-    println!("\nErrors of a 20 mm cylinder's diameter along i / j (mm; figure 6.4 b, c); columns: depth (mm)");
+    let of =
+        |d: f64, x: f64, depth: f64| states.iter().position(|s| *s == (d, x, depth)).and_then(|k| errors[k]);
+    println!(
+        "\nErrors of a 20 mm cylinder's diameter along i / j (mm; figure 6.4 b, c); columns: depth (mm)"
+    );
     table(&depths_mm, &|x, depth| {
         of(20.0, x, depth).map_or("no edge".into(), |e| format!("{:+.2} / {:+.2}", 1e3 * e[0], 1e3 * e[1]))
     });
-    println!("\nMean absolute error along i and j over the stretches (mm; figure 6.4 a); columns: depth (mm)");
+    println!(
+        "\nMean absolute error along i and j over the stretches (mm; figure 6.4 a); columns: depth (mm)"
+    );
     let head: String = depths_mm.iter().map(|d| format!("{d:>9.0}")).collect();
     println!("{:>9}{head}", "D (mm)");
     for &d in &diameters_mm {
@@ -84,7 +87,12 @@ pub(crate) fn faces(panels: &mut Vec<Panel>) {
             if seen.is_empty() {
                 return format!("{:>9}", "-");
             }
-            format!("{:>6.2} {}/{}", seen.iter().sum::<f64>() / seen.len() as f64, seen.len(), stretches().len())
+            format!(
+                "{:>6.2} {}/{}",
+                seen.iter().sum::<f64>() / seen.len() as f64,
+                seen.len(),
+                stretches().len()
+            )
         };
         println!("{d:>9.0}{}", depths_mm.iter().map(|depth| cell(*depth)).collect::<String>());
     }
@@ -94,7 +102,9 @@ pub(crate) fn faces(panels: &mut Vec<Panel>) {
         gap(low, high) / (high - low).max(1) as f64
     };
     let stretched: Vec<f64> = stretches().iter().map(|x| 1e3 * x).collect();
-    for (axis, title) in ["6.4 c: error along i (mm), 20 mm", "6.4 b: error along j (mm), 20 mm"].iter().enumerate() {
+    for (axis, title) in
+        ["6.4 c: error along i (mm), 20 mm", "6.4 b: error along j (mm), 20 mm"].iter().enumerate()
+    {
         let mut panel = Panel::new(*title, "depth (mm)", "stretch (mm)");
         for (k, &depth) in depths_mm.iter().enumerate() {
             for (l, x) in stretches().into_iter().enumerate() {

@@ -55,7 +55,9 @@ pub(crate) fn reconstructed(panels: &mut Vec<Panel>) -> Outcome<()> {
 fn surface(shape: &Shape, half_m: [f64; 2]) -> Vec<[f64; 3]> {
     let steps = |half: f64| (0..=(4e3 * half) as usize).map(move |k| 5e-4 * k as f64 - half);
     let at = |x: f64, y: f64| shape.height_m(x, y).map(|z| [x, y, z]);
-    steps(half_m[0]).flat_map(|x| steps(half_m[1]).filter_map(move |y| at(x, y)).collect::<Vec<_>>()).collect()
+    steps(half_m[0])
+        .flat_map(|x| steps(half_m[1]).filter_map(move |y| at(x, y)).collect::<Vec<_>>())
+        .collect()
 }
 
 /// Distance from the nearest of some points, m.
@@ -66,7 +68,8 @@ fn nearest_m(points: &[[f64; 3]], to: &[f64; 3]) -> f64 {
 
 /// A map of heights with the object's outline.
 fn heights(name: &str, seen: &[[f64; 3]], half_m: [f64; 2]) -> Panel {
-    let mut panel = Panel::new(format!("6.6: {name}"), "x (mm)", "y (mm), colour: height, blue 0, red -5 mm").map();
+    let mut panel =
+        Panel::new(format!("6.6: {name}"), "x (mm)", "y (mm), colour: height, blue 0, red -5 mm").map();
     for p in seen {
         let level = (10.0 + 2e3 * p[2]).clamp(0.0, 10.0) as usize;
         panel.cell([1e3 * p[0], 1e3 * p[1]], [1.5, 1.5], &hue(10 - level, 11));
@@ -89,14 +92,17 @@ const SIDE_M: f64 = 0.02;
 
 /// Figure 6.8: a cube of dough rolled in circles until its height settles, then pressed flat; and one that is only pressed.
 pub(crate) fn cookies(panels: &mut Vec<Panel>) -> Outcome<()> {
-    println!("\nCookies from a cube of 20 mm (figure 6.8; the thesis: circularity 0.888 on average, a square 0.785)");
+    println!(
+        "\nCookies from a cube of 20 mm (figure 6.8; the thesis: circularity 0.888 on average, a square 0.785)"
+    );
     println!("{:>10} {:>8} {:>8} {:>18} {:>12}", "", "circles", "settled", "height (mm)", "circularity");
     let ways = [("rolled", true), ("not rolled", false)];
     let ways = if examples::small() { &ways[..1] } else { &ways[..] };
     let cookies: Vec<Cookie> = ways.par_iter().map(|(_, rolls)| cookie(*rolls)).collect::<Outcome<_>>()?;
     let mut heights = Panel::new("6.8: height while rolled (mm)", "circle", "");
     for ((name, rolls), cookie) in ways.iter().zip(&cookies) {
-        let [first, last] = [cookie.heights_mm.first(), cookie.heights_mm.last()].map(|h| h.copied().unwrap_or(f64::NAN));
+        let [first, last] =
+            [cookie.heights_mm.first(), cookie.heights_mm.last()].map(|h| h.copied().unwrap_or(f64::NAN));
         let words = if *rolls { format!("{first:.1} to {last:.1}") } else { "-".into() };
         println!(
             "{name:>10} {:>8} {:>8} {words:>18} {:>12.3}",
@@ -131,8 +137,7 @@ fn cookie(rolls: bool) -> Outcome<Cookie> {
     if rolls {
         // Medium firmness; half a circle's way to each side.
         rig.open_to(0.13, 0.05)?;
-        let rolling =
-            Rolling { middle: at(0.0, SIDE_M - 6e-3), circle_m: 8e-3, moves: (6, 0.17), most: 60 };
+        let rolling = Rolling { middle: at(0.0, SIDE_M - 6e-3), circle_m: 8e-3, moves: (6, 0.17), most: 60 };
         let height = |rig: &mut Rig| top_m(rig);
         let done = roll(&mut rig, &rolling, Settling::thesis(), height).map_err(|e| e.to_string())?;
         settled = done.settled;

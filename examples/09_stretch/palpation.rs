@@ -24,7 +24,8 @@ pub(crate) fn balloons(surface: &Surface, panels: &mut Vec<Panel>) -> Outcome<()
     let felt: Vec<(usize, Palpation)> = trials
         .into_par_iter()
         .map(|(k, seed)| {
-            let mut rig = Rig::new(Shape::Ball { radius_m: 0.02 }, Filling::Springy(FILLINGS[k].1), 100 + seed);
+            let mut rig =
+                Rig::new(Shape::Ball { radius_m: 0.02 }, Filling::Springy(FILLINGS[k].1), 100 + seed);
             let stretches_m = vec![0.0, 0.02, 0.04, 0.06];
             let programme = Programme { stretches_m, pictures: 2, ..Programme::thesis(at(0.0, 0.03), 0.0) };
             Ok((k, palpate(&mut rig, &programme, surface).map_err(|e| e.to_string())?))

@@ -121,7 +121,13 @@ impl Panel {
         }
         let x = |v: f64| left + before + frame[0] * (v - ranges[0][0]) / (ranges[0][1] - ranges[0][0]);
         let y = |v: f64| top + above + frame[1] * (ranges[1][1] - v) / (ranges[1][1] - ranges[1][0]);
-        writeln!(svg, "<text x='{}' y='{}' font-weight='bold'>{}</text>", left + 8.0, top + 16.0, self.title)?;
+        writeln!(
+            svg,
+            "<text x='{}' y='{}' font-weight='bold'>{}</text>",
+            left + 8.0,
+            top + 16.0,
+            self.title
+        )?;
         for (mark, colour) in &self.marks {
             match mark {
                 Mark::Line(points) => {
@@ -164,13 +170,23 @@ impl Panel {
         )?;
         for v in ticks(ranges[0]) {
             let u = x(v);
-            writeln!(svg, "<text x='{u:.1}' y='{:.1}' text-anchor='middle'>{}</text>", bottom + 14.0, short(v))?;
+            writeln!(
+                svg,
+                "<text x='{u:.1}' y='{:.1}' text-anchor='middle'>{}</text>",
+                bottom + 14.0,
+                short(v)
+            )?;
         }
         for v in ticks(ranges[1]) {
             let (u, w) = (left + before - 4.0, y(v) + 4.0);
             writeln!(svg, "<text x='{u:.1}' y='{w:.1}' text-anchor='end'>{}</text>", short(v))?;
         }
-        writeln!(svg, "<text x='{right:.1}' y='{:.1}' text-anchor='end'>{}</text>", bottom + 30.0, self.labels[0])?;
+        writeln!(
+            svg,
+            "<text x='{right:.1}' y='{:.1}' text-anchor='end'>{}</text>",
+            bottom + 30.0,
+            self.labels[0]
+        )?;
         writeln!(svg, "<text x='{:.1}' y='{:.1}'>{}</text>", left + 8.0, top + 28.0, self.labels[1])?;
         for (k, (name, colour)) in self.legend.iter().enumerate() {
             let (u, v) = (left + before + 8.0, top + above + 14.0 + 12.0 * k as f64);

@@ -274,7 +274,7 @@ impl Cap {
     /// Gauss-Newton with Tukey's weights; none where it does not settle within the contact.
     fn fit(mut self, near: &[[f64; 3]], rough: f64) -> Option<Ball> {
         let prior = Self::prior(rough);
-        for _ in 0..60 {
+        for round in 0..60 {
             let rows: Vec<(f64, SVector<f64, 7>)> = near
                 .iter()
                 .map(|p| {
@@ -285,14 +285,15 @@ impl Cap {
             let known = prior.map(|(precision, _)| precision);
             let off = std::array::from_fn(|k| prior[k].1 - self.0[k]);
             let Robust { step, sigma, scatter } = robust_step(&rows, &known, &off)?;
-            // Radius and edge by a quarter at most, so that the edge stays inside the ball.
-            let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(1.0, f64::min);
+            // Radius and edge by a quarter at most, so that the edge stays inside the ball; later by half a step, since weights may swing.
+            let half = if round < 20 { 1.0 } else { 0.5 };
+            let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(half, f64::min);
             self.0 += part * step;
             let [x, y, top, radius_m, edge, ..] = <[f64; 7]>::from(self.0);
             if !(radius_m.is_finite() && radius_m > 0.0 && edge > 0.05 * radius_m && edge < 0.97 * radius_m) {
                 return None;
             }
-            if step.fixed_rows::<5>(0).norm() < 1e-7 * radius_m {
+            if (0..5).all(|k| step[k].abs() < 1e-3 * sigma[k]) {
                 let (radius_sigma_m, scatter_m) = (sigma[3], scatter);
                 return Some(Ball { centre_m: [x, y, top + radius_m], radius_m, radius_sigma_m, scatter_m });
             }

@@ -228,9 +228,9 @@ impl<T: Number> Sample<'_, T> {
     /// The same and its slope.
     fn bulk_both(&self, d: T) -> (T, T) {
         let half = self.half_space().both(d);
-        let layered = self.layered(d).map_or(half, |(factor, slope)| {
-            (half.0 * factor, half.1 * factor + half.0 * factor / d * slope)
-        });
+        let layered = self
+            .layered(d)
+            .map_or(half, |(factor, slope)| (half.0 * factor, half.1 * factor + half.0 * factor / d * slope));
         self.adhesive().map_or(layered, |sticky| {
             let sticky = sticky.both(d);
             (layered.0 + sticky.0 - half.0, layered.1 + sticky.1 - half.1)

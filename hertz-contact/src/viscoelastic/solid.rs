@@ -114,11 +114,7 @@ impl<T> Default for Scratch<T> {
 
 impl<T: Number> Place<T> {
     fn re(&self) -> Place<f64> {
-        Place {
-            time_s: self.time_s.re(),
-            depth_m: self.depth_m.re(),
-            depth_memory: self.depth_memory.re(),
-        }
+        Place { time_s: self.time_s.re(), depth_m: self.depth_m.re(), depth_memory: self.depth_memory.re() }
     }
 
     /// On along a straight line in time to a later time and depth; times may be equal: a jump.
