@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use liquid_haptics::slosh::UprightCylinder;
-use missing_physics::model::{DerivedPerRun, Spec};
+use liquid_haptics::slosh::{Decay, Effects, UprightCylinder};
+use missing_physics::model::{DerivedPerRun, Over, Spec};
 
 use super::model::Setup;
 use crate::domains::builder::{ANY, At, Builder};
@@ -75,8 +75,15 @@ pub(super) fn build(
         ],
         &["nonlinear-frequency"],
     );
-    p.frequency = b.shared("coefficient", "", 0.0, [-0.3, 0.3], 0.01);
-    b.mechanism(
+    let square = largest * largest;
+    p.frequency = b.shared(
+        &format!("coefficient_per_{suffix}2"),
+        &format!("1/({unit})^2"),
+        0.0,
+        [-0.3 / square, 0.3 / square],
+        0.01 / square,
+    );
+    let mechanism = b.mechanism(
         "nonlinear-frequency",
         &[p.frequency],
         [
@@ -87,6 +94,19 @@ pub(super) fn build(
         ],
         &["surface-tension"],
     );
+    // The start says how high the wave is only together with the spring: the change is that of its motion.
+    let (cos, sin, frequency) = (p.cos.slot, p.sin.slot, p.frequency.slot);
+    let shift = move |shared: &[f64], own: &[f64]| {
+        let effects =
+            Effects { frequency_change: shared[frequency], largest_amplitude: 1.0, ..Effects::default() };
+        Decay { omega_rad_s: omega, damping_ratio: 0.0, effects }.frequency_shift([own[cos], own[sin]])
+    };
+    mechanism.derived_per_run = vec![DerivedPerRun {
+        name: "coefficient".into(),
+        unit: String::new(),
+        over: Over::Largest,
+        value: Arc::new(shift),
+    }];
     p.friction = b.shared(&format!("friction_{suffix}"), unit, 0.0, [0.0, largest], at_rest * largest);
     b.mechanism(
         "contact-line-friction",
@@ -188,6 +208,7 @@ fn amplitude_of(cos: At, sin: At, suffix: &str, unit: &str) -> DerivedPerRun {
     DerivedPerRun {
         name: format!("amplitude_{suffix}"),
         unit: unit.into(),
+        over: Over::Mean,
         value: Arc::new(move |_, own| own[cos.slot].hypot(own[sin.slot])),
     }
 }
