@@ -164,9 +164,8 @@ impl InDuals for IndentationModel {
         let p = &self.places;
         let depths = run.inputs.first().ok_or("delta_m is missing")?;
         let value = |at: Option<At>| at.map_or(T::from(0.0), |at| shared[at.slot]);
-        let on = |at: Option<At>| {
-            at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot))
-        };
+        let on =
+            |at: Option<At>| at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot));
         let modulus = self.modulus(run).ok_or("no condition")?;
         let known = self.setup.thickness_m.map_or(0.0, f64::recip);
         let law = Indentation {
@@ -182,8 +181,8 @@ impl InDuals for IndentationModel {
             ..Indentation::elastic(self.setup.indenter, shared[modulus.slot], self.setup.poisson_ratio)
         };
         law.check().map_err(|e| e.to_string())?;
-        let relaxation = on(p.relaxed)
-            .then(|| LinearSolid { relaxed_fraction: value(p.relaxed), tau_s: value(p.tau) });
+        let relaxation =
+            on(p.relaxed).then(|| LinearSolid { relaxed_fraction: value(p.relaxed), tau_s: value(p.tau) });
         let offset = own[p.offset.slot];
         let true_depths: Vec<T> = depths.iter().map(|d| -offset + *d).collect();
         let acting = Acting {

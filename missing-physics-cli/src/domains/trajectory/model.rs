@@ -39,7 +39,6 @@ pub struct Setup {
 /// A run of this kind films a rod of known length: the z channel reads its ends.
 pub const ROD: u32 = 1;
 
-
 /// The flight's parameters by meaning; each knows where it stands among the shared parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
