@@ -98,7 +98,11 @@ impl Segmenter {
         }));
         self.keep_largest(cloud, settings);
         self.trim(settings);
-        self.fill_faces(cloud);
+        let filled = self.fill_faces(cloud);
+        let all = self.states.iter().filter(|s| **s == State::Contact).count();
+        if filled as f64 > FLAT * all as f64 {
+            self.trim_face(cloud, all);
+        }
         &self.states
     }
 
@@ -212,13 +216,13 @@ impl Segmenter {
     }
 
     /// Points above the curved points' plane, within their rows and columns, are in contact.
-    fn fill_faces(&mut self, cloud: &Cloud) {
+    fn fill_faces(&mut self, cloud: &Cloud) -> usize {
         let columns = cloud.columns().max(1);
         let curved = || self.states.iter().enumerate().filter(|(_, s)| **s == State::Contact).map(|(i, _)| i);
         let at = |i: usize| ((i % columns) as f64, (i / columns) as f64);
         let n = curved().count();
         if n < 3 {
-            return;
+            return 0;
         }
         let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let mut reach = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
@@ -229,7 +233,8 @@ impl Segmenter {
             right += x * f64::from(cloud.smooth[i]);
             reach = [reach[0].min(u), reach[1].max(u), reach[2].min(v), reach[3].max(v)];
         }
-        let Some(plane) = gram.cholesky().map(|c| c.solve(&right)) else { return };
+        let Some(plane) = gram.cholesky().map(|c| c.solve(&right)) else { return 0 };
+        let mut filled = 0;
         for (i, state) in self.states.iter_mut().enumerate() {
             let (u, v) = at(i);
             let within = u >= reach[0] && u <= reach[1] && v >= reach[2] && v <= reach[3];
@@ -238,10 +243,57 @@ impl Segmenter {
                 && f64::from(cloud.smooth[i]) > plane.dot(&Vector3::new(1.0, u, v))
             {
                 *state = State::Contact;
+                filled += 1;
+            }
+        }
+        filled
+    }
+
+    /// Where a flat face ends: its rim was widened by the smoothing.
+    ///
+    /// Across an edge from a face to a flank of slope s, heights averaged by a triangle of half-width w are `s w / 6` below the face at the edge, and
+    /// their slope there is `s / 2`, whatever s is. So what lies deeper below the face than `w / 3` times its slope is outside.
+    fn trim_face(&mut self, cloud: &Cloud, all: usize) {
+        let (columns, step) = (cloud.columns().max(1), cloud.step.max(1));
+        let at = |i: usize| ((i % columns) as f64, (i / columns) as f64);
+        let touching: Vec<usize> =
+            (0..self.states.len()).filter(|k| self.states[*k] == State::Contact).collect();
+        let sum = touching.iter().map(|k| at(*k)).fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        let middle = (sum.0 / all as f64, sum.1 / all as f64);
+        let core = 0.5 * (all as f64 / std::f64::consts::PI).sqrt();
+        let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for &k in &touching {
+            let (u, v) = (at(k).0 - middle.0, at(k).1 - middle.1);
+            if u.hypot(v) < core {
+                let x = Vector3::new(1.0, u, v);
+                gram += x * x.transpose();
+                right += x * f64::from(cloud.smooth[k]);
+            }
+        }
+        let Some(plane) = gram.cholesky().map(|c| c.solve(&right)) else { return };
+        let third = (2 * cloud.half + 1) as f64 / 3.0;
+        let smooth = |k: usize| f64::from(cloud.smooth[k]);
+        for k in touching {
+            let (column, row) = (k % columns, k / columns);
+            let inner = column >= step && column + step < columns;
+            if !(inner && row >= step && (row + step + 1) * columns <= self.states.len()) {
+                continue;
+            }
+            let (u, v) = (at(k).0 - middle.0, at(k).1 - middle.1);
+            let below = plane.dot(&Vector3::new(1.0, u, v)) - smooth(k);
+            let slope = |by: usize| (smooth(k + by) - smooth(k - by)) / (2 * step) as f64;
+            let slope = (slope(step) - plane[1]).hypot(slope(step * columns) - plane[2]);
+            if below > BELOW_M && below > third * slope {
+                self.states[k] = State::Deformed;
             }
         }
     }
 }
+
+/// Part of a contact that is not curved from which on it is a flat face.
+const FLAT: f64 = 0.2;
+/// What is less below a face is on it, m: three standard deviations of an averaged height.
+const BELOW_M: f64 = 1.2e-4;
 
 /// r of `k_j + r k_i = 0` from the sums of `k_i^2`, `k_i k_j`, `k_j^2`: the direction along which the pairs scatter least is `(r, 1)`.
 fn slope([ii, ij, jj]: [f64; 3]) -> Option<f64> {
