@@ -123,7 +123,7 @@ impl<T: Number> Place<T> {
     }
 
     /// The same a part (0 to 1) of the way.
-    fn to_part(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
+    fn along(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
         self.by(tau_s, (end.0 - self.time_s) * part, (end.1 - self.depth_m) * part)
     }
 
@@ -248,7 +248,7 @@ impl<T: Number> LinearSolid<T> {
 
     /// Minus [`Self::moved`] to `now` from a part of the way to `end`, and its slope: both rise.
     fn part(&self, from: &Place<T>, end: (T, T), part: T, now: &Place<T>) -> (T, T) {
-        let (place, _) = from.to_part(self.tau_s, end, part);
+        let (place, _) = from.along(self.tau_s, end, part);
         let slope = self.remaining(now.time_s - place.time_s) * (end.1 - from.depth_m);
         (-self.moved(&place, now), slope)
     }
@@ -275,7 +275,7 @@ impl<T: Number> LinearSolid<T> {
         // The root is looked for in plain numbers; only its last step carries derivatives.
         let root = plain.parted(&from.place.re(), &next.re(), &now.place.re());
         let part = polish(T::from(root), |part| self.part(&from.place, end, part, &now.place));
-        self.sum(&from.with(law, from.place.to_part(self.tau_s, end, part)), now)
+        self.sum(&from.with(law, from.place.along(self.tau_s, end, part)), now)
     }
 }
 
