@@ -137,9 +137,9 @@ pub(super) fn build(
         ],
         &["contact-line-friction"],
     );
-    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
     p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3, 100.0], 1.0 / omega);
     p.transient = b.own(&format!("transient_{suffix}"), unit, ANY, amplitude);
+    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
     let mechanism = b.mechanism(
         "sensor-lag",
         &[p.lag],
@@ -181,7 +181,8 @@ fn modes(
         &["arm-compliance", "sensor-lag"],
     );
     second.companions = vec![p.second_cos.index, p.second_sin.index];
-    second.derived_per_run = vec![amplitude_of(p.second_cos, p.second_sin, suffix, unit)];
+    second.derived_per_run =
+        vec![amplitude_of(&p, [p.second_omega, p.second_cos, p.second_sin], suffix, unit)];
     second.shapes = vec![p.second_omega.index, p.second_damping.index];
     p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
     p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
@@ -199,16 +200,20 @@ fn modes(
         &["second-mode"],
     );
     arm.companions = vec![p.arm_cos.index, p.arm_sin.index];
-    arm.derived_per_run = vec![amplitude_of(p.arm_cos, p.arm_sin, suffix, unit)];
+    arm.derived_per_run = vec![amplitude_of(&p, [p.arm_omega, p.arm_cos, p.arm_sin], suffix, unit)];
     arm.shapes = vec![p.arm_omega.index, p.arm_damping.index];
 }
 
-/// The amplitude at t = 0 of a wave that each run has in two parts.
-fn amplitude_of(cos: At, sin: At, suffix: &str, unit: &str) -> DerivedPerRun {
+/// The amplitude at t = 0 of a wave that each run has in two parts. A sensor that lags (its reading has a transient) shows less of it.
+fn amplitude_of(p: &Places, [omega, cos, sin]: [At; 3], suffix: &str, unit: &str) -> DerivedPerRun {
+    let (omega, cos, sin, lag, transient) = (omega.slot, cos.slot, sin.slot, p.lag.slot, p.transient.slot);
     DerivedPerRun {
         name: format!("amplitude_{suffix}"),
         unit: unit.into(),
         over: Over::Mean,
-        value: Arc::new(move |_, own| own[cos.slot].hypot(own[sin.slot])),
+        value: Arc::new(move |shared, own| {
+            let lags = if own[transient] == 0.0 { 0.0 } else { shared[omega] * shared[lag] };
+            own[cos].hypot(own[sin]) * lags.hypot(1.0)
+        }),
     }
 }
