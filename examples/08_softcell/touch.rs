@@ -90,14 +90,17 @@ pub(crate) fn contours(panels: &mut Vec<Panel>) -> Outcome<()> {
             continue;
         };
         let mut tracker = Tracker::new(&bench.picture()?.value, TrackerSettings::default())?;
-        bench.touch.shear_m = [0.0, shear_m];
-        tracker.next(&bench.picture()?.value)?;
+        // As slowly as the box slides: a marker is followed from picture to picture.
+        for k in 1..=8 {
+            bench.touch.shear_m = [0.0, shear_m * f64::from(k) / 8.0];
+            tracker.next(&bench.picture()?.value)?;
+        }
         let seen: Vec<_> = tracker.tracks().iter().filter(|t| t.seen()).collect();
         let places: Vec<[f64; 2]> = seen.iter().map(|t| t.home_px).collect();
         let values: Vec<f64> = seen.iter().map(|t| t.by_px()[1]).collect();
         let highest = values.iter().copied().fold(0.0, f64::max);
         println!("{:>9.2} {:>12.2} {:>14.1}", 1e-3 * p, 1e3 * shear_m, highest);
-        let levels: Vec<f64> = (1..=8).map(f64::from).filter(|l| *l < highest).collect();
+        let levels: Vec<f64> = (2..=9).map(|k| 0.1 * f64::from(k) * highest).collect();
         let plan = Plan::new(&places, Kernel::ThinPlate, 1e-3)?;
         let lines = plan.field(&values)?.contours([160.0, 80.0], [480.0, 400.0], (81, 81), &levels)?;
         let title = format!("5.9: 0.8 N at {:.1} kPa, along the shear (px)", 1e-3 * p);
@@ -107,7 +110,7 @@ pub(crate) fn contours(panels: &mut Vec<Panel>) -> Outcome<()> {
                 panel.line(line.iter().map(|p| [p[0], -p[1]]), &hue(k, 8));
             }
             if let Some(p) = contour.lines.first().and_then(|l| l.first()) {
-                panel.text([p[0], -p[1]], format!("{:.0}", contour.level));
+                panel.text([p[0], -p[1]], format!("{:.1}", contour.level));
             }
         }
         panels.push(panel);
