@@ -307,7 +307,11 @@ impl Prior {
     }
 
     /// Draws one parameter vector whose coordinates are within a window; none for a try that is refused, which correlations bring.
-    pub(crate) fn sample_within<R: Rng + ?Sized>(&self, window: &[[f64; 2]], rng: &mut R) -> Option<Vec<f64>> {
+    pub(crate) fn sample_within<R: Rng + ?Sized>(
+        &self,
+        window: &[[f64; 2]],
+        rng: &mut R,
+    ) -> Option<Vec<f64>> {
         let each = self.marginals.iter().zip(window);
         let mut u: Vec<f64> = each.clone().map(|(m, w)| m.sample_within(*w, rng)).collect();
         if let Some(correlation) = &self.correlation {

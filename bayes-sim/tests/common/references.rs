@@ -66,7 +66,12 @@ fn predation(u: &[f64], x: &[f64]) -> f64 {
 }
 
 /// Random-walk Metropolis from `start`: steps from the covariance so far while it warms up, then one in `20 d` kept.
-fn metropolis(start: &[f64], count: usize, rng: &mut ChaCha8Rng, ln: impl Fn(&[f64]) -> f64) -> Vec<Vec<f64>> {
+fn metropolis(
+    start: &[f64],
+    count: usize,
+    rng: &mut ChaCha8Rng,
+    ln: impl Fn(&[f64]) -> f64,
+) -> Vec<Vec<f64>> {
     let d = start.len();
     let (warm, thin) = (4000 * d, 20 * d);
     let mut at = DVector::from_column_slice(start);

@@ -32,8 +32,17 @@ pub(crate) fn design() -> &'static DMatrix<f64> {
 
 /// Precision of the prior: second differences of the filter are small.
 pub(crate) fn smoothness() -> DMatrix<f64> {
-    let d = DMatrix::from_fn(LAGS, LAGS, |i, j| if i == j { 1.0 } else if i == j + 1 { -1.0 } else { 0.0 });
-    let rising = DMatrix::from_fn(LAGS, LAGS, |i, j| if i == j { (i as f64 / LAGS as f64).sqrt() } else { 0.0 });
+    let d = DMatrix::from_fn(LAGS, LAGS, |i, j| {
+        if i == j {
+            1.0
+        } else if i == j + 1 {
+            -1.0
+        } else {
+            0.0
+        }
+    });
+    let rising =
+        DMatrix::from_fn(LAGS, LAGS, |i, j| if i == j { (i as f64 / LAGS as f64).sqrt() } else { 0.0 });
     let f = &d * &d + rising;
     let mut precision = DMatrix::zeros(LAGS + 1, LAGS + 1);
     precision[(0, 0)] = 0.5;
