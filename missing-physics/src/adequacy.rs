@@ -36,21 +36,19 @@ pub(crate) fn test(
 ) -> Result<Adequacy, PredictError> {
     let mut bank = Bank::new(problem, selection, fit, rivals, rule)?;
     let observed = residuals(problem, fit)?;
-    // Shapes that such worlds never choose, nor these data
-    // under any alternative, need not be tried again for each of them.
-    let truth = bank.noise_beyond_mechanisms(&observed);
-    let mut wanted: Vec<bool> = vec![false; problem.shapes.len()];
-    truth.iter().for_each(|&(shape, _)| wanted[shape] = true);
-    wanted[0] = true;
+    let truth = bank.sharpen(&observed);
+    // Shapes that such worlds never choose, nor these data under any alternative, need not be tried again for each of them.
+    let mut wanted: Vec<usize> = truth.iter().map(|&(shape, _)| shape).chain([0]).collect();
     let pilots: Vec<Reading> = (0..12u64)
         .into_par_iter()
         .map(|k| bank.read(&draw(problem, &truth, rule, seed ^ 0x5eed, k)))
         .collect();
     for reading in pilots.iter().chain([&bank.read(&observed)]) {
-        reading.noise.iter().for_each(|&(s, _)| wanted[bank.in_play()[s]] = true);
+        wanted.extend(reading.noise.iter().map(|&(s, _)| bank.in_play()[s]));
     }
-    let play: Vec<usize> = rule.allowed.iter().copied().filter(|&s| wanted[s]).collect();
-    bank.play(&play);
+    wanted.sort_unstable();
+    wanted.dedup();
+    bank.play(&wanted);
 
     let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
         let reading = bank.read(data);

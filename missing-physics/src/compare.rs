@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::adequacy::{draw, residuals};
 use crate::bank::Bank;
 use crate::data::Recording;
+use crate::estimate::better_top;
 use crate::fit::{Fit, NoiseRule, NoiseState, UNDETERMINED, covariance, fit, solve};
 use crate::linalg::{cholesky, log_determinant};
 use crate::model::PredictError;
@@ -33,6 +34,8 @@ pub(crate) const LOG_RANGE: f64 = 9.21;
 const BEAM: usize = 3;
 /// Standard deviation of a shared parameter's prior where unseen data are predicted, in units of its scale.
 const WIDE: f64 = 10.0;
+/// Sets within this log evidence of the best may become it once their best top is found.
+const POLISHED: f64 = 6.0;
 /// The largest set tried.
 const MOST: usize = 3;
 
@@ -251,7 +254,27 @@ pub(crate) fn search(
         order.truncate(BEAM);
         layer = order;
     }
+    polish(problem, rule, &mut all);
     Some(all)
+}
+
+/// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
+fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
+    let best = best_evidence(all);
+    let worth =
+        |c: &&mut Candidate| c.ruled_out.is_none() && !c.set.is_empty() && c.evidence > best - POLISHED;
+    let mut likely: Vec<&mut Candidate> = all.iter_mut().filter(worth).collect();
+    likely.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    likely.truncate(BEAM);
+    likely.par_iter_mut().for_each(|c| {
+        for _ in 0..BEAM {
+            let Some(top) = better_top(problem, c) else { break };
+            match candidate(problem, rule, &c.set, &[], &top, &[vec![]]) {
+                Ok(better) if better.evidence > c.evidence => **c = better,
+                _ => break,
+            }
+        }
+    });
 }
 
 fn best_evidence(all: &[Candidate]) -> f64 {

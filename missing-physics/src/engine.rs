@@ -471,7 +471,7 @@ impl Work<'_> {
         let recording = &self.problem.recording;
         (0..self.problem.channels())
             .map(|c| {
-                let shape = self.problem.shapes[fit.noise.shape[c]];
+                let shape = self.problem.family.shape(fit.noise.shape[c]);
                 ChannelNoise {
                     channel: recording.channels[c].name.clone(),
                     sigma: fit.noise.sigma[c],

@@ -1,9 +1,13 @@
 //! Values and intervals of parameters.
 
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
 use crate::compare::Candidate;
 use crate::diagnosis::Estimate;
-use crate::fit::{NoiseRule, covariance, solve};
-use crate::model::{Derived, Mechanism, Scope};
+use crate::fit::{Fit, NoiseRule, covariance, solve};
+use crate::model::{Derived, DerivedPerRun, Mechanism, Over, Scope};
 use crate::problem::{Problem, Selection};
 
 /// Two-sided 95 % quantile of the normal law.
@@ -19,10 +23,7 @@ pub(crate) fn of_mechanism(
     profile: Option<&NoiseRule>,
 ) -> Vec<Estimate> {
     let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, profile);
-    all.extend(mechanism.derived_per_run.iter().map(|quantity| {
-        let of_run = |own: &Vec<f64>| (quantity.value)(&candidate.fit.shared, own);
-        over_runs(candidate.fit.own.iter().map(of_run).collect(), &quantity.name, &quantity.unit)
-    }));
+    all.extend(mechanism.derived_per_run.iter().map(|quantity| over_runs(candidate, quantity)));
     all
 }
 
@@ -46,8 +47,13 @@ pub(crate) fn estimates(
             let info = &spec.parameters[p];
             let slot = problem.slots[p];
             if info.scope == Scope::PerRun {
-                let values = candidate.fit.own.iter().map(|own| own[slot]).collect();
-                return over_runs(values, &info.name, &info.unit);
+                let own = DerivedPerRun {
+                    name: info.name.clone(),
+                    unit: info.unit.clone(),
+                    over: Over::Mean,
+                    value: Arc::new(move |_, own: &[f64]| own[slot]),
+                };
+                return over_runs(candidate, &own);
             }
             let value = candidate.fit.shared[slot];
             let mut ci95 = [f64::NAN; 2];
@@ -55,7 +61,7 @@ pub(crate) fn estimates(
                 let half = Z95 * covariance[(i, i)].max(0.0).sqrt();
                 ci95 = [value - half, value + half];
                 if profile.is_some() {
-                    ci95 = followed(problem, candidate, i, half, ci95);
+                    ci95 = Profile::new(problem, candidate, i).interval(half, ci95);
                 }
                 ci95 = [ci95[0].max(info.lower), ci95[1].min(info.upper)];
             }
@@ -64,32 +70,10 @@ pub(crate) fn estimates(
         .collect();
     for quantity in derived {
         let value = (quantity.value)(&candidate.fit.shared);
-        let determined: Vec<bool> =
-            (0..selection.shared.len()).map(|i| covariance[(i, i)].is_finite()).collect();
-        let half = {
-            let gradient: Vec<f64> = selection
-                .shared
-                .iter()
-                .enumerate()
-                .map(|(i, &slot)| {
-                    if !determined[i] {
-                        return 0.0;
-                    }
-                    let step = 1e-4 * covariance[(i, i)].max(0.0).sqrt();
-                    let mut shifted = candidate.fit.shared.clone();
-                    shifted[slot] += step;
-                    let above = (quantity.value)(&shifted);
-                    shifted[slot] -= 2.0 * step;
-                    if step > 0.0 { (above - (quantity.value)(&shifted)) / (2.0 * step) } else { 0.0 }
-                })
-                .collect();
-            let variance: f64 = (0..gradient.len())
-                .flat_map(|i| (0..gradient.len()).map(move |j| (i, j)))
-                .filter(|&(i, j)| determined[i] && determined[j])
-                .map(|(i, j)| gradient[i] * gradient[j] * covariance[(i, j)])
-                .sum();
-            Z95 * variance.max(0.0).sqrt()
-        };
+        let by_shared = slopes(&selection.shared, &candidate.fit.shared, &errors(&covariance), &|shared| {
+            (quantity.value)(shared)
+        });
+        let half = Z95 * quadratic(&by_shared, &covariance).max(0.0).sqrt();
         estimates.push(Estimate {
             name: quantity.name.clone(),
             unit: quantity.unit.clone(),
@@ -100,51 +84,210 @@ pub(crate) fn estimates(
     estimates
 }
 
-/// The mean of a value that each run has of its own, with the interval of that mean.
-fn over_runs(values: Vec<f64>, name: &str, unit: &str) -> Estimate {
-    let n = values.len().max(1) as f64;
-    let value = values.iter().sum::<f64>() / n;
-    let spread = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let half = Z95 * (spread / n).sqrt();
-    Estimate { name: name.into(), unit: unit.into(), value, ci95: [value - half, value + half] }
+/// Standard errors of the free shared parameters; infinite where the data do not determine one.
+fn errors(covariance: &DMatrix<f64>) -> Vec<f64> {
+    covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
 }
 
-/// The profile-likelihood interval of the `i`-th free shared parameter, where the quadratic one misleads.
-fn followed(
-    problem: &Problem<'_>,
-    candidate: &Candidate,
-    i: usize,
-    half: f64,
-    quadratic: [f64; 2],
-) -> [f64; 2] {
-    let fit = &candidate.fit;
-    let slot = candidate.selection.shared[i];
-    let mut others: Selection = candidate.selection.clone();
-    others.shared.remove(i);
-    others.added_shared.remove(i);
-    let rise = |value: f64| -> Option<f64> {
-        let mut shared = fit.shared.clone();
-        shared[slot] = value;
-        solve(problem, &others, &fit.noise, &shared, &fit.own).ok().map(|f| f.chi2 - fit.chi2)
+/// Slopes of a function along the given slots of its argument, by differences of a small part of each one's error; none along those
+/// that are not determined.
+fn slopes(slots: &[usize], at: &[f64], errors: &[f64], value: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
+    let mut shifted = at.to_vec();
+    slots
+        .iter()
+        .zip(errors)
+        .map(|(&slot, error)| {
+            let step = 1e-4 * error;
+            if !(step > 0.0 && step.is_finite()) {
+                return 0.0;
+            }
+            shifted[slot] = at[slot] + step;
+            let above = value(&shifted);
+            shifted[slot] = at[slot] - step;
+            let below = value(&shifted);
+            shifted[slot] = at[slot];
+            (above - below) / (2.0 * step)
+        })
+        .collect()
+}
+
+/// The variance of a sum of parameters with the given weights, those that are not determined left out.
+fn quadratic(weights: &[f64], covariance: &DMatrix<f64>) -> f64 {
+    let told = |i: &usize| covariance[(*i, *i)].is_finite();
+    let told: Vec<usize> = (0..weights.len()).filter(told).collect();
+    told.iter()
+        .flat_map(|&i| told.iter().map(move |&j| (i, j)))
+        .map(|(i, j)| weights[i] * weights[j] * covariance[(i, j)])
+        .sum()
+}
+
+/// A value that each run has of its own, over the runs, with what the errors of the runs' own and of the shared parameters make of it,
+/// and with what the runs differ beyond those (DerSimonian and Laird 1986, doi:10.1016/0197-2456(86)90046-2).
+fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun) -> Estimate {
+    let (fit, selection) = (&candidate.fit, &candidate.selection);
+    let covariance = covariance(&fit.information);
+    let shared_errors = errors(&covariance);
+    let mut values = Vec::with_capacity(fit.own.len());
+    let mut own_variances = Vec::with_capacity(fit.own.len());
+    let mut by_shared = Vec::with_capacity(fit.own.len());
+    for (own, told) in fit.own.iter().zip(&fit.own_told) {
+        let by_own = slopes(&selection.own, own, &told.error, &|own| (quantity.value)(&fit.shared, own));
+        let mut along =
+            slopes(&selection.shared, &fit.shared, &shared_errors, &|shared| (quantity.value)(shared, own));
+        for (slope, moved) in by_own.iter().zip(&told.slope) {
+            along.iter_mut().zip(moved).for_each(|(a, m)| *a += slope * m);
+        }
+        let told = by_own.iter().zip(&told.error).filter(|(_, e)| e.is_finite());
+        values.push((quantity.value)(&fit.shared, own));
+        own_variances.push(told.map(|(s, e)| (s * e).powi(2)).sum::<f64>());
+        by_shared.push(along);
+    }
+    let (value, variance) = match quantity.over {
+        Over::Mean => {
+            let n = values.len().max(1) as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let along: Vec<f64> = (0..selection.shared.len())
+                .map(|k| by_shared.iter().map(|run| run[k]).sum::<f64>() / n)
+                .collect();
+            let own = own_variances.iter().map(|v| v + between(&values, &own_variances)).sum::<f64>();
+            (mean, own / (n * n) + quadratic(&along, &covariance))
+        }
+        Over::Largest => {
+            let largest = (0..values.len()).max_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs()));
+            largest.map_or((f64::NAN, f64::NAN), |run| {
+                (values[run], own_variances[run] + quadratic(&by_shared[run], &covariance))
+            })
+        }
     };
-    let mut interval = quadratic;
-    for (side, end) in [(-1.0, 0), (1.0, 1)] {
-        let bound = if side < 0.0 { problem.shared.lower[slot] } else { problem.shared.upper[slot] };
-        let mut distance = half;
-        for _ in 0..8 {
-            let value = fit.shared[slot] + side * distance;
-            if !(value - bound).is_finite() && bound.is_finite() || (value - bound) * side >= 0.0 {
-                interval[end] = bound;
-                break;
+    let half = Z95 * variance.max(0.0).sqrt();
+    let name = quantity.name.clone();
+    Estimate { name, unit: quantity.unit.clone(), value, ci95: [value - half, value + half] }
+}
+
+/// The variance of runs' values beyond their own errors, by moments; none where it cannot be told.
+fn between(values: &[f64], variances: &[f64]) -> f64 {
+    if values.len() < 2 || variances.iter().any(|v| !(*v > 0.0)) {
+        let n = values.len().max(1) as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        return values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    }
+    let weights: Vec<f64> = variances.iter().map(|v| 1.0 / v).collect();
+    let total: f64 = weights.iter().sum();
+    let mean = weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / total;
+    let spread: f64 = weights.iter().zip(values).map(|(w, v)| w * (v - mean).powi(2)).sum();
+    let scale = total - weights.iter().map(|w| w * w).sum::<f64>() / total;
+    ((spread - (values.len() - 1) as f64) / scale).max(0.0)
+}
+
+/// How far about an estimate the profile of the likelihood is looked at, in standard errors: dry friction and jumps leave many tops.
+const LOOK: [f64; 6] = [0.75, 1.5, 3.0, 6.0, 12.0, 24.0];
+/// A top is a better one where the sum of squares is lower by this.
+const BETTER: f64 = 0.05;
+
+/// The likelihood of one free shared parameter, all others fitted at each of its values.
+struct Profile<'a> {
+    problem: &'a Problem<'a>,
+    fit: &'a Fit,
+    /// What is free with it, and beside it.
+    all: &'a Selection,
+    others: Selection,
+    slot: usize,
+}
+
+impl<'a> Profile<'a> {
+    fn new(problem: &'a Problem<'a>, candidate: &'a Candidate, i: usize) -> Self {
+        let mut others = candidate.selection.clone();
+        let slot = others.shared.remove(i);
+        others.added_shared.remove(i);
+        Self { problem, fit: &candidate.fit, all: &candidate.selection, others, slot }
+    }
+
+    fn at(&self, value: f64) -> Option<Fit> {
+        let mut shared = self.fit.shared.clone();
+        shared[self.slot] = value;
+        solve(self.problem, &self.others, &self.fit.noise, &shared, &self.fit.own).ok()
+    }
+
+    /// By how much the sum of squares is higher at a value than at the estimate.
+    fn rise(&self, value: f64) -> Option<f64> {
+        self.at(value).map(|f| f.chi2 - self.fit.chi2)
+    }
+
+    /// The top of the likelihood to which a fit climbs from a value, and by how much its sum of squares is higher than the estimate's.
+    fn top_from(&self, value: f64) -> Option<(f64, f64)> {
+        let near = self.at(value)?;
+        let top = solve(self.problem, self.all, &near.noise, &near.shared, &near.own).ok()?;
+        Some((top.shared[self.slot], top.chi2 - self.fit.chi2))
+    }
+
+    fn bound(&self, side: f64) -> f64 {
+        let table = &self.problem.shared;
+        if side < 0.0 { table.lower[self.slot] } else { table.upper[self.slot] }
+    }
+
+    /// Values about the estimate on one side, within its bounds, from near to far.
+    fn looks(&self, side: f64, error: f64) -> impl Iterator<Item = f64> + use<'_> {
+        let bound = self.bound(side);
+        let values = LOOK.map(|k| self.fit.shared[self.slot] + side * k * error);
+        values.into_iter().filter(move |value| (value - bound) * side < 0.0)
+    }
+
+    /// The 95 % interval, where the quadratic one of this half width misleads.
+    fn interval(&self, half: f64, quadratic: [f64; 2]) -> [f64; 2] {
+        let mut interval = quadratic;
+        for (side, end) in [(-1.0, 0), (1.0, 1)] {
+            let bound = self.bound(side);
+            let mut distance = half;
+            for _ in 0..8 {
+                let value = self.fit.shared[self.slot] + side * distance;
+                if !(value - bound).is_finite() && bound.is_finite() || (value - bound) * side >= 0.0 {
+                    interval[end] = bound;
+                    break;
+                }
+                let Some(risen) = self.rise(value).filter(|r| *r > 0.0) else { break };
+                interval[end] = value;
+                if (risen - CHI95).abs() < 0.05 * CHI95 {
+                    break;
+                }
+                // Along a profile that is nearly a parabola the distance goes with the square root of the rise.
+                distance *= (CHI95 / risen).sqrt().clamp(0.5, 2.0);
             }
-            let Some(risen) = rise(value).filter(|r| *r > 0.0) else { break };
-            interval[end] = value;
-            if (risen - CHI95).abs() < 0.05 * CHI95 {
-                break;
+            // Another top beyond the first fall may be as likely as the interval's own end.
+            for value in self.looks(side, half / Z95).filter(|value| (value - quadratic[end]) * side > 0.0) {
+                if let Some((top, risen)) = self.top_from(value).filter(|(_, risen)| *risen < CHI95) {
+                    let reach = top + side * half * (1.0 - risen / CHI95).min(1.0).sqrt();
+                    let reach = if (reach - bound) * side < 0.0 { reach } else { bound };
+                    if (reach - interval[end]) * side > 0.0 {
+                        interval[end] = reach;
+                    }
+                }
             }
-            // Along a profile that is nearly a parabola the distance goes with the square root of the rise.
-            distance *= (CHI95 / risen).sqrt().clamp(0.5, 2.0);
+        }
+        interval
+    }
+}
+
+/// A better top of the likelihood than a candidate's own, if there is one where its mechanisms' parameters are a few standard errors
+/// to many away.
+pub(crate) fn better_top(problem: &Problem<'_>, candidate: &Candidate) -> Option<Fit> {
+    let selection = &candidate.selection;
+    let covariance = covariance(&candidate.fit.information);
+    let mut best: Option<Fit> = None;
+    for i in (0..selection.shared.len()).filter(|&i| selection.added_shared[i]) {
+        let error = covariance[(i, i)].max(0.0).sqrt();
+        if !(error > 0.0 && error.is_finite()) {
+            continue;
+        }
+        let profile = Profile::new(problem, candidate, i);
+        for value in [-1.0, 1.0].into_iter().flat_map(|side| profile.looks(side, error)) {
+            let least = best.as_ref().map_or(candidate.fit.chi2, |b| b.chi2) - BETTER;
+            // A slope that is still falling towards the fit's own top is none: the parameter is freed again.
+            let near = profile.at(value).filter(|f| f.chi2 < least + CHI95);
+            let top = near.and_then(|f| solve(problem, selection, &f.noise, &f.shared, &f.own).ok());
+            if let Some(top) = top.filter(|f| f.chi2 < least) {
+                best = Some(top);
+            }
         }
     }
-    interval
+    best
 }

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use crate::data::Run;
 use crate::linalg::{backward, cholesky, determined, dot, forward, log_determinant};
 use crate::model::{Model, PredictError};
+use crate::noise::Shape;
 use crate::problem::{Problem, Selection};
 use crate::step::{Eliminated, Linearised, Step, reduce};
 
@@ -270,8 +271,10 @@ pub(crate) struct NoiseRule {
     pub(crate) fixed_sigma: Vec<Option<f64>>,
     /// How well each fixed sigma is known: its relative standard error.
     pub(crate) uncertainty: Vec<f64>,
-    /// The shapes that are allowed.
+    /// The shapes that are tried one by one; those between them follow from the best.
     pub(crate) allowed: Vec<usize>,
+    /// The longest correlation that is believed, in median steps between rows.
+    pub(crate) longest: f64,
     /// Further log prior weight against correlated noise. Where mechanisms compete, colour that only some of them need is
     /// one more thing that they assume; it cancels where all of them need it.
     pub(crate) against_colour: f64,
@@ -282,8 +285,13 @@ pub(crate) struct NoiseRule {
 impl NoiseRule {
     /// Log prior weight of a shape.
     pub(crate) fn log_prior(&self, problem: &Problem<'_>, shape: usize) -> f64 {
-        let weight = problem.shapes[shape].log_prior();
+        let weight = problem.family.shape(shape).log_prior();
         if weight < 0.0 { weight - self.against_colour } else { weight }
+    }
+
+    /// Whether a shape between the allowed ones may be chosen.
+    pub(crate) fn admits(&self, shape: &Shape) -> bool {
+        shape.length_steps <= self.longest
     }
 
     /// The same rule for mechanisms that compete.
@@ -302,65 +310,88 @@ pub(crate) fn estimate_noise(
 ) -> Result<NoiseState, PredictError> {
     let channels = problem.channels();
     let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
-    let total: usize = (0..channels).map(|c| problem.count(c)).sum();
     let mut state = white.clone();
-    let mut raw = Vec::with_capacity(own.len());
-    for (run, values) in own.iter().enumerate() {
-        raw.push(whitened_columns(problem, selection, &white, run, shared, values)?);
-    }
+    let raw = own
+        .iter()
+        .enumerate()
+        .map(|(run, values)| whitened_columns(problem, selection, &white, run, shared, values))
+        .collect::<Result<Vec<_>, _>>()?;
     let own_columns: Vec<Vec<Vec<usize>>> =
         (0..own.len()).map(|run| channel_columns(problem, run, &raw[run][..selection.own.len()])).collect();
-    #[allow(clippy::needless_range_loop, reason = "the channel indexes five things")]
     for channel in 0..channels {
-        let mut best = f64::NEG_INFINITY;
+        let left = Left { problem, rule, raw: &raw, own_columns: &own_columns, channel, selection };
+        let higher = |a: &(f64, f64), b: &(f64, f64)| a.0 > b.0;
+        let mut best = (0, (f64::NEG_INFINITY, 1.0));
         for &shape in &rule.allowed {
-            let mut sums = Sums::default();
-            for (run, columns) in raw.iter().enumerate() {
-                let start: usize = (0..channel).map(|c| problem.rows[run].valid[c].len()).sum();
-                let end = start + problem.rows[run].valid[channel].len();
-                let whitener = problem.whitener(run, channel, shape);
-                let mine = &own_columns[run][channel];
-                let n_own = mine.len();
-                let whitened: Vec<Vec<f64>> = mine
-                    .iter()
-                    .copied()
-                    .chain([columns.len() - 1])
-                    .map(|k| {
-                        let mut column = columns[k][start..end].to_vec();
-                        whitener.whiten(&mut column);
-                        column
-                    })
-                    .collect();
-                let residual = &whitened[n_own];
-                let mut own_gram = gram(&whitened[..n_own]);
-                let kept = cholesky(&mut own_gram, 1e-9);
-                // The own parameters are fitted anew under each shape: what they were under another one is no evidence.
-                let mut right: Vec<f64> = whitened[..n_own].iter().map(|c| dot(c, residual)).collect();
-                forward(&own_gram, &kept, &mut right);
-                sums.squares += (dot(residual, residual) - dot(&right, &right)).max(0.0);
-                sums.log_determinant += whitener.log_determinant + log_determinant(&own_gram, &kept);
-                sums.used += kept.iter().filter(|k| **k).count();
-                sums.rows += end - start;
-            }
-            let share = sums.rows as f64 / total.max(1) as f64;
-            let freedom =
-                (sums.rows as f64 - sums.used as f64 - share * selection.shared.len() as f64).max(1.0);
-            let sigma = match rule.fixed_sigma[channel] {
-                Some(sigma) => sigma,
-                None => (sums.squares / freedom).sqrt().max(rule.floor[channel]),
-            };
-            let score = rule.log_prior(problem, shape)
-                - freedom * sigma.ln()
-                - 0.5 * sums.log_determinant
-                - 0.5 * sums.squares / (sigma * sigma);
-            if score > best {
-                best = score;
-                state.shape[channel] = shape;
-                state.sigma[channel] = sigma;
+            let value = left.under(shape);
+            if higher(&value, &best.1) {
+                best = (shape, value);
             }
         }
+        let (shape, (_, sigma)) =
+            problem.family.climb(best, |s| rule.admits(s), |shape| left.under(shape), higher);
+        state.shape[channel] = shape;
+        state.sigma[channel] = sigma;
     }
     Ok(state)
+}
+
+/// What a fit leaves in one channel: residuals and own parameters' columns, not yet whitened.
+struct Left<'a> {
+    problem: &'a Problem<'a>,
+    rule: &'a NoiseRule,
+    raw: &'a [Vec<Vec<f64>>],
+    own_columns: &'a [Vec<Vec<usize>>],
+    channel: usize,
+    selection: &'a Selection,
+}
+
+impl Left<'_> {
+    /// Log likelihood with the prior's weight, and sigma, under a shape of noise.
+    fn under(&self, shape: usize) -> (f64, f64) {
+        let Self { problem, rule, channel, .. } = *self;
+        let mut sums = Sums::default();
+        for (run, columns) in self.raw.iter().enumerate() {
+            let start: usize = (0..channel).map(|c| problem.rows[run].valid[c].len()).sum();
+            let end = start + problem.rows[run].valid[channel].len();
+            let whitener = problem.whitener(run, channel, shape);
+            let mine = &self.own_columns[run][channel];
+            let n_own = mine.len();
+            let whitened: Vec<Vec<f64>> = mine
+                .iter()
+                .copied()
+                .chain([columns.len() - 1])
+                .map(|k| {
+                    let mut column = columns[k][start..end].to_vec();
+                    whitener.whiten(&mut column);
+                    column
+                })
+                .collect();
+            let residual = &whitened[n_own];
+            let mut own_gram = gram(&whitened[..n_own]);
+            let kept = cholesky(&mut own_gram, 1e-9);
+            // The own parameters are fitted anew under each shape: what they were under another one is no evidence.
+            let mut right: Vec<f64> = whitened[..n_own].iter().map(|c| dot(c, residual)).collect();
+            forward(&own_gram, &kept, &mut right);
+            sums.squares += (dot(residual, residual) - dot(&right, &right)).max(0.0);
+            sums.log_determinant += whitener.log_determinant + log_determinant(&own_gram, &kept);
+            sums.used += kept.iter().filter(|k| **k).count();
+            sums.rows += end - start;
+        }
+        let total: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+        let share = sums.rows as f64 / total.max(1) as f64;
+        let freedom =
+            (sums.rows as f64 - sums.used as f64 - share * self.selection.shared.len() as f64).max(1.0);
+        let sigma = match rule.fixed_sigma[channel] {
+            Some(sigma) => sigma,
+            None => (sums.squares / freedom).sqrt().max(rule.floor[channel]),
+        };
+        let score = rule.log_prior(problem, shape)
+            - freedom * sigma.ln()
+            - 0.5 * sums.log_determinant
+            - 0.5 * sums.squares / (sigma * sigma);
+        (score, sigma)
+    }
 }
 
 /// For each channel, which of a run's own columns (all channels one after the other) it determines.

@@ -7,6 +7,7 @@ pub mod diagnosis;
 pub mod engine;
 mod estimate;
 mod experiment;
+mod family;
 pub mod fit;
 mod law;
 pub mod likelihood;

@@ -69,13 +69,25 @@ impl std::fmt::Debug for Derived {
 /// A function of the shared parameters and of one run's own.
 pub type OfRun = std::sync::Arc<dyn Fn(&[f64], &[f64]) -> f64 + Send + Sync>;
 
-/// A quantity that is computed run by run; the mean over the runs is reported.
+/// What is reported of a quantity that each run has of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Over {
+    /// The mean over the runs.
+    #[default]
+    Mean,
+    /// The value of the run in which its modulus is largest.
+    Largest,
+}
+
+/// A quantity that is computed run by run.
 #[derive(Clone)]
 pub struct DerivedPerRun {
     /// Name with its unit as a suffix.
     pub name: String,
     /// The unit alone.
     pub unit: String,
+    /// What is reported of it.
+    pub over: Over,
     /// The value from the shared parameters and the run's own ones, each in the order of [`Spec::parameters`].
     pub value: OfRun,
 }
@@ -117,7 +129,7 @@ pub struct Mechanism {
     pub companions_unless: Vec<String>,
     /// Quantities computed from its parameters, reported beside them.
     pub derived: Vec<Derived>,
-    /// Quantities computed from each run's own parameters, reported as a mean over the runs.
+    /// Quantities computed from each run's own parameters, reported as they say ([`Over`]).
     pub derived_per_run: Vec<DerivedPerRun>,
 }
 

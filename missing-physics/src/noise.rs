@@ -37,29 +37,6 @@ impl Shape {
     }
 }
 
-/// Correlations of neighbours in noise that is an autoregression of one row.
-const PHIS: [f64; 8] = [0.2, 0.4, 0.6, 0.75, 0.86, 0.93, 0.97, 0.99];
-
-/// The shapes among which the data choose; white first, those that go by row last.
-pub fn family() -> Vec<Shape> {
-    let mut shapes = vec![Shape::WHITE];
-    let rough =
-        |phi: f64, correlated: f64| Shape { correlated, length_steps: -1.0 / phi.ln(), ..Shape::WHITE };
-    shapes.extend(PHIS.map(|phi| rough(phi, 1.0)));
-    for correlated in [0.15, 0.4, 0.7, 0.9, 0.98] {
-        for phi in [0.75, 0.9, 0.97] {
-            shapes.push(rough(phi, correlated));
-        }
-    }
-    for correlated in [0.3, 0.7, 0.93, 0.99] {
-        for length_steps in [3.0, 7.0, 18.0] {
-            shapes.push(Shape { correlated, length_steps, smooth: true, ..Shape::WHITE });
-        }
-    }
-    shapes.extend(PHIS.map(|phi| Shape { by_row: true, ..rough(phi, 1.0) }));
-    shapes
-}
-
 /// Smallest share of the variance that is white.
 const LEAST_WHITE: f64 = 1e-6;
 
@@ -260,6 +237,7 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::family::Family;
     use nalgebra::{DMatrix, DVector};
 
     fn covariance(positions: &[f64], step: f64, shape: Shape) -> DMatrix<f64> {
@@ -286,7 +264,11 @@ mod tests {
             })
             .collect();
         let values: Vec<f64> = (0..40).map(|i| (f64::from(i) * 0.7).sin() + 0.1 * f64::from(i % 5)).collect();
-        for shape in family().into_iter().skip(1) {
+        for shape in (1..Family::get().len())
+            .step_by(23)
+            .chain(Family::get().few().skip(1))
+            .map(|n| Family::get().shape(n))
+        {
             let dense = covariance(&positions, 0.15, shape).cholesky().expect("positive definite");
             let y = DVector::from_vec(values.clone());
             let form = y.dot(&dense.solve(&y));

@@ -47,13 +47,16 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         fixed_sigma,
         uncertainty,
         against_colour: 0.0,
-        allowed: (0..problem.shapes.len())
+        allowed: problem
+            .family
+            .few()
             .filter(|&s| {
-                let shape = problem.shapes[s];
+                let shape = problem.family.shape(s);
                 let heard = !shape.by_row || problem.uneven;
                 s == 0 || long && heard && shape.length_steps <= longest
             })
             .collect(),
+        longest,
         floor,
     }
 }

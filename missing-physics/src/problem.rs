@@ -3,14 +3,16 @@
 use std::sync::OnceLock;
 
 use crate::data::{Recording, Run};
+use crate::family::Family;
 use crate::model::{Model, Scope, Spec};
-use crate::noise::{Shape, Whitener, family, median};
+use crate::noise::{Whitener, median};
 
 /// A model and a recording, with everything about the rows that no fit changes.
 pub(crate) struct Problem<'a> {
     pub(crate) model: &'a dyn Model,
     pub(crate) recording: Recording,
-    pub(crate) shapes: Vec<Shape>,
+    /// The shapes of noise, by number.
+    pub(crate) family: &'static Family,
     pub(crate) rows: Vec<RunRows>,
     /// Median step between rows, in the noise variable's unit.
     pub(crate) step: f64,
@@ -33,14 +35,20 @@ pub(crate) struct ParameterTable {
     pub(crate) index: Vec<usize>,
 }
 
+/// Whiteners of neighbouring shapes.
+type Page = Box<[OnceLock<Whitener>]>;
+
+/// Whiteners on a page.
+const PAGE: usize = 64;
+
 /// The measured rows of one run.
 pub(crate) struct RunRows {
     /// For each channel, the rows that were measured.
     pub(crate) valid: Vec<Vec<usize>>,
     /// For each channel, the noise variable at those rows.
     pub(crate) positions: Vec<Vec<f64>>,
-    /// For each channel and shape, made when first asked for.
-    whiteners: Vec<Vec<OnceLock<Whitener>>>,
+    /// For each channel and shape, made when first asked for, page by page: few of the many shapes ever are.
+    whiteners: Vec<Vec<OnceLock<Page>>>,
 }
 
 impl ParameterTable {
@@ -59,9 +67,14 @@ impl ParameterTable {
     }
 }
 
+/// Places to be filled.
+fn empty<T>(count: usize) -> Vec<OnceLock<T>> {
+    (0..count).map(|_| OnceLock::new()).collect()
+}
+
 impl<'a> Problem<'a> {
     pub(crate) fn new(model: &'a dyn Model, recording: Recording) -> Self {
-        let shapes = family();
+        let family = Family::get();
         let mut gaps = Vec::new();
         let mut rows = Vec::with_capacity(recording.runs.len());
         for run in &recording.runs {
@@ -73,7 +86,7 @@ impl<'a> Problem<'a> {
                 .map(|column| (0..column.len()).filter(|&i| column[i].is_finite()).collect())
                 .collect();
             let positions = valid.iter().map(|ids| ids.iter().map(|&i| along[i]).collect()).collect();
-            let whiteners = valid.iter().map(|_| shapes.iter().map(|_| OnceLock::new()).collect()).collect();
+            let whiteners = valid.iter().map(|_| empty(family.len().div_ceil(PAGE))).collect();
             rows.push(RunRows { valid, positions, whiteners });
         }
         let step = median(&mut gaps).unwrap_or(1.0);
@@ -103,7 +116,7 @@ impl<'a> Problem<'a> {
             own_start,
             step,
             uneven: 10 * odd > gaps.len(),
-            shapes,
+            family,
             rows,
             recording,
             model,
@@ -132,8 +145,9 @@ impl<'a> Problem<'a> {
 
     pub(crate) fn whitener(&self, run: usize, channel: usize, shape: usize) -> &Whitener {
         let rows = &self.rows[run];
-        rows.whiteners[channel][shape].get_or_init(|| {
-            let shape = self.shapes[shape];
+        let page = rows.whiteners[channel][shape / PAGE].get_or_init(|| empty(PAGE).into_boxed_slice());
+        page[shape % PAGE].get_or_init(|| {
+            let shape = self.family.shape(shape);
             if shape.by_row {
                 let numbers: Vec<f64> = rows.valid[channel].iter().map(|&i| i as f64).collect();
                 Whitener::new(&numbers, 1.0, shape)

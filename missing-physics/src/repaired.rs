@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::compare::Candidate;
 use crate::data::{Recording, RecordingError};
+use crate::family::Family;
 use crate::fit::{NoiseState, own_normal, solve};
 use crate::linalg::inverse;
 use crate::model::{Model, PredictError, Quantity};
-use crate::noise::family;
 use crate::problem::{Problem, Selection};
 
 /// A model with its mechanisms on, and how well its parameters are known.
@@ -234,7 +234,7 @@ impl Repaired {
         if !self.parameters.iter().all(|p| p.value.is_finite()) || !(self.noise_step > 0.0) {
             return Err(RepairedError::Damaged("a parameter or step that is no number"));
         }
-        let shapes = family().len();
+        let shapes = Family::get().len();
         if self.noise.iter().any(|n| !(n.sigma > 0.0 && n.sigma.is_finite()) || n.shape >= shapes) {
             return Err(RepairedError::Damaged("noise that is not above zero, or of no known shape"));
         }

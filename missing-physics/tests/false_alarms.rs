@@ -18,9 +18,13 @@ const WORLDS: u64 = 300;
 
 /// Counts p-values at or below a level and compares the count with the binomial law of that level, at 1 in 1,000.
 fn holds(world: World) {
+    holds_in(world, WORLDS);
+}
+
+fn holds_in(world: World, worlds: u64) {
     let model = Ball::default();
     let options = Options { replicates: 199, ..Options::default() };
-    let p: Vec<f64> = (0..WORLDS)
+    let p: Vec<f64> = (0..worlds)
         .map(|seed| {
             let options = Options { seed, ..options.clone() };
             let answer = diagnose(&model, &world.draw(1000 + seed), &[], &options, &Silent).unwrap();
@@ -30,8 +34,8 @@ fn holds(world: World) {
         .collect();
     for level in [0.01, 0.05, 0.2, 0.5] {
         let alarms = p.iter().filter(|p| **p <= level + 1e-12).count() as u64;
-        let law = Binomial::new(level, WORLDS).unwrap();
-        println!("level {level}: {alarms} alarms in {WORLDS} worlds");
+        let law = Binomial::new(level, worlds).unwrap();
+        println!("level {level}: {alarms} alarms in {worlds} worlds");
         assert!(law.cdf(alarms) > 5e-4, "too few alarms at {level}: {alarms}");
         assert!(alarms == 0 || law.sf(alarms - 1) > 5e-4, "too many alarms at {level}: {alarms}");
     }
@@ -60,4 +64,10 @@ fn faintly_coloured_noise() {
 #[test]
 fn one_reading_in_a_hundred_is_wild() {
     holds(World { wild: 0.01, ..World::NULL });
+}
+
+/// So many rows show a correlation to a hundredth: it must be met that well, and lies between round numbers.
+#[test]
+fn many_rows_of_coloured_noise() {
+    holds_in(World { rows: 1000, phi: 0.5, ..World::NULL }, 40);
 }

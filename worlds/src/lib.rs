@@ -4,6 +4,7 @@ pub mod bounce;
 pub mod bounces;
 pub mod bundled;
 pub mod concealed;
+pub mod customs;
 pub mod dough;
 pub mod doughs;
 pub mod flight;

@@ -49,6 +49,8 @@ pub enum DecayError {
 const STEPS_PER_RADIAN: f64 = 4.0;
 /// Spacings of rows that differ by less, relatively, are the same but for rounding.
 const EVEN: f64 = 1e-11;
+/// The fifth power of the spring, over the square of the third.
+const QUINTIC: f64 = 21.0 / 80.0;
 
 impl Decay {
     /// Readings at the rising times `t_s` (s, from 0 on), from the start `x(0) = a`, `x'(0) = -gamma omega a + omega_d b`: without
@@ -70,6 +72,30 @@ impl Decay {
             return Ok(());
         }
         self.integrate(t_s, start, out)
+    }
+
+    /// Relative change of the frequency of the motion through the start `[a, b]` (as in [`Self::read`]), viscosity and friction left
+    /// out.
+    pub fn frequency_shift(&self, [a, b]: [f64; 2]) -> f64 {
+        let s = self.stiffening();
+        let potential = |u: f64| u + 0.5 * u * u + QUINTIC / 3.0 * u.powi(3);
+        // The energy of the start is that of the turning point A, where u = s A^2.
+        let energy = potential(s * a * a) + s * b * b;
+        let mut u = energy;
+        for _ in 0..20 {
+            // Above zero everywhere: however soft, this spring always pulls back.
+            let slope = 1.0 + u + QUINTIC * u * u;
+            u = u - (potential(u) - energy) / slope;
+        }
+        3.0 / 8.0 * u
+    }
+
+    /// The cubic part of the spring, relative to the linear one, in 1/reading^2: the first harmonic of one of relative strength
+    /// s A^2 has the frequency 1 + 3/8 s A^2 - 21/256 s^2 A^4 (Nayfeh and Mook 1979, doi:10.1002/9783527617586, section 2.3); a
+    /// fifth power of 21/80 s^2 takes the last term away.
+    fn stiffening(&self) -> f64 {
+        let largest = self.effects.largest_amplitude;
+        if largest == 0.0 { 0.0 } else { 8.0 / 3.0 * self.effects.frequency_change / (largest * largest) }
     }
 
     fn check(&self) -> Result<(), DecayError> {
@@ -104,18 +130,15 @@ impl Decay {
     /// What the effects add to the acceleration.
     fn push(&self, x: f64, v: f64, stiffening: f64, force: f64) -> f64 {
         let w = self.omega_rad_s;
-        -w * w * stiffening * x * x * x - self.effects.quadratic_per_reading * v.abs() * v - force
+        let cubic = stiffening * x * x;
+        -w * w * x * cubic * (1.0 + QUINTIC * cubic)
+            - self.effects.quadratic_per_reading * v.abs() * v
+            - force
     }
 
     fn integrate(&self, t_s: &[f64], start: [f64; 2], out: &mut [f64]) -> Result<(), DecayError> {
         let (w, friction) = (self.omega_rad_s, self.effects.friction);
-        // The first harmonic of a cubic spring of relative strength s A^2 has the frequency 1 + 3/8 s A^2.
-        let largest = self.effects.largest_amplitude;
-        let stiffening = if largest == 0.0 {
-            0.0
-        } else {
-            8.0 / 3.0 * self.effects.frequency_change / (largest * largest)
-        };
+        let stiffening = self.stiffening();
         let bound = 1e3 * (start[0].abs() + start[1].abs() / w + friction);
         let mut state = Motion { x: start[0], v: start[1], direction: 0.0 };
         state.set_off(w, friction);
@@ -353,12 +376,9 @@ mod tests {
         approx::assert_relative_eq!(tops[49], expected, max_relative = 1e-4);
     }
 
-    /// Zero crossings come sooner by the stated share.
-    #[test]
-    fn the_frequency_changes_by_the_stated_share() {
-        let decay =
-            Decay { damping_ratio: 0.0, effects: Effects { frequency_change: 0.01, ..MODE.effects }, ..MODE };
-        let x = read(decay, &times(40_000, 2.5e-4), [1.0, 0.0]);
+    /// Angular frequency of a motion without damping, by its zero crossings.
+    fn frequency(decay: Decay, start: [f64; 2]) -> f64 {
+        let x = read(decay, &times(40_000, 2.5e-4), start);
         let crossings: Vec<f64> = x
             .windows(2)
             .enumerate()
@@ -366,8 +386,28 @@ mod tests {
             .map(|(i, w)| (i as f64 + w[0] / (w[0] - w[1])) * 2.5e-4)
             .collect();
         let last = crossings.len() - 1;
-        let frequency = std::f64::consts::TAU * last as f64 / (crossings[last] - crossings[0]);
-        approx::assert_relative_eq!(frequency, 20.2, max_relative = 2e-4);
+        std::f64::consts::TAU * last as f64 / (crossings[last] - crossings[0])
+    }
+
+    /// Zero crossings come sooner by the stated share.
+    #[test]
+    fn the_frequency_changes_by_the_stated_share() {
+        let decay =
+            Decay { damping_ratio: 0.0, effects: Effects { frequency_change: 0.01, ..MODE.effects }, ..MODE };
+        approx::assert_relative_eq!(frequency(decay, [1.0, 0.0]), 20.2, max_relative = 2e-4);
+    }
+
+    /// From any phase, for a wave that is slower or faster when it is high.
+    #[test]
+    fn the_shift_of_a_start_is_that_of_its_motion() {
+        for frequency_change in [-0.06, -0.02, 0.03] {
+            let effects = Effects { frequency_change, ..MODE.effects };
+            let decay = Decay { damping_ratio: 0.0, effects, ..MODE };
+            for start in [[1.0, 0.0], [0.0, 0.95], [0.6, -0.7]] {
+                let found = frequency(decay, start) / 20.0 - 1.0;
+                approx::assert_relative_eq!(decay.frequency_shift(start), found, max_relative = 3e-3);
+            }
+        }
     }
 
     #[test]
@@ -382,8 +422,8 @@ mod tests {
         for decay in bad {
             assert!(matches!(decay.read(&[0.0, 1.0], [1.0, 0.0], &mut out), Err(DecayError::Value { .. })));
         }
-        // A spring that softens until it pushes has no decay.
-        let soft = Decay { effects: Effects { frequency_change: -0.9, ..MODE.effects }, ..MODE };
-        assert!(soft.read(&[0.0, 5.0], [1.5, 0.0], &mut out).is_err());
+        // A spring so stiff that the steps are too long for it.
+        let stiff = Decay { effects: Effects { frequency_change: 50.0, ..MODE.effects }, ..MODE };
+        assert!(matches!(stiff.read(&[0.0, 5.0], [3.0, 0.0], &mut out), Err(DecayError::Diverges { .. })));
     }
 }

@@ -31,6 +31,9 @@ pub(crate) struct Alternative {
 /// Degree of the polynomial in a variable that the bank looks for.
 pub(crate) const DEGREE: usize = 5;
 
+/// Most moves of a climb among shapes at one stride.
+const CLIMB: usize = 8;
+
 /// One run and channel: whitened columns for each shape that is in play.
 struct Block {
     /// Raw (unwhitened) columns over the measured rows.
@@ -435,7 +438,7 @@ impl<'a> Bank<'a> {
                     let (squares, log_determinant) =
                         self.squares(products, channel, shape, &ids, &coefficients);
                     let (mut value, sigma) = self.channel_score(channel, squares, log_determinant);
-                    value += self.problem.shapes[self.in_play[shape]].log_prior();
+                    value += self.problem.family.shape(self.in_play[shape]).log_prior();
                     if value > best {
                         best = value;
                         *state = (shape, sigma);
@@ -518,6 +521,43 @@ impl<'a> Bank<'a> {
         let start = self.white_start(&products);
         let (_, noise, _) = self.alternate(&products, &own, &shared, &start, 8);
         noise.into_iter().map(|(shape, sigma)| (self.in_play[shape], sigma)).collect()
+    }
+
+    /// The noise of a data vector as [`Self::noise_beyond_mechanisms`] finds it, of the shapes between those in play as well;
+    /// those a standard error about it are put in play beside the others: another vector of this noise would choose among them.
+    pub(crate) fn sharpen(&mut self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
+        let mut shapes = self.in_play.clone();
+        let mut noise = self.noise_beyond_mechanisms(data);
+        for stride in self.problem.family.strides() {
+            for _ in 0..CLIMB {
+                self.play(&self.around(&noise, |_| stride));
+                let next = self.noise_beyond_mechanisms(data);
+                let still = next.iter().zip(&noise).all(|(a, b)| a.0 == b.0);
+                noise = next;
+                if still {
+                    break;
+                }
+            }
+        }
+        let problem = self.problem;
+        shapes.extend(self.around(&noise, |channel| problem.family.error_steps(problem.count(channel))));
+        shapes.sort_unstable();
+        shapes.dedup();
+        self.play(&shapes);
+        noise
+    }
+
+    /// White noise, each channel's shape, and the shapes so many steps about it.
+    fn around(&self, noise: &[(usize, f64)], stride: impl Fn(usize) -> usize) -> Vec<usize> {
+        let family = self.problem.family;
+        let mut shapes = vec![0];
+        for (channel, &(shape, _)) in noise.iter().enumerate() {
+            let beside = family.around(shape, stride(channel)).into_iter();
+            shapes.extend(beside.filter(|&s| self.rule.admits(&family.shape(s))).chain([shape]));
+        }
+        shapes.sort_unstable();
+        shapes.dedup();
+        shapes
     }
 
     /// White noise at the level of the whole data, where fits begin.

@@ -137,7 +137,7 @@ impl SloshModel {
             effects: Effects {
                 friction: shared[p.friction.slot],
                 quadratic_per_reading: shared[p.quadratic.slot],
-                frequency_change: shared[p.frequency.slot],
+                frequency_change: shared[p.frequency.slot] * self.largest * self.largest,
                 largest_amplitude: self.largest,
             },
         };

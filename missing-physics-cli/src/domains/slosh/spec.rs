@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use liquid_haptics::slosh::UprightCylinder;
-use missing_physics::model::{DerivedPerRun, Spec};
+use liquid_haptics::slosh::{Decay, Effects, UprightCylinder};
+use missing_physics::model::{DerivedPerRun, Over, Spec};
 
 use super::model::Setup;
 use crate::domains::builder::{ANY, At, Builder};
@@ -75,8 +75,15 @@ pub(super) fn build(
         ],
         &["nonlinear-frequency"],
     );
-    p.frequency = b.shared("coefficient", "", 0.0, [-0.3, 0.3], 0.01);
-    b.mechanism(
+    let square = largest * largest;
+    p.frequency = b.shared(
+        &format!("coefficient_per_{suffix}2"),
+        &format!("1/({unit})^2"),
+        0.0,
+        [-0.3 / square, 0.3 / square],
+        0.01 / square,
+    );
+    let mechanism = b.mechanism(
         "nonlinear-frequency",
         &[p.frequency],
         [
@@ -87,6 +94,19 @@ pub(super) fn build(
         ],
         &["surface-tension"],
     );
+    // The start says how high the wave is only together with the spring: the change is that of its motion.
+    let (cos, sin, frequency) = (p.cos.slot, p.sin.slot, p.frequency.slot);
+    let shift = move |shared: &[f64], own: &[f64]| {
+        let effects =
+            Effects { frequency_change: shared[frequency], largest_amplitude: 1.0, ..Effects::default() };
+        Decay { omega_rad_s: omega, damping_ratio: 0.0, effects }.frequency_shift([own[cos], own[sin]])
+    };
+    mechanism.derived_per_run = vec![DerivedPerRun {
+        name: "coefficient".into(),
+        unit: String::new(),
+        over: Over::Largest,
+        value: Arc::new(shift),
+    }];
     p.friction = b.shared(&format!("friction_{suffix}"), unit, 0.0, [0.0, largest], at_rest * largest);
     b.mechanism(
         "contact-line-friction",
@@ -117,9 +137,9 @@ pub(super) fn build(
         ],
         &["contact-line-friction"],
     );
-    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
     p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3, 100.0], 1.0 / omega);
     p.transient = b.own(&format!("transient_{suffix}"), unit, ANY, amplitude);
+    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
     let mechanism = b.mechanism(
         "sensor-lag",
         &[p.lag],
@@ -161,7 +181,8 @@ fn modes(
         &["arm-compliance", "sensor-lag"],
     );
     second.companions = vec![p.second_cos.index, p.second_sin.index];
-    second.derived_per_run = vec![amplitude_of(p.second_cos, p.second_sin, suffix, unit)];
+    second.derived_per_run =
+        vec![amplitude_of(&p, [p.second_omega, p.second_cos, p.second_sin], suffix, unit)];
     second.shapes = vec![p.second_omega.index, p.second_damping.index];
     p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
     p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
@@ -179,15 +200,20 @@ fn modes(
         &["second-mode"],
     );
     arm.companions = vec![p.arm_cos.index, p.arm_sin.index];
-    arm.derived_per_run = vec![amplitude_of(p.arm_cos, p.arm_sin, suffix, unit)];
+    arm.derived_per_run = vec![amplitude_of(&p, [p.arm_omega, p.arm_cos, p.arm_sin], suffix, unit)];
     arm.shapes = vec![p.arm_omega.index, p.arm_damping.index];
 }
 
-/// The amplitude at t = 0 of a wave that each run has in two parts.
-fn amplitude_of(cos: At, sin: At, suffix: &str, unit: &str) -> DerivedPerRun {
+/// The amplitude at t = 0 of a wave that each run has in two parts. A sensor that lags (its reading has a transient) shows less of it.
+fn amplitude_of(p: &Places, [omega, cos, sin]: [At; 3], suffix: &str, unit: &str) -> DerivedPerRun {
+    let (omega, cos, sin, lag, transient) = (omega.slot, cos.slot, sin.slot, p.lag.slot, p.transient.slot);
     DerivedPerRun {
         name: format!("amplitude_{suffix}"),
         unit: unit.into(),
-        value: Arc::new(move |_, own| own[cos.slot].hypot(own[sin.slot])),
+        over: Over::Mean,
+        value: Arc::new(move |shared, own| {
+            let lags = if own[transient] == 0.0 { 0.0 } else { shared[omega] * shared[lag] };
+            own[cos].hypot(own[sin]) * lags.hypot(1.0)
+        }),
     }
 }

@@ -1,0 +1,289 @@
+//! Simulators of other people beside recordings of rigs that do more than they know: columns `sim_<channel>` of a pendulum, a tank
+//! or a heated plate, all of whose constants are known.
+
+use std::fmt::Write as _;
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::GRAVITY_M_S2;
+use crate::concealed::draw::{self, between, log_between, sign, stated, strength, whole};
+use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use crate::noise::Noise;
+use crate::sizing::{change, sized};
+
+/// The domain `custom`.
+#[derive(Debug, Clone, Copy)]
+pub struct Customs;
+
+/// What is simulated: position (or level, or temperature) and its rate of change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Rig {
+    /// Swings with this angular frequency (rad/s) when it swings little.
+    Pendulum { omega_rad_s: f64 },
+    /// Drains by `h' = -k sqrt(h)`, k in sqrt(m)/s.
+    Tank { outlet: f64 },
+    /// Warmer than the room by what a heater gives (K/s) and the air takes (1/s).
+    Plate { heater_k_s: f64, cooling_per_s: f64 },
+}
+
+/// What the simulator does not know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Effect {
+    Nothing,
+    /// Friction of a bearing's grease; evaporation at a constant rate; radiation.
+    First,
+    /// Drag of the air; a filter that clogs with time; a heater that weakens with time.
+    Second,
+    /// A knock; a second outlet that opens; a window that is opened: from a time on.
+    Sudden,
+}
+
+/// One recording.
+struct World {
+    rig: Rig,
+    effect: Effect,
+    turn: f64,
+    at_s: f64,
+    starts: Vec<f64>,
+    rows: usize,
+    rate_hz: f64,
+    noise: Noise,
+}
+
+/// Steps of the integrator between two rows.
+const STEPS: usize = 20;
+/// How long a knock lasts, s.
+const KNOCK_S: f64 = 0.04;
+
+impl Maker for Customs {
+    fn domain(&self) -> &'static str {
+        "custom"
+    }
+
+    /// A simulator in columns has no list of mechanisms.
+    fn kind(&self, hidden: Hidden) -> Hidden {
+        if hidden == Hidden::Nothing { hidden } else { Hidden::Unlisted }
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let hidden = self.kind(hidden);
+        let world = World::drawn(hidden, &mut rng);
+        let mut key = Key::new(hidden);
+        let mut size = 0.0;
+        if hidden == Hidden::Unlisted {
+            let wanted = strength(&mut rng);
+            size = sized(wanted, [1e-7, 10.0], |size| world.strength(size));
+            key.strength = Some(world.strength(size));
+            world.say(&mut key);
+        }
+        let [header, data] = world.files(size, &mut rng);
+        Concealed::table(header, data, key)
+    }
+}
+
+impl World {
+    fn drawn(hidden: Hidden, rng: &mut ChaCha8Rng) -> Self {
+        let (rig, duration_s, level, sigma) = match whole(rng, 0, 2) {
+            0 => {
+                let omega_rad_s = (GRAVITY_M_S2 / between(rng, 0.2, 1.2)).sqrt();
+                let duration_s = between(rng, 3.0, 10.0);
+                (Rig::Pendulum { omega_rad_s }, duration_s, 0.5, log_between(rng, 5e-4, 5e-3))
+            }
+            1 => {
+                let duration_s = between(rng, 40.0, 120.0);
+                // Two thirds of the level are gone in the end.
+                let outlet = 0.42 * 0.5 / duration_s;
+                (Rig::Tank { outlet }, duration_s, 0.25, log_between(rng, 5e-4, 3e-3))
+            }
+            _ => {
+                let duration_s = between(rng, 200.0, 900.0);
+                let cooling_per_s = between(rng, 1.0, 4.0) / duration_s;
+                let heater_k_s = cooling_per_s * between(rng, 0.0, 40.0);
+                (Rig::Plate { heater_k_s, cooling_per_s }, duration_s, 30.0, log_between(rng, 0.05, 0.4))
+            }
+        };
+        let runs = whole(rng, 2, 6);
+        let rows = whole(rng, 60, 250);
+        let effects = [Effect::First, Effect::Second, Effect::Sudden];
+        Self {
+            rig,
+            effect: if hidden == Hidden::Nothing { Effect::Nothing } else { effects[whole(rng, 0, 2)] },
+            turn: sign(rng),
+            at_s: duration_s * between(rng, 0.2, 0.7),
+            starts: (0..runs).map(|_| level * between(rng, 0.6, 1.4)).collect(),
+            rows,
+            rate_hz: rows as f64 / duration_s,
+            noise: draw::noise(rng, sigma),
+        }
+    }
+
+    /// Rates of change of position and speed.
+    fn rates(&self, [x, v]: [f64; 2], t: f64, size: f64) -> [f64; 2] {
+        use Effect::{First, Nothing, Second, Sudden};
+        let after = if t >= self.at_s { 1.0 } else { 0.0 };
+        match self.rig {
+            Rig::Pendulum { omega_rad_s } => {
+                let knock = self.turn * (-0.5 * ((t - self.at_s) / KNOCK_S).powi(2)).exp() / KNOCK_S;
+                let push = size
+                    * match self.effect {
+                        Nothing => 0.0,
+                        First => -2.0 * v,
+                        Second => -v.abs() * v,
+                        Sudden => knock,
+                    };
+                [v, -omega_rad_s * omega_rad_s * x.sin() + push]
+            }
+            Rig::Tank { outlet } => {
+                let level = x.max(0.0);
+                let lost = match self.effect {
+                    Nothing => 0.0,
+                    First => level.min(1e-3) / 1e-3,
+                    Second => -0.1 * t * outlet * level.sqrt(),
+                    Sudden => after * level.sqrt(),
+                };
+                [-outlet * level.sqrt() - size * lost, 0.0]
+            }
+            Rig::Plate { heater_k_s, cooling_per_s } => {
+                let lost = match self.effect {
+                    Nothing => 0.0,
+                    First => cooling_per_s * 0.1 * x.abs() * x,
+                    Second => heater_k_s * 0.1 * t * cooling_per_s + 1e-3 * t * cooling_per_s,
+                    Sudden => after * cooling_per_s * x,
+                };
+                [heater_k_s - cooling_per_s * x - size * lost, 0.0]
+            }
+        }
+    }
+
+    /// What one run reads without noise, by a classical Runge-Kutta method.
+    fn run(&self, start: f64, size: f64) -> Vec<f64> {
+        let h = 1.0 / (self.rate_hz * STEPS as f64);
+        let mut state = [start, 0.0];
+        let along = |s: [f64; 2], k: [f64; 2], h: f64| [s[0] + h * k[0], s[1] + h * k[1]];
+        let mut readings = Vec::with_capacity(self.rows);
+        for row in 0..self.rows {
+            readings.push(state[0]);
+            for step in 0..STEPS {
+                let t = (row * STEPS + step) as f64 * h;
+                let k1 = self.rates(state, t, size);
+                let k2 = self.rates(along(state, k1, 0.5 * h), t + 0.5 * h, size);
+                let k3 = self.rates(along(state, k2, 0.5 * h), t + 0.5 * h, size);
+                let k4 = self.rates(along(state, k3, h), t + h, size);
+                for i in 0..2 {
+                    state[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+                }
+            }
+        }
+        readings
+    }
+
+    /// What an effect of this size does to the readings, in sigmas.
+    fn strength(&self, size: f64) -> f64 {
+        let sigma = draw::sigma(&self.noise);
+        let squares = self.starts.iter().flat_map(|s| change(&self.run(*s, 0.0), &self.run(*s, size)));
+        squares.map(|d| (d / sigma).powi(2)).sum::<f64>().sqrt()
+    }
+
+    fn say(&self, key: &mut Key) {
+        let what = match (self.rig, self.effect) {
+            (_, Effect::Nothing) => return,
+            (Rig::Pendulum { .. }, Effect::First) => "grease in the bearing",
+            (Rig::Pendulum { .. }, Effect::Second) => "drag of the air",
+            (Rig::Pendulum { .. }, Effect::Sudden) => "a knock",
+            (Rig::Tank { .. }, Effect::First) => "evaporation",
+            (Rig::Tank { .. }, Effect::Second) => "an outlet that clogs",
+            (Rig::Tank { .. }, Effect::Sudden) => "a second outlet that opens",
+            (Rig::Plate { .. }, Effect::First) => "cooling that grows with the temperature",
+            (Rig::Plate { .. }, Effect::Second) => "a heater that weakens",
+            (Rig::Plate { .. }, Effect::Sudden) => "a draught from a window that is opened",
+        };
+        key.unlisted = Some(what.into());
+        if self.effect == Effect::Sudden {
+            let to = self.rows as f64 / self.rate_hz;
+            key.place = Some(Place { variable: "t_s".into(), from: self.at_s, to });
+        }
+    }
+
+    fn files(&self, size: f64, rng: &mut ChaCha8Rng) -> [String; 2] {
+        let (channel, unit) = match self.rig {
+            Rig::Pendulum { .. } => ("angle_rad", "rad"),
+            Rig::Tank { .. } => ("level_m", "m"),
+            Rig::Plate { .. } => ("warmer_k", "K"),
+        };
+        let mut header = format!(
+            "format = 1\ndomain = \"custom\"\ndata = \"data.csv\"\n\n[[input]]\nname = \"t_s\"\nunit = \"s\"\n\n[[channel]]\nname = \"{channel}\"\nunit = \"{unit}\"\n"
+        );
+        if whole(rng, 0, 2) > 0 {
+            let _ = write!(header, "\n[noise]\n{channel} = {:.3e}\n", stated(rng, &self.noise));
+        }
+        let mut data = format!("run,t_s,{channel},sim_{channel}\n");
+        for (run, &start) in self.starts.iter().enumerate() {
+            let simulated = self.run(start, 0.0);
+            let mut readings = self.run(start, size);
+            self.noise.apply(&mut readings, rng);
+            for (row, (value, simulated)) in readings.iter().zip(&simulated).enumerate() {
+                let t = row as f64 / self.rate_hz;
+                let _ = writeln!(data, "{},{t:.4},{value:.7},{simulated:.7}", run + 1);
+            }
+        }
+        [header, data]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn world(rig: Rig, effect: Effect) -> World {
+        World {
+            rig,
+            effect,
+            turn: 1.0,
+            at_s: 2.0,
+            starts: vec![0.25],
+            rows: 101,
+            rate_hz: 20.0,
+            noise: Noise::white(1e-3),
+        }
+    }
+
+    /// Torricelli: the root of the level falls in a straight line.
+    #[test]
+    fn a_tank_drains_as_torricelli_says() {
+        let level = world(Rig::Tank { outlet: 0.05 }, Effect::Nothing).run(0.25, 0.0);
+        for (row, h) in level.iter().enumerate() {
+            let t = row as f64 / 20.0;
+            approx::assert_relative_eq!(h.sqrt(), 0.5 - 0.025 * t, epsilon = 1e-10);
+        }
+    }
+
+    /// Newton's law of cooling, and a swing of little amplitude that grease slows.
+    #[test]
+    fn plates_cool_and_pendulums_fade() {
+        let plate = Rig::Plate { heater_k_s: 0.5, cooling_per_s: 0.2 };
+        for (row, x) in world(plate, Effect::Nothing).run(30.0, 0.0).iter().enumerate() {
+            let t = row as f64 / 20.0;
+            approx::assert_relative_eq!(*x, 2.5 + 27.5 * (-0.2 * t).exp(), epsilon = 1e-7);
+        }
+        let swing = world(Rig::Pendulum { omega_rad_s: 4.0 }, Effect::First).run(1e-3, 0.3);
+        for (row, x) in swing.iter().enumerate() {
+            let (t, damped) = (row as f64 / 20.0, (16.0f64 - 0.09).sqrt());
+            let shape = (damped * t).cos() + 0.3 / damped * (damped * t).sin();
+            approx::assert_abs_diff_eq!(*x, 1e-3 * (-0.3 * t).exp() * shape, epsilon = 1e-8);
+        }
+    }
+
+    /// Nothing is hidden before a sudden effect begins, but something after it, and more of it is seen.
+    #[test]
+    fn what_is_sudden_begins_in_time() {
+        for rig in [Rig::Tank { outlet: 0.02 }, Rig::Plate { heater_k_s: 0.5, cooling_per_s: 0.2 }] {
+            let w = world(rig, Effect::Sudden);
+            let difference = change(&w.run(0.25, 0.0), &w.run(0.25, 0.02));
+            assert!(difference[..40].iter().all(|d| *d == 0.0));
+            assert!(difference[60].abs() > 1e-5, "{rig:?}");
+            assert!(w.strength(0.02) > 1.5 * w.strength(0.01));
+        }
+    }
+}
