@@ -113,7 +113,7 @@ pub(crate) fn populations(theta: &[f64]) -> Vec<f64> {
     let &[alpha, beta, gamma, delta] = theta else { return Vec::new() };
     // Logarithms: both stay positive, and fast growth is smooth.
     let mut y = [30.0_f64.ln(), 0.0];
-    let mut out = vec![[0.0; 2]; 10];
+    let mut out = [[0.0; 2]; 10];
     for (i, at) in out.iter_mut().enumerate() {
         for _ in 0..if i == 0 { 0 } else { 210 } {
             y = step(y, 0.01, |[x, y]| [alpha - beta * y.exp(), -gamma + delta * x.exp()]);
