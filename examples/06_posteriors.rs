@@ -23,15 +23,20 @@ use bayes_sim::calibration::expected_coverage;
 use bayes_sim::mdn::{Mdn, MdnSettings};
 use bayes_sim::mdrff::{Mdrff, MdrffSettings};
 use bayes_sim::posterior::ConditionalDensity;
-use common::Task;
+use common::{Task, simulators};
 
 /// Mean C2ST of NPE at 1e3, 1e4 and 1e5 simulations (shared/sbibm/c2st_wide.csv).
-const PUBLISHED: [(&str, [f64; 3]); 5] = [
+const PUBLISHED: [(&str, [f64; 3]); 10] = [
     ("gaussian_linear", [0.6945, 0.5522, 0.5060]),
     ("two_moons", [0.7251, 0.6064, 0.5417]),
     ("slcp", [0.9752, 0.9006, 0.8315]),
     ("gaussian_mixture", [0.7161, 0.6153, 0.5478]),
     ("gaussian_linear_uniform", [0.6963, 0.5534, 0.5093]),
+    ("bernoulli_glm", [0.8630, 0.6783, 0.5588]),
+    ("bernoulli_glm_raw", [0.8996, 0.7648, 0.6074]),
+    ("sir", [0.8151, 0.6796, 0.5848]),
+    ("slcp_distractors", [0.9816, 0.9703, 0.8631]),
+    ("lotka_volterra", [0.9994, 0.9968, 0.9808]),
 ];
 
 fn train(name: &str, task: &Task, count: usize) -> Result<Box<dyn ConditionalDensity>, Box<dyn Error>> {
@@ -61,6 +66,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         common::slcp(),
         common::gaussian_mixture(),
         common::gaussian_linear_uniform(),
+        simulators::bernoulli_glm(),
+        simulators::bernoulli_glm_raw(),
+        simulators::sir(),
+        simulators::slcp_distractors(),
+        simulators::lotka_volterra(),
     ];
     let densities = ["mdn", "mdrff", "autoregressive"];
     let counts = [1_000, 10_000, 100_000];

@@ -50,6 +50,12 @@ pub enum Error {
         /// What came.
         prior: String,
     },
+    /// Correlations that are none, or of flat parameters.
+    #[error("this is no correlation of a prior: {reason}")]
+    Correlation {
+        /// What is wrong.
+        reason: String,
+    },
     /// Too few simulations to learn from.
     #[error("{got} rows are too few: at least {least} are needed")]
     TooFew {

@@ -3,6 +3,7 @@ pub mod autoregressive;
 pub mod c2st;
 pub mod calibration;
 pub mod campaign;
+mod correlation;
 mod ensemble;
 pub mod error;
 mod head;

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::mixture::{Component, Mixture};
 use crate::normal::ln_sum_exp;
 use crate::posterior::Posterior;
-use crate::prior::{Marginal, Prior};
+use crate::prior::Prior;
 
 /// Most components that are carried from one factor to the next.
 const CARRIED: usize = 24;
@@ -82,15 +82,8 @@ impl Information {
 
     /// Flat priors are constant: nothing to divide out but a constant.
     fn of_prior(prior: &Prior) -> Self {
-        let d = prior.dim();
-        let mut out = Self { constant: 0.0, shift: DVector::zeros(d), precision: DMatrix::zeros(d, d) };
-        for (i, marginal) in prior.marginals().iter().enumerate() {
-            if let Marginal::Normal { mean, sd } | Marginal::LogNormal { mean, sd } = *marginal {
-                out.precision[(i, i)] = 1.0 / (sd * sd);
-                out.shift[i] = mean / (sd * sd);
-            }
-        }
-        out
+        let (precision, shift) = prior.information();
+        Self { constant: 0.0, shift, precision }
     }
 
     fn plus(&self, other: &Self) -> Self {

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -185,7 +185,9 @@ impl<D: ConditionalDensity + Saved> Rounds<D> {
         while out.len() < count && tries < TRIES * count {
             let mut candidates = Points::new(d);
             for _ in 0..count {
-                candidates.push(&within(&self.prior, &window, rng))?;
+                if let Some(theta) = self.prior.sample_within(&window, rng) {
+                    candidates.push(&theta)?;
+                }
             }
             tries += count;
             for (t, r) in candidates.rows().zip(self.relative(density, &candidates)?) {
@@ -227,13 +229,6 @@ fn window(prior: &Prior, scouts: &Points) -> Vec<[f64; 2]> {
         *range = [(range[0] - margin).max(bounds[0]), (range[1] + margin).min(bounds[1])];
     }
     out
-}
-
-/// One draw of the prior within a window of its coordinates.
-fn within<R: Rng + ?Sized>(prior: &Prior, window: &[[f64; 2]], rng: &mut R) -> Vec<f64> {
-    let coordinates: Vec<f64> =
-        prior.marginals().iter().zip(window).map(|(m, w)| m.sample_within(*w, rng)).collect();
-    prior.values(&coordinates)
 }
 
 impl<D: ConditionalDensity + Saved> Rounds<D> {

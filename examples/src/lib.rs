@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod dough;
 pub mod grains;
+pub mod plot;
 
 use indicatif::{ParallelProgressIterator, ProgressStyle};
 use missing_physics::data::{Recording, Run};

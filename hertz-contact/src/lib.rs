@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod calibrated;
 pub mod fit;
 pub mod indenter;
 pub mod law;

@@ -3,6 +3,8 @@
 //! A firmer tip gives way less: `F = (k_0 + k_1 p) u + (q_0 + q_1 p) u^2`, fitted by least squares to loads that were known. The square takes
 //! in that the rim of the contact slips first (Mindlin): the load rises ever more slowly.
 
+use hertz_contact::calibrated::{Beyond, Calibrated, distinct};
+
 use crate::regression::Linear;
 
 /// Why there is no load.
@@ -27,17 +29,8 @@ pub enum LoadError {
         pressures: usize,
     },
     /// A question beyond what was calibrated.
-    #[error("{what} is {got}; it was calibrated from {low} to {high}")]
-    Beyond {
-        /// Which.
-        what: &'static str,
-        /// What was asked for.
-        got: f64,
-        /// Least calibrated value.
-        low: f64,
-        /// Greatest calibrated value.
-        high: f64,
-    },
+    #[error(transparent)]
+    Beyond(#[from] Beyond),
 }
 
 /// One known load.
@@ -51,12 +44,15 @@ pub struct Sheared {
     pub load_n: f64,
 }
 
+/// Part of the calibrated range that may be asked for beyond it.
+pub(crate) const SLACK: f64 = 0.02;
+
 /// A calibrated skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShearLoad {
     linear: Linear,
-    pressure_pa: (f64, f64),
-    shear_m: (f64, f64),
+    pressure_pa: Calibrated,
+    shear_m: Calibrated,
 }
 
 impl ShearLoad {
@@ -78,15 +74,12 @@ impl ShearLoad {
         }
         let rows: Vec<Vec<f64>> = samples.iter().map(|s| row(s.pressure_pa, s.shear_m)).collect();
         let loads: Vec<f64> = samples.iter().map(|s| s.load_n).collect();
-        let mut pressures: Vec<f64> = samples.iter().map(|s| s.pressure_pa).collect();
-        pressures.sort_by(f64::total_cmp);
-        pressures.dedup();
+        let pressures = distinct(samples.iter().map(|s| s.pressure_pa));
         let undetermined = LoadError::Undetermined { samples: samples.len(), pressures: pressures.len() };
         let linear = Linear::fit(&rows, &loads).ok_or(undetermined)?;
-        let range = |of: fn(&Sheared) -> f64| {
-            samples.iter().map(of).fold((f64::INFINITY, f64::NEG_INFINITY), |r, x| (r.0.min(x), r.1.max(x)))
-        };
-        Ok(Self { linear, pressure_pa: range(|s| s.pressure_pa), shear_m: range(|s| s.shear_m) })
+        let range = |what, of: fn(&Sheared) -> f64| Calibrated::over(what, samples.iter().map(of), SLACK);
+        let pressure_pa = range("the pressure", |s| s.pressure_pa);
+        Ok(Self { linear, pressure_pa, shear_m: range("the shear", |s| s.shear_m) })
     }
 
     /// Load in N at a pressure and a mean shear, with the standard deviation of a new one.
@@ -94,14 +87,8 @@ impl ShearLoad {
     /// # Errors
     /// [`LoadError::Beyond`]: a polynomial says nothing beyond its samples (a fiftieth of the range is allowed).
     pub fn load_n(&self, pressure_pa: f64, shear_m: f64) -> Result<(f64, f64), LoadError> {
-        for (what, got, (low, high)) in
-            [("the pressure", pressure_pa, self.pressure_pa), ("the shear", shear_m, self.shear_m)]
-        {
-            let slack = 0.02 * (high - low);
-            if !(got >= low - slack && got <= high + slack) {
-                return Err(LoadError::Beyond { what, got, low, high });
-            }
-        }
+        self.pressure_pa.check(pressure_pa)?;
+        self.shear_m.check(shear_m)?;
         let row = row(pressure_pa, shear_m);
         Ok((self.linear.at(&row).0, self.linear.new_sigma(&row)))
     }

@@ -3,10 +3,12 @@
 //! The tip is treated as an elastic ball (section 5.3): `F = 4/3 E/(1 - nu^2) sqrt(R) delta^(3/2)` with
 //! `1/R = 1/R_tip + 1/R_probe`, which corrects eqs 5.1 to 5.3.
 
+use hertz_contact::calibrated::{Beyond, Calibrated, distinct};
 use hertz_contact::fit::{Curve, Fit, FitError, Loss, Workspace};
 use hertz_contact::indenter::{Indenter, effective_radius_m};
 use hertz_contact::law::{Elastic, InverseError, Law, LawError};
 
+use crate::load::SLACK;
 use crate::regression::Linear;
 
 /// Poisson's ratio of rubber.
@@ -43,15 +45,8 @@ pub enum ModulusError {
         got: usize,
     },
     /// A pressure beyond the calibrated ones.
-    #[error("a pressure of {got_pa} Pa; calibrated from {low_pa} to {high_pa} Pa")]
-    Beyond {
-        /// What was asked for.
-        got_pa: f64,
-        /// Least calibrated pressure.
-        low_pa: f64,
-        /// Greatest calibrated pressure.
-        high_pa: f64,
-    },
+    #[error(transparent)]
+    Beyond(#[from] Beyond),
 }
 
 /// What is pressed onto what.
@@ -124,7 +119,7 @@ pub struct Stiffness {
     modulus: Linear,
     radius: Linear,
     degree: usize,
-    pressure_pa: (f64, f64),
+    pressure_pa: Calibrated,
 }
 
 /// A value with its 95 % interval.
@@ -153,11 +148,8 @@ impl Stiffness {
                 }
             }
         }
-        let mut pressures: Vec<f64> = states.iter().map(|s| s.pressure_pa).collect();
-        pressures.sort_by(f64::total_cmp);
-        pressures.dedup();
+        let pressures = distinct(states.iter().map(|s| s.pressure_pa));
         let too_few = ModulusError::TooFew { expected: 3, got: pressures.len() };
-        let (Some(&low), Some(&high)) = (pressures.first(), pressures.last()) else { return Err(too_few) };
         if pressures.len() < 3 {
             return Err(too_few);
         }
@@ -168,7 +160,8 @@ impl Stiffness {
             Linear::fit(&rows, &values).ok_or(too_few)
         };
         let (modulus, radius) = (fit(|s| s.modulus_pa, degree)?, fit(|s| s.tip_m, 1)?);
-        Ok(Self { modulus, radius, degree, pressure_pa: (low, high) })
+        let pressure_pa = Calibrated::over("the pressure in Pa", pressures, SLACK);
+        Ok(Self { modulus, radius, degree, pressure_pa })
     }
 
     /// Modulus E in Pa at a pressure.
@@ -176,7 +169,7 @@ impl Stiffness {
     /// # Errors
     /// [`ModulusError::Beyond`].
     pub fn modulus_pa(&self, pressure_pa: f64) -> Result<Bounded, ModulusError> {
-        self.within(pressure_pa)?;
+        self.pressure_pa.check(pressure_pa)?;
         let (value, error) = self.modulus.at(&powers(pressure_pa, self.degree));
         let half = self.modulus.half_width() * error;
         Ok(Bounded { value, interval: (value - half, value + half) })
@@ -187,7 +180,7 @@ impl Stiffness {
     /// # Errors
     /// [`ModulusError::Beyond`].
     pub fn tip_m(&self, pressure_pa: f64) -> Result<f64, ModulusError> {
-        self.within(pressure_pa)?;
+        self.pressure_pa.check(pressure_pa)?;
         Ok(self.radius.at(&powers(pressure_pa, 1)).0)
     }
 
@@ -232,15 +225,6 @@ impl Stiffness {
         probe_m: f64,
     ) -> Result<Bounded, ModulusError> {
         self.force_n(pressure_pa, smallest_indentation_m, 0.0, probe_m)
-    }
-
-    fn within(&self, pressure_pa: f64) -> Result<(), ModulusError> {
-        let (low_pa, high_pa) = self.pressure_pa;
-        let slack = 0.02 * (high_pa - low_pa);
-        if pressure_pa >= low_pa - slack && pressure_pa <= high_pa + slack {
-            return Ok(());
-        }
-        Err(ModulusError::Beyond { got_pa: pressure_pa, low_pa, high_pa })
     }
 }
 

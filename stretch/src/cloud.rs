@@ -211,6 +211,8 @@ pub struct Cloud {
     pub(crate) window: Option<Window>,
     geometry: Option<(Intrinsics, Rest)>,
     pub(crate) step: usize,
+    /// Half the side of the squares that were averaged over, pixels.
+    pub(crate) half: usize,
     /// Height over the plane at rest towards the lens, m; NaN where nothing or something flying was seen.
     pub heights: Vec<f32>,
     /// Averaged height, m; NaN where less than a quarter of the square was seen.
@@ -266,6 +268,7 @@ impl Cloud {
         self.window = Some(window);
         self.geometry = Some((*intrinsics, *rest));
         self.step = settings.step_px;
+        self.half = settings.half_px;
         self.lift(picture, rest, window);
         self.clean(window, settings.jump_m as f32);
         let (seen, total) =

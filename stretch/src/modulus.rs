@@ -3,6 +3,7 @@
 //! At each stretch x the modulus falls with the contact's diameter, `E = a + b exp(-D/c)`; for one diameter it grows with the
 //! stretch, `E = p + q ln(1 + x/x_0)`. Forces are eqs 6.2 to 6.4, corrected, nu = 1/2.
 
+use hertz_contact::calibrated::{Beyond, Calibrated, distinct};
 use hertz_contact::indenter::Indenter;
 use nalgebra::{Matrix2, Vector2};
 
@@ -43,17 +44,8 @@ pub enum ModulusError {
         stretch_m: f64,
     },
     /// A question beyond what was calibrated.
-    #[error("{what} is {got} m; calibrated from {low} to {high} m")]
-    Beyond {
-        /// Which.
-        what: &'static str,
-        /// What was asked for.
-        got: f64,
-        /// Least calibrated value.
-        low: f64,
-        /// Greatest calibrated value.
-        high: f64,
-    },
+    #[error(transparent)]
+    Beyond(#[from] Beyond),
 }
 
 /// A press of a rigid ball whose force was measured.
@@ -172,12 +164,16 @@ fn best<T: Copy>(fits: impl Iterator<Item = (T, f64)>) -> T {
     fits[0].0
 }
 
+/// Part of the calibrated range that may be asked for beyond it.
+const SLACK: f64 = 0.05;
+
 /// Modulus over radius and stretch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     stretches_m: Vec<f64>,
     falling: Vec<Falling>,
-    radius_m: (f64, f64),
+    radius_m: Calibrated,
+    stretch_m: Calibrated,
     /// Relative error of a force by leaving out each radius in turn: root mean square.
     relative_error: f64,
     /// The same, N: mean of the absolute value, and its standard deviation.
@@ -252,8 +248,10 @@ impl Surface {
             }
             falling.push(Falling::fit(&points));
         }
-        let radius_m = (radii[0], radii[radii.len() - 1]);
-        Ok(Self { stretches_m, falling, radius_m, relative_error: f64::NAN, error_n: (f64::NAN, f64::NAN) })
+        let radius_m = Calibrated::over("the radius in m", radii, SLACK);
+        let stretch_m = Calibrated::over("the stretch in m", stretches_m.iter().copied(), SLACK);
+        let (relative_error, error_n) = (f64::NAN, (f64::NAN, f64::NAN));
+        Ok(Self { stretches_m, falling, radius_m, stretch_m, relative_error, error_n })
     }
 
     fn modulus(&self, radius_m: f64, stretch_m: f64) -> f64 {
@@ -267,15 +265,8 @@ impl Surface {
     /// # Errors
     /// [`ModulusError::Beyond`].
     pub fn modulus_pa(&self, radius_m: f64, stretch_m: f64) -> Result<f64, ModulusError> {
-        let stretch = (self.stretches_m[0], self.stretches_m[self.stretches_m.len() - 1]);
-        for (what, got, (low, high)) in
-            [("the radius", radius_m, self.radius_m), ("the stretch", stretch_m, stretch)]
-        {
-            let slack = 0.05 * (high - low);
-            if !(got >= low - slack && got <= high + slack) {
-                return Err(ModulusError::Beyond { what, got, low, high });
-            }
-        }
+        self.radius_m.check(radius_m)?;
+        self.stretch_m.check(stretch_m)?;
         Ok(self.modulus(radius_m, stretch_m))
     }
 
@@ -305,11 +296,4 @@ fn check(presses: &[Press]) -> Result<(), ModulusError> {
         }
     }
     Ok(())
-}
-
-fn distinct(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup();
-    values
 }

@@ -322,16 +322,25 @@ impl Eyes {
         R: DepthCamera,
     {
         let (mut apexes, mut balls) = (Vec::new(), Vec::new());
-        for _ in 0..programme.pictures {
+        // A picture may show too little of the object; of so many more one will do.
+        for taken in 1..=4 * programme.pictures {
             let picture = rig.depth_m().map_err(device)?.value;
             let Some((rest, window)) = self.rest else { continue };
             self.cloud
                 .fill(&picture, &rig.intrinsics(), &rest, window, &programme.cloud)
                 .map_err(PalpateError::Cloud)?;
             let states = self.segmenter.segment(&self.cloud, &programme.segment);
-            let touching = cap(&self.cloud, states).map_err(PalpateError::Contact)?;
-            apexes.push(rest.distance_m - (touching.centre_m[2] - touching.radius_m));
-            balls.push(touching);
+            match cap(&self.cloud, states) {
+                Ok(touching) => {
+                    apexes.push(rest.distance_m - (touching.centre_m[2] - touching.radius_m));
+                    balls.push(touching);
+                }
+                Err(ContactError::Flat { .. }) if taken < 4 * programme.pictures || !balls.is_empty() => {}
+                Err(e) => return Err(PalpateError::Contact(e)),
+            }
+            if balls.len() == programme.pictures {
+                break;
+            }
         }
         let n = apexes.len() as f64;
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / n;

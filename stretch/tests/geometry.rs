@@ -1,6 +1,7 @@
 //! What the camera sees of a contact, against the fake's truth.
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     clippy::print_stdout,
     reason = "a test stops where it fails, and says what it saw"
 )]
@@ -73,6 +74,61 @@ fn a_ball_s_radius_and_height_are_right_and_so_is_their_interval() {
     println!("{held} of 25 intervals hold the radius");
     // 25 at 95 %: fewer than 21 in one of a hundred.
     assert!(held >= 21, "{held}");
+}
+
+/// Pressed in a little, a ball shows too small a part of itself to tell its radius: the interval says so, or there is none. Deeper, both
+/// come in.
+#[test]
+fn a_shallow_ball_s_interval_is_wide_or_open() {
+    let (mut told, mut held, mut all) = (0, 0, 0);
+    for (radius_m, stretch_m) in [(0.01, 0.0), (0.015, 0.04), (0.02, 0.0), (0.02, 0.06)] {
+        for depth_m in [0.003, 0.004, 0.006, 0.009] {
+            let mut line = String::new();
+            for seed in 20..25 {
+                let (cloud, segmenter) = seen(Shape::Ball { radius_m }, stretch_m, depth_m, seed);
+                all += 1;
+                match cap(&cloud, &segmenter.states) {
+                    Ok(b) => {
+                        let off = b.radius_m - radius_m;
+                        told += 1;
+                        held += usize::from(off.abs() < 1.96 * b.radius_sigma_m);
+                        line += &format!(" {:+.1}+-{:.1}", 1e3 * off, 1.96e3 * b.radius_sigma_m);
+                    }
+                    Err(ContactError::Flat { radius_m, sigma_m }) => {
+                        line += &format!(" open({:.0},{:.0})", 1e3 * radius_m, 1e3 * sigma_m);
+                    }
+                    Err(e) => panic!("{e}"),
+                }
+            }
+            println!("R {radius_m} stretch {stretch_m} depth {depth_m}:{line}");
+        }
+    }
+    println!("{held} of {told} intervals hold the radius, {all} looks");
+    assert!(held as f64 >= 0.9 * told as f64, "{held} of {told}");
+}
+
+/// The free membrane beside a contact shows the ratio of its tensions, at every stretch.
+#[test]
+fn the_ratio_of_the_tensions_is_seen() {
+    for stretch_m in [0.0, 0.02, 0.06] {
+        let mut rig = Rig::new(Shape::Ball { radius_m: 0.015 }, Filling::Rigid, 9);
+        rig.open_to(0.1 + stretch_m, 0.1).unwrap();
+        rig.move_to(at(-0.012), 1.0).unwrap();
+        let [along, across] = rig.membrane().tension_n_m;
+        let truth = across / along;
+        let found: Vec<Option<(f64, f64)>> = (30..33)
+            .map(|seed| {
+                let (cloud, segmenter) = seen(Shape::Ball { radius_m: 0.015 }, stretch_m, 0.012, seed);
+                segmenter.tension_ratio(&cloud)
+            })
+            .collect();
+        println!("stretch {stretch_m}: {truth:.3}, seen {found:.3?}");
+        for (ratio, sigma) in found.into_iter().flatten() {
+            assert!((ratio - truth).abs() < 0.15 + 2.0 * sigma, "{ratio} +- {sigma}, true {truth}");
+        }
+    }
+    let (cloud, segmenter) = seen(Shape::Ball { radius_m: 0.01 }, 0.0, -0.01, 4);
+    assert!(segmenter.tension_ratio(&cloud).is_none(), "a level membrane shows no ratio");
 }
 
 /// Figure 6.4's good region: sub-millimetre at low stretch and large indentation.

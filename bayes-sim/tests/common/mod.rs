@@ -10,6 +10,9 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 use std::io::Read;
 use std::path::PathBuf;
 
+pub(crate) mod references;
+pub(crate) mod simulators;
+
 use bayes_sim::points::Points;
 use bayes_sim::prior::{Marginal, Prior};
 use bayes_sim::simulations::Simulations;
@@ -45,7 +48,7 @@ pub(crate) fn gaussian_linear() -> Task {
     Task { name: "gaussian_linear", prior, x_dim: 10, simulate: gaussian_noise }
 }
 
-/// The same under a flat prior; its posterior is exact in [`exact`].
+/// The same under a flat prior; its posterior is exact in [`references`].
 pub(crate) fn gaussian_linear_uniform() -> Task {
     let prior = Prior::uniform(&[[-1.0, 1.0]; 10]).unwrap();
     Task { name: "gaussian_linear_uniform", prior, x_dim: 10, simulate: gaussian_noise }
@@ -55,7 +58,7 @@ fn gaussian_noise(theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
     theta.iter().map(|t| t + 0.1_f64.sqrt() * normal(rng)).collect()
 }
 
-/// A wide and a narrow Gaussian about the same mean; its posterior is exact in [`exact`].
+/// A wide and a narrow Gaussian about the same mean; its posterior is exact in [`references`].
 pub(crate) fn gaussian_mixture() -> Task {
     let simulate = |theta: &[f64], rng: &mut ChaCha8Rng| {
         let sd = if rng.random::<bool>() { 1.0 } else { 0.1 };
@@ -114,10 +117,13 @@ impl Task {
 
 /// Observation `i`, from 1, and the first `count` points of its reference posterior.
 pub(crate) fn reference(task: &Task, i: usize, count: usize) -> Option<(Vec<f64>, Points)> {
-    if matches!(task.name, "gaussian_linear_uniform" | "gaussian_mixture") {
-        return Some(exact(task, i as u64, count));
-    }
-    let folder = shared(&format!("sbibm/{}/num_observation_{i}", task.name))?;
+    let shared_task = match task.name {
+        "gaussian_linear" | "two_moons" | "slcp" => task.name,
+        // What is added says nothing about the parameters: the same posterior.
+        "slcp_distractors" => "slcp",
+        _ => return Some(references::own(task, i as u64, count)),
+    };
+    let folder = shared(&format!("sbibm/{shared_task}/num_observation_{i}"))?;
     let observation = std::fs::read_to_string(folder.join("observation.csv")).unwrap();
     let packed = std::fs::File::open(folder.join("reference_posterior_samples.csv.bz2")).unwrap();
     let mut text = String::new();
@@ -125,37 +131,11 @@ pub(crate) fn reference(task: &Task, i: usize, count: usize) -> Option<(Vec<f64>
     let row = |line: &str| line.split(',').map(|v| v.trim().parse().unwrap()).collect::<Vec<f64>>();
     let rows: Vec<Vec<f64>> = text.lines().skip(1).take(count).map(row).collect();
     let points = Points::from_rows(task.prior.dim(), rows.iter().map(Vec::as_slice)).unwrap();
-    Some((row(observation.lines().nth(1).unwrap()), points))
-}
-
-/// An observation of its own and exact draws of its posterior: Gaussians cut to the prior's box, by rejection.
-fn exact(task: &Task, seed: u64, count: usize) -> (Vec<f64>, Points) {
-    let mut rng = ChaCha8Rng::seed_from_u64(1_000_000 + seed);
-    let theta = task.prior.sample(&mut rng);
-    let x = task.simulate(&theta, &mut rng);
-    let mut points = Points::new(x.len());
-    while points.len() < count {
-        let sd = match task.name {
-            "gaussian_mixture" if rng.random::<bool>() => 1.0,
-            "gaussian_mixture" => 0.1,
-            _ => 0.1_f64.sqrt(),
-        };
-        let draw: Vec<f64> = if task.name == "gaussian_mixture" {
-            x.iter().map(|x| x + sd * normal(&mut rng)).collect()
-        } else {
-            let inside = |x: &f64, rng: &mut ChaCha8Rng| loop {
-                let t = x + sd * normal(rng);
-                if t.abs() <= 1.0 {
-                    return t;
-                }
-            };
-            x.iter().map(|x| inside(x, &mut rng)).collect()
-        };
-        if task.prior.contains(&draw) {
-            points.push(&draw).unwrap();
-        }
+    let mut x = row(observation.lines().nth(1).unwrap());
+    if shared_task != task.name {
+        x = simulators::distracted(x, &mut ChaCha8Rng::seed_from_u64(i as u64));
     }
-    (x, points)
+    Some((x, points))
 }
 
 /// A generator behind the trait object that densities take.

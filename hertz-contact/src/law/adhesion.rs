@@ -89,15 +89,7 @@ impl<T: Number> Jkr<T> {
         let z = w * (2.0 * PI * r.sqrt()) / (e * d * d.abs().sqrt());
         if d.re() > 0.0 && z.re() < 1.0 {
             // The root's derivative is infinite at z = 0; what it does to the force vanishes there.
-            let root = if z.re() > 1e-20 { z.sqrt() } else { T::from(0.0) };
-            let mut y = 1.0;
-            for _ in 0..8 {
-                // From y = 1 Newton overshoots, then comes down: the quartic is convex.
-                let (value, slope) = (y * y * y * y - 1.0 - root.re() * y, 4.0 * y * y * y - root.re());
-                y -= value / slope;
-            }
-            let y = polish(T::from(y), |y| (y.powi(4) - root * y - 1.0, y.powi(3) * 4.0 - root));
-            let q = root * y;
+            let (y, q) = if z.re() > 1e-20 { spread(z.sqrt()) } else { (T::from(1.0), T::from(0.0)) };
             let one = q + T::from(1.0);
             let radius_m = (d * one * r).sqrt();
             // F - F_Hertz with the terms of order sqrt(w), which cancel, left out.
@@ -131,6 +123,18 @@ impl<T: Number> Jkr<T> {
         let force_n = e * critical.powi(3) * cube * (cube * (4.0 / 3.0) - 8.0) / r;
         Some(Contact { radius_m: critical * x * x, ratio: cube.recip(), force_n })
     }
+}
+
+/// y with `y^4 = 1 + root y`, and `q = root y`.
+fn spread<T: Number>(root: T) -> (T, T) {
+    let mut y = 1.0;
+    for _ in 0..8 {
+        // From y = 1 Newton overshoots, then comes down: the quartic is convex.
+        let (value, slope) = (y * y * y * y - 1.0 - root.re() * y, 4.0 * y * y * y - root.re());
+        y -= value / slope;
+    }
+    let y = polish(T::from(y), |y| (y.powi(4) - root * y - 1.0, y.powi(3) * 4.0 - root));
+    (y, root * y)
 }
 
 impl<T: Number> Law<T> for Jkr<T> {

@@ -155,29 +155,41 @@ impl<T: Number, L: Law<T>> Compliant<T, L> {
     /// Where adhesion holds the bodies, the spring of the load cell lets go before they would; from there on nothing
     /// touches and the two are the same.
     pub fn true_indentation_m(&self, measured_m: T) -> T {
-        let (m, c) = (measured_m.re(), self.compliance_m_n.re());
+        self.root_m(measured_m.re()).map_or(measured_m, |root| self.polished_m(root, measured_m))
+    }
+
+    /// The true indentation as a plain number; none where nothing touches.
+    pub(super) fn root_m(&self, m: f64) -> Option<f64> {
+        let c = self.compliance_m_n.re();
         if !m.is_finite() {
-            return measured_m;
+            return None;
         }
         let at = |x: f64| {
             let (force, slope) = self.law.both(T::from(x));
             (x + c * force.re() - m, 1.0 + c * slope.re())
         };
         let lowest = self.law.rises_from_m();
-        let root = if c == 0.0 {
-            m
+        if c == 0.0 {
+            Some(m)
         } else if m > 0.0 && lowest >= 0.0 {
-            crate::root::rising(at, 0.0, m, m)
+            Some(crate::root::rising(at, 0.0, m, m))
         } else {
-            match stuck(&at, lowest, m) {
-                Some(root) => root,
-                None => return measured_m,
-            }
-        };
+            stuck(&at, lowest, m)
+        }
+    }
+
+    /// The true indentation with its derivatives, from a plain one.
+    pub(super) fn polished_m(&self, root: f64, measured_m: T) -> T {
         polish(T::from(root), |x| {
             let (force, slope) = self.law.both(x);
             (x + self.compliance_m_n * force - measured_m, self.compliance_m_n * slope + T::from(1.0))
         })
+    }
+
+    /// Force and stiffness over the measured indentation, at a true one.
+    pub(super) fn both_at(&self, true_m: T) -> (T, T) {
+        let (force, slope) = self.law.both(true_m);
+        (force, slope / (self.compliance_m_n * slope + T::from(1.0)))
     }
 }
 
@@ -229,8 +241,7 @@ impl<T: Number, L: Law<T>> Law<T> for Compliant<T, L> {
     }
 
     fn both(&self, indentation_m: T) -> (T, T) {
-        let (force, slope) = self.law.both(self.true_indentation_m(indentation_m));
-        (force, slope / (self.compliance_m_n * slope + T::from(1.0)))
+        self.both_at(self.true_indentation_m(indentation_m))
     }
 
     fn validity(&self, indentation_m: f64) -> Validity {

@@ -60,27 +60,122 @@ impl<T: Number> Indentation<T> {
         }
     }
 
+    /// The contact as a law in which only what acts is computed: an effect that is at zero and carries no derivative need not be.
+    pub fn contact(&self, acting: Acting) -> Contact<'_, T> {
+        Contact { law: self, plain: acting.compliance.then(|| self.re()), acting }
+    }
+
+    /// What is not off; with numbers that carry derivatives, everything.
+    fn acting(&self) -> Acting {
+        let on = |x: T| T::NDERIV > 0 || x.re() != 0.0;
+        Acting {
+            adhesion: on(self.work_of_adhesion_j_m2),
+            stiffening: on(self.stiffening),
+            membrane: on(self.tension_n_m) || on(self.stretching_n_m3),
+            rim: on(self.rim_stiffness_n_m),
+            compliance: on(self.compliance_m_n),
+        }
+    }
+
     fn sample(&self) -> Sample<'_, T> {
-        Sample(self)
-    }
-
-    fn cell(&self) -> Compliant<T, Sample<'_, T>> {
-        Compliant { law: self.sample(), compliance_m_n: self.compliance_m_n }
-    }
-
-    /// A rigid load cell that no parameter softens, which needs no solution.
-    fn rigid(&self) -> bool {
-        T::NDERIV == 0 && self.compliance_m_n.re() == 0.0
+        Sample(self, self.acting())
     }
 
     /// True indentation in m at a measured one.
     pub fn true_indentation_m(&self, measured_m: T) -> T {
-        if self.rigid() { measured_m } else { self.cell().true_indentation_m(measured_m) }
+        self.contact(self.acting()).true_indentation_m(measured_m)
+    }
+
+    /// The same contact without derivatives.
+    fn re(&self) -> Indentation<f64> {
+        Indentation {
+            indenter: self.indenter,
+            poisson_ratio: self.poisson_ratio,
+            modulus_pa: self.modulus_pa.re(),
+            layer: self.layer,
+            inverse_thickness_per_m: self.inverse_thickness_per_m.re(),
+            work_of_adhesion_j_m2: self.work_of_adhesion_j_m2.re(),
+            stiffening: self.stiffening.re(),
+            tension_n_m: self.tension_n_m.re(),
+            stretching_n_m3: self.stretching_n_m3.re(),
+            rim_depth_m: self.rim_depth_m.re(),
+            rim_stiffness_n_m: self.rim_stiffness_n_m.re(),
+            compliance_m_n: self.compliance_m_n.re(),
+        }
+    }
+}
+
+/// Which effects beside elasticity and the layer's are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Acting {
+    /// Adhesion.
+    pub adhesion: bool,
+    /// Strain stiffening.
+    pub stiffening: bool,
+    /// A membrane's tension and stretching.
+    pub membrane: bool,
+    /// A rim.
+    pub rim: bool,
+    /// The load cell's compliance.
+    pub compliance: bool,
+}
+
+/// An [`Indentation`] of which only what acts is computed.
+#[derive(Debug, Clone, Copy)]
+pub struct Contact<'a, T> {
+    law: &'a Indentation<T>,
+    /// The same without derivatives, where the load cell gives: there a root is looked for.
+    plain: Option<Indentation<f64>>,
+    acting: Acting,
+}
+
+impl<T: Number> Contact<'_, T> {
+    fn cell(&self) -> Compliant<T, Sample<'_, T>> {
+        Compliant { law: Sample(self.law, self.acting), compliance_m_n: self.law.compliance_m_n }
+    }
+
+    fn true_indentation_m(&self, measured_m: T) -> T {
+        let Some(plain) = &self.plain else { return measured_m };
+        let cell = Compliant { law: plain.sample(), compliance_m_n: plain.compliance_m_n };
+        cell.root_m(measured_m.re()).map_or(measured_m, |root| self.cell().polished_m(root, measured_m))
+    }
+}
+
+impl<T: Number> Law<T> for Contact<'_, T> {
+    fn check(&self) -> Result<(), LawError> {
+        self.cell().check()
+    }
+
+    fn force(&self, indentation_m: T) -> T {
+        Sample(self.law, self.acting).force(self.true_indentation_m(indentation_m))
+    }
+
+    fn derivative(&self, indentation_m: T) -> T {
+        self.both(indentation_m).1
+    }
+
+    fn both(&self, indentation_m: T) -> (T, T) {
+        self.cell().both_at(self.true_indentation_m(indentation_m))
+    }
+
+    fn validity(&self, indentation_m: f64) -> Validity {
+        self.cell().validity(indentation_m)
+    }
+
+    fn rises_from_m(&self) -> f64 {
+        self.cell().rises_from_m()
+    }
+
+    fn inverse(&self, force_n: T) -> Result<T, InverseError> {
+        let sample = Sample(self.law, self.acting);
+        let guess = sample.half_space().inverse(force_n).map_or(1e-3, |x| x.re());
+        let true_m = invert(&sample, force_n, guess)?;
+        Ok(true_m + self.law.compliance_m_n * force_n)
     }
 }
 
 /// What is pressed, without the load cell.
-struct Sample<'a, T>(&'a Indentation<T>);
+struct Sample<'a, T>(&'a Indentation<T>, Acting);
 
 impl<T: Number> Sample<'_, T> {
     fn half_space(&self) -> Elastic<T> {
@@ -90,9 +185,8 @@ impl<T: Number> Sample<'_, T> {
 
     fn adhesive(&self) -> Option<Jkr<T>> {
         let i = self.0;
-        let sticks = i.work_of_adhesion_j_m2.re() > 0.0 || T::NDERIV > 0;
         match i.indenter {
-            Indenter::Sphere { radius_m } if sticks => Some(Jkr {
+            Indenter::Sphere { radius_m } if self.1.adhesion => Some(Jkr {
                 radius_m,
                 modulus_pa: i.modulus_pa,
                 poisson_ratio: i.poisson_ratio,
@@ -100,15 +194,6 @@ impl<T: Number> Sample<'_, T> {
             }),
             _ => None,
         }
-    }
-
-    fn layered(&self) -> Option<Layered<T>> {
-        let i = self.0;
-        i.layer.map(|layer| Layered {
-            elastic: self.half_space(),
-            layer,
-            inverse_thickness_per_m: i.inverse_thickness_per_m,
-        })
     }
 
     fn membrane(&self) -> Membrane<T> {
@@ -120,25 +205,36 @@ impl<T: Number> Sample<'_, T> {
     }
 
     /// Stiffness's factor and slope; a cone has no length to compare the depth with.
-    fn stiffening(&self, indentation_m: T) -> (T, T) {
-        match self.0.indenter.radius_m() {
-            Some(radius_m) => stiffening(self.0.stiffening, radius_m, indentation_m),
-            None => (T::from(1.0), T::from(0.0)),
-        }
+    fn stiffening(&self, indentation_m: T) -> Option<(T, T)> {
+        let radius_m = self.0.indenter.radius_m().filter(|_| self.1.stiffening)?;
+        Some(stiffening(self.0.stiffening, radius_m, indentation_m))
     }
 
-    /// Force and stiffness of the bulk: the layer, plus what adhesion changes on a half-space.
-    fn bulk(&self, d: T) -> (T, T) {
-        let half = self.half_space();
-        match (self.layered(), self.adhesive()) {
-            (None, None) => half.both(d),
-            (Some(layered), None) => layered.both(d),
-            (None, Some(sticky)) => sticky.both(d),
-            (Some(layered), Some(sticky)) => {
-                let (a, b, c) = (layered.both(d), sticky.both(d), half.both(d));
-                (a.0 + b.0 - c.0, a.1 + b.1 - c.1)
-            }
-        }
+    /// The layer's factor and its logarithmic slope over the depth, inside the contact.
+    fn layered(&self, d: T) -> Option<(T, T)> {
+        let i = self.0;
+        let layer = i.layer.as_ref().filter(|_| d.re() > 0.0)?;
+        let (factor, slope) = layer.factor(i.indenter.reach_m(d) * i.inverse_thickness_per_m);
+        Some((factor, slope * i.indenter.reach_exponent()))
+    }
+
+    /// Force of the bulk: the layer, plus what adhesion changes on a half-space.
+    fn bulk(&self, d: T) -> T {
+        let half = self.half_space().force(d);
+        let layered = self.layered(d).map_or(half, |(factor, _)| half * factor);
+        self.adhesive().map_or(layered, |sticky| layered + sticky.force(d) - half)
+    }
+
+    /// The same and its slope.
+    fn bulk_both(&self, d: T) -> (T, T) {
+        let half = self.half_space().both(d);
+        let layered = self
+            .layered(d)
+            .map_or(half, |(factor, slope)| (half.0 * factor, half.1 * factor + half.0 * factor / d * slope));
+        self.adhesive().map_or(layered, |sticky| {
+            let sticky = sticky.both(d);
+            (layered.0 + sticky.0 - half.0, layered.1 + sticky.1 - half.1)
+        })
     }
 }
 
@@ -160,27 +256,48 @@ impl<T: Number> Law<T> for Sample<'_, T> {
         Ok(())
     }
 
-    fn force(&self, indentation_m: T) -> T {
-        self.both(indentation_m).0
+    fn force(&self, d: T) -> T {
+        let mut force = self.bulk(d);
+        if let Some((factor, _)) = self.stiffening(d) {
+            force *= factor;
+        }
+        if self.1.membrane {
+            force += self.membrane().force(d);
+        }
+        if self.1.rim {
+            force += self.rim().force(d);
+        }
+        force
     }
 
     fn derivative(&self, indentation_m: T) -> T {
         self.both(indentation_m).1
     }
 
-    fn both(&self, indentation_m: T) -> (T, T) {
-        let d = indentation_m;
-        let (factor, slope) = self.stiffening(d);
-        let (force, stiffness) = self.bulk(d);
-        let (membrane, rim) = (self.membrane().both(d), self.rim().both(d));
-        (force * factor + membrane.0 + rim.0, stiffness * factor + force * slope + membrane.1 + rim.1)
+    fn both(&self, d: T) -> (T, T) {
+        let mut both = self.bulk_both(d);
+        if let Some((factor, slope)) = self.stiffening(d) {
+            both = (both.0 * factor, both.1 * factor + both.0 * slope);
+        }
+        let mut add = |(force, slope): (T, T)| both = (both.0 + force, both.1 + slope);
+        if self.1.membrane {
+            add(self.membrane().both(d));
+        }
+        if self.1.rim {
+            add(self.rim().both(d));
+        }
+        both
     }
 
     fn validity(&self, indentation_m: f64) -> Validity {
         let d = indentation_m;
-        let bulk = match (self.adhesive(), self.layered()) {
+        let layered = |layer: Layer| {
+            let (elastic, per_m) = (self.half_space(), self.0.inverse_thickness_per_m);
+            Layered { elastic, layer, inverse_thickness_per_m: per_m }.validity(d)
+        };
+        let bulk = match (self.adhesive(), self.0.layer) {
             (Some(sticky), _) if d <= 0.0 => return sticky.validity(d),
-            (_, Some(layered)) => layered.validity(d),
+            (_, Some(layer)) => layered(layer),
             _ => self.half_space().validity(d),
         };
         let radius_m = self.0.indenter.radius_m().unwrap_or(f64::INFINITY);
@@ -195,11 +312,11 @@ impl<T: Number> Law<T> for Sample<'_, T> {
 
 impl<T: Number> Law<T> for Indentation<T> {
     fn check(&self) -> Result<(), LawError> {
-        self.cell().check()
+        self.contact(self.acting()).check()
     }
 
     fn force(&self, indentation_m: T) -> T {
-        self.both(indentation_m).0
+        self.contact(self.acting()).force(indentation_m)
     }
 
     fn derivative(&self, indentation_m: T) -> T {
@@ -207,20 +324,18 @@ impl<T: Number> Law<T> for Indentation<T> {
     }
 
     fn both(&self, indentation_m: T) -> (T, T) {
-        if self.rigid() { self.sample().both(indentation_m) } else { self.cell().both(indentation_m) }
+        self.contact(self.acting()).both(indentation_m)
     }
 
     fn validity(&self, indentation_m: f64) -> Validity {
-        self.cell().validity(indentation_m)
+        self.contact(self.acting()).validity(indentation_m)
     }
 
     fn rises_from_m(&self) -> f64 {
-        self.cell().rises_from_m()
+        self.contact(self.acting()).rises_from_m()
     }
 
     fn inverse(&self, force_n: T) -> Result<T, InverseError> {
-        let guess = self.sample().half_space().inverse(force_n).map_or(1e-3, |x| x.re());
-        let true_m = invert(&self.sample(), force_n, guess)?;
-        Ok(true_m + self.compliance_m_n * force_n)
+        self.contact(self.acting()).inverse(force_n)
     }
 }

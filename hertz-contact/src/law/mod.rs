@@ -13,7 +13,7 @@ mod layer;
 pub use adhesion::{Dmt, Jkr};
 pub use elastic::{Elastic, NeoHookean, PowerLaw, SneddonSphere};
 pub use extra::{Compliant, Membrane, Rim, Stiffened};
-pub use indentation::Indentation;
+pub use indentation::{Acting, Contact, Indentation};
 pub use layer::{Base, Dimitriadis, Layer, Layered};
 
 use crate::Number;
@@ -194,14 +194,11 @@ pub(crate) fn invert<T: Number, L: Law<T> + ?Sized>(
     }))
 }
 
-/// Two steps of Newton in `T`, which carry the derivatives of a root whose real part is known: the first is right to
-/// first order, the second to third.
+/// Newton's steps in `T`, which carry the derivatives of a root whose real part is known: the first is right to first order, the
+/// second to third.
 pub(crate) fn polish<T: Number>(root: T, f: impl Fn(T) -> (T, T)) -> T {
     let mut x = root;
-    if T::NDERIV == 0 {
-        return x;
-    }
-    for _ in 0..2 {
+    for _ in 0..T::NDERIV.min(2) {
         let (value, slope) = f(x);
         if slope.re() == 0.0 || !slope.re().is_finite() {
             return x;

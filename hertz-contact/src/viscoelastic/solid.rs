@@ -3,6 +3,7 @@
 use super::{Contact, HistoryError, LinearSolid, Relaxation, check_history};
 use crate::Number;
 use crate::law::{Law, polish};
+use crate::number::first_order;
 
 /// `exp(-x)`, zero with its derivative where it vanishes.
 pub(super) fn decay<T: Number>(x: T) -> T {
@@ -10,9 +11,9 @@ pub(super) fn decay<T: Number>(x: T) -> T {
 }
 
 /// One over (k + 1)!.
-const FACTORIALS: [f64; 14] = {
-    let (mut out, mut value, mut k) = ([0.0; 14], 1.0, 0);
-    while k < 14 {
+const FACTORIALS: [f64; 15] = {
+    let (mut out, mut value, mut k) = ([0.0; 15], 1.0, 0);
+    while k < 15 {
         value /= (k + 1) as f64;
         out[k] = value;
         k += 1;
@@ -22,10 +23,40 @@ const FACTORIALS: [f64; 14] = {
 
 /// `int_0^1 exp(-x (1 - u)) du` and the same of `u exp(-x (1 - u))`.
 pub(super) fn moments<T: Number>(x: T) -> (T, T) {
+    let (first, second) = plain_moments(x.re());
+    // The first one's slope is the second less the first.
+    let of_first = first_order(x, |_| (first, second - first));
+    let of_second = first_order(x, |x| (second, second_slope(x, first, second)));
+    of_first.zip(of_second).unwrap_or_else(|| plain_moments(x))
+}
+
+/// Slope of the second of [`moments`]: `-int u (1 - u) exp(-x (1 - u)) du`.
+fn second_slope(x: f64, first: f64, second: f64) -> f64 {
+    if x < 0.3 {
+        let terms = terms(x);
+        // Sums of (-x)^k (k + 1)/(k + 3)!
+        -(0..terms).rev().fold(0.0, |sum, k| (k + 1) as f64 * FACTORIALS[k + 2] - x * sum)
+    } else {
+        (first - 2.0 * second) / x
+    }
+}
+
+/// Terms of the series that are needed for the last digit.
+fn terms(x: f64) -> usize {
+    if x < 1e-5 {
+        4
+    } else if x < 1e-2 {
+        7
+    } else {
+        FACTORIALS.len() - 2
+    }
+}
+
+fn plain_moments<T: Number>(x: T) -> (T, T) {
     if x.re() < 0.3 {
         // Sums of (-x)^k / (k + 1)! and (-x)^k / (k + 2)!, to the last digit.
         let (mut first, mut second) = (T::from(0.0), T::from(0.0));
-        for k in (0..FACTORIALS.len() - 1).rev() {
+        for k in (0..terms(x.re())).rev() {
             first = T::from(FACTORIALS[k]) - x * first;
             second = T::from(FACTORIALS[k + 1]) - x * second;
         }
@@ -82,9 +113,21 @@ impl<T> Default for Scratch<T> {
 }
 
 impl<T: Number> Place<T> {
-    /// On along a straight line in time to a later time and depth, `part` (0 to 1) of the way; times may be equal: a jump.
-    fn to(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
-        let (lasts, way_m) = ((end.0 - self.time_s) * part, (end.1 - self.depth_m) * part);
+    fn re(&self) -> Place<f64> {
+        Place { time_s: self.time_s.re(), depth_m: self.depth_m.re(), depth_memory: self.depth_memory.re() }
+    }
+
+    /// On along a straight line in time to a later time and depth; times may be equal: a jump.
+    fn to(&self, tau_s: T, end: (T, T)) -> (Self, Step<T>) {
+        self.by(tau_s, end.0 - self.time_s, end.1 - self.depth_m)
+    }
+
+    /// The same a part (0 to 1) of the way.
+    fn along(&self, tau_s: T, end: (T, T), part: T) -> (Self, Step<T>) {
+        self.by(tau_s, (end.0 - self.time_s) * part, (end.1 - self.depth_m) * part)
+    }
+
+    fn by(&self, tau_s: T, lasts: T, way_m: T) -> (Self, Step<T>) {
         let x = lasts / tau_s;
         let step = Step { way_m, left: decay(x), moments: moments(x) };
         let place = Self {
@@ -97,14 +140,16 @@ impl<T: Number> Place<T> {
 }
 
 impl<T: Number> Point<T> {
-    /// As [`Place::to`], with the elastic force as a parabola in time, which the exponential is integrated against exactly.
-    fn to<L: Law<T>>(&self, law: &L, tau_s: T, end: (T, T), part: T) -> Self {
-        let (place, Step { way_m, left, moments: (first, second) }) = self.place.to(tau_s, end, part);
+    /// On to a place, with the elastic force as a parabola in time, which the exponential is integrated against exactly.
+    fn with<L: Law<T>>(&self, law: &L, (place, step): (Place<T>, Step<T>)) -> Self {
+        let Step { way_m, left, moments: (first, second) } = step;
         let force_n = law.force(place.depth_m);
         let middle = law.force(self.place.depth_m + way_m * 0.5);
-        let slope_0 = middle * 4.0 - self.force_n * 3.0 - force_n;
-        let slope_1 = self.force_n - middle * 4.0 + force_n * 3.0;
-        let force_memory = left * self.force_memory + slope_0 * (first - second) + slope_1 * second;
+        // Slopes 4 m - 3 f_0 - f_1 at the start and f_0 - 4 m + 3 f_1 at the end, times (first - second) and second.
+        let (start, middle_weight, end) =
+            (second * 4.0 - first * 3.0, first * 4.0 - second * 8.0, second * 4.0 - first);
+        let force_memory =
+            left * self.force_memory + self.force_n * start + middle * middle_weight + force_n * end;
         Self { place, force_n, force_memory }
     }
 }
@@ -129,6 +174,7 @@ impl<T: Number> LinearSolid<T> {
         Relaxation::<T>::check(self)?;
         check_history(times_s, indentations_m, forces_n.len())?;
         let zero = T::from(0.0);
+        let plain = self.re();
         let grown = &mut scratch.grown;
         grown.clear();
         // The state now, and where on the way of growth the contact's radius was last seen.
@@ -155,16 +201,16 @@ impl<T: Number> LinearSolid<T> {
                     continue;
                 }
             };
-            let point = start.to(law, self.tau_s, (T::from(time), depth), T::from(1.0));
+            let point = start.with(law, start.place.to(self.tau_s, (T::from(time), depth)));
             now = Some(point);
             *out = match contact {
-                Contact::Fixed => self.sum(&point, &point),
+                Contact::Fixed => self.here(&point),
                 Contact::Shrinks => {
                     let last = grown.len() - 1;
-                    if self.moved(&grown[last].place, &point.place).re() >= 0.0 {
+                    if plain.moved(&grown[last].place.re(), &point.place.re()) >= 0.0 {
                         grown.push(point);
                         at = last + 1;
-                        self.sum(&point, &point)
+                        self.here(&point)
                     } else {
                         self.shrunk(law, grown, &mut at, &point)
                     }
@@ -175,6 +221,15 @@ impl<T: Number> LinearSolid<T> {
             }
         }
         Ok(())
+    }
+
+    fn re(&self) -> LinearSolid<f64> {
+        LinearSolid { relaxed_fraction: self.relaxed_fraction.re(), tau_s: self.tau_s.re() }
+    }
+
+    /// `int psi(t - s) d f` up to now.
+    fn here(&self, now: &Point<T>) -> T {
+        now.force_n - self.relaxed_fraction * (now.force_n - now.force_memory)
     }
 
     /// `int psi(t - s) d f` up to `then`, seen from `now`.
@@ -191,9 +246,17 @@ impl<T: Number> LinearSolid<T> {
             + self.relaxed_fraction * (now.depth_memory - left * then.depth_memory)
     }
 
+    /// Minus [`Self::moved`] to `now` from a part of the way to `end`, and its slope: both rise.
+    fn part(&self, from: &Place<T>, end: (T, T), part: T, now: &Place<T>) -> (T, T) {
+        let (place, _) = from.along(self.tau_s, end, part);
+        let slope = self.remaining(now.time_s - place.time_s) * (end.1 - from.depth_m);
+        (-self.moved(&place, now), slope)
+    }
+
     /// The force while the contact is smaller than it was; `at` is the last index at which it was not larger.
     fn shrunk<L: Law<T>>(&self, law: &L, grown: &[Point<T>], at: &mut usize, now: &Point<T>) -> T {
-        let smaller = |i: usize| self.moved(&grown[i].place, &now.place).re() >= 0.0;
+        let plain = self.re();
+        let smaller = |i: usize| plain.moved(&grown[i].place.re(), &now.place.re()) >= 0.0;
         *at = (*at).min(grown.len() - 1);
         while *at + 1 < grown.len() && smaller(*at + 1) {
             *at += 1;
@@ -205,20 +268,24 @@ impl<T: Number> LinearSolid<T> {
             *at -= 1;
         }
         let from = &grown[*at];
-        let Some(end) = grown.get(*at + 1).map(|p| (p.place.time_s, p.place.depth_m)) else {
+        let Some(next) = grown.get(*at + 1).map(|p| &p.place) else {
             return self.sum(from, now);
         };
-        // `moved` falls along the way from this point to the next.
-        let value = |part: T| {
-            let (place, _) = from.place.to(self.tau_s, end, part);
-            let slope = self.remaining(now.place.time_s - place.time_s) * (end.1 - from.place.depth_m);
-            (-self.moved(&place, &now.place), slope)
-        };
-        let real = |part: f64| {
-            let (value, slope) = value(T::from(part));
-            (value.re(), slope.re())
-        };
-        let part = polish(T::from(crate::root::rising(real, 0.0, 1.0, 0.5)), value);
-        self.sum(&from.to(law, self.tau_s, end, part), now)
+        let end = (next.time_s, next.depth_m);
+        // The root is looked for in plain numbers; only its last step carries derivatives.
+        let root = plain.parted(&from.place.re(), &next.re(), &now.place.re());
+        let part = polish(T::from(root), |part| self.part(&from.place, end, part, &now.place));
+        self.sum(&from.with(law, from.place.along(self.tau_s, end, part)), now)
+    }
+}
+
+impl LinearSolid<f64> {
+    /// The part of the way between two places at which the contact was as large as it is now.
+    fn parted(&self, from: &Place<f64>, next: &Place<f64>, now: &Place<f64>) -> f64 {
+        let end = (next.time_s, next.depth_m);
+        // Nearly a straight line: the chord's root is a good start.
+        let (first, last) = (self.moved(from, now), self.moved(next, now));
+        let start = first / (first - last);
+        crate::root::rising(|part| self.part(from, end, part, now), 0.0, 1.0, start)
     }
 }

@@ -4,6 +4,7 @@ pub mod bounce;
 mod builder;
 pub mod custom;
 pub mod dough_roll;
+mod dual;
 pub mod grain_pour;
 pub mod indentation;
 pub mod liquid_tilt;

@@ -80,15 +80,15 @@ impl DepthEye {
         Picture::new(width, depths)
     }
 
-    /// Depth without noise and the tangent of the slope to the ray's plane; none beside the membrane.
+    /// Depth without noise (rows of the picture go against the membrane's y) and the tangent of the slope to the ray's plane; none beside the membrane.
     fn depth(&self, membrane: &Membrane, u: f64, v: f64) -> Option<(f64, f64)> {
         let [x, y, _] = self.intrinsics.point(u, v, 1.0);
         let mut z = self.distance_m;
         for _ in 0..6 {
-            z = self.distance_m - membrane.height_m(x * z, y * z)?;
+            z = self.distance_m - membrane.height_m(x * z, -y * z)?;
         }
         let h = 5e-4;
-        let at = |dx: f64, dy: f64| membrane.height_m(x * z + dx, y * z + dy).unwrap_or(self.distance_m - z);
+        let at = |dx: f64, dy: f64| membrane.height_m(x * z + dx, dy - y * z).unwrap_or(self.distance_m - z);
         let slope = ((at(h, 0.0) - at(-h, 0.0)) / (2.0 * h)).hypot((at(0.0, h) - at(0.0, -h)) / (2.0 * h));
         Some((z, slope))
     }

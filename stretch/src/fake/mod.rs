@@ -5,11 +5,13 @@
 //! reactions; there is no modulus in it.
 
 mod camera;
+mod lump;
 mod membrane;
 mod object;
 mod rig;
 
 pub use camera::DepthEye;
+pub use lump::Lump;
 pub use membrane::{Membrane, Sheet};
 pub use object::Shape;
 pub use rig::{FakeError, Filling, Rig};

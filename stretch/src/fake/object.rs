@@ -1,5 +1,7 @@
 //! What the membrane is pressed onto.
 
+use super::lump::Lump;
+
 /// An object's upper side: its highest point is at height 0 on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
@@ -23,6 +25,15 @@ pub enum Shape {
         /// Half the sides along x and y, m.
         half_m: [f64; 2],
     },
+    /// Half a cylinder that lies along x.
+    Ridge {
+        /// Radius, m.
+        radius_m: f64,
+        /// Half its length, m.
+        half_length_m: f64,
+    },
+    /// A lump of dough.
+    Lump(Lump),
 }
 
 impl Shape {
@@ -36,6 +47,9 @@ impl Shape {
             Self::Cylinder { radius_m } => (r <= radius_m).then_some(0.0),
             Self::Cone { angle_rad } => Some(-r * angle_rad.tan()),
             Self::Box { half_m } => (x.abs() <= half_m[0] && y.abs() <= half_m[1]).then_some(0.0),
+            Self::Ridge { radius_m, half_length_m } => (x.abs() <= half_length_m && y.abs() < radius_m)
+                .then(|| (radius_m * radius_m - y * y).sqrt() - radius_m),
+            Self::Lump(lump) => lump.below_top_m(x, y),
         }
     }
 }

@@ -45,6 +45,9 @@ pub enum Filling {
     Rigid,
     /// Its top sinks by the force over a stiffness, N/m.
     Springy(f64),
+    /// Dough, where the shape is a [`super::Lump`]: moved over under more than the first force (N) it becomes rounder, pressed with
+    /// more than the second flatter, until its breadth bears it.
+    Dough(f64, f64),
 }
 
 /// Hand, arm and object. The tool's frame is the membrane's: its origin in the middle, z up, towards the camera. Commands are carried
@@ -117,6 +120,29 @@ impl Rig {
         let membrane = self.solve(place_m);
         self.solved = Some((question, membrane.clone()));
         membrane
+    }
+
+    /// What the membrane does to dough while the hand moves sideways by a way (m).
+    fn knead(&mut self, way_m: f64) {
+        let (Filling::Dough(rolls_n, flattens_n), Shape::Lump(start)) = (self.filling, self.shape) else {
+            return;
+        };
+        self.membrane();
+        let mut lump = start.rolled(way_m, self.force_n / rolls_n);
+        // Flatter until the breadth bears the force; the top is where the table lets it be.
+        for _ in 0..100 {
+            self.top_m[2] += lump.height_m() - self.lump_height_m();
+            self.shape = Shape::Lump(lump);
+            self.membrane();
+            if self.force_n <= flattens_n * (lump.half_m() / start.half_m()).powi(2) {
+                break;
+            }
+            lump = lump.pressed();
+        }
+    }
+
+    fn lump_height_m(&self) -> f64 {
+        if let Shape::Lump(lump) = self.shape { lump.height_m() } else { 0.0 }
     }
 
     fn solve(&mut self, [x, y, wanted]: [f64; 3]) -> Membrane {
@@ -198,7 +224,9 @@ impl Arm for Rig {
         if !(deadline_s > 0.0) {
             return Err(FakeError::OutOfRange { what: "the deadline", got: deadline_s });
         }
-        self.tool = tool_in_base;
+        let before = std::mem::replace(&mut self.tool, tool_in_base).position_m;
+        let [x, y, _] = tool_in_base.position_m;
+        self.knead((x - before[0]).hypot(y - before[1]));
         Ok(())
     }
 

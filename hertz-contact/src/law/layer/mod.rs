@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 
 use super::elastic::{Elastic, nan_or_zero, power, power_slope};
 use super::{InverseError, Law, LawError, Validity, invert, poisson, zero_or_more};
+use crate::number::first_order;
 use crate::{Number, indenter::Indenter};
 
 /// How the layer rests on its base.
@@ -159,7 +160,10 @@ impl Layer {
         let chi = if chi.re() < 0.0 { T::from(0.0) } else { chi };
         let one = chi + T::from(1.0);
         let x = chi / one * (2.0 / self.v_end) - T::from(1.0);
-        (sum(&self.value, x).exp(), sum(&self.slope, x) * chi / (one * one))
+        // The slope is that over v = (1 + x)/2 v_end.
+        let log = first_order(x, |x| (sum(&self.value, x), 0.5 * self.v_end * sum(&self.slope, x)))
+            .unwrap_or_else(|| sum(&self.value, x));
+        (log.exp(), sum(&self.slope, x) * chi / (one * one))
     }
 }
 

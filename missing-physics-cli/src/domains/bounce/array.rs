@@ -1,6 +1,7 @@
-//! What four microphones and more know beyond place and time: whether their arrivals fit together.
+//! What a wrong array does to the places and times that are heard with it, and what four microphones and more know beyond them:
+//! whether their arrivals fit together.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
 /// Microphones as they are stated.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -57,6 +58,35 @@ impl Microphones {
         DMatrix::from_columns(&columns)
     }
 
+    /// By how much time (s) and place (x and y, m) of an impact change if the stated speed of sound is too large by `scale`: heard again
+    /// with the right one, less heard again with the stated one.
+    pub(super) fn moved(&self, place: [f64; 2], arrivals_s: &[f64], scale: f64) -> Option<[f64; 3]> {
+        let [right, stated] = [scale, 0.0].map(|scale| self.located(place, arrivals_s, scale));
+        let moved = right? - stated?;
+        Some([moved[0] / self.speed_of_sound_m_s, moved[1], moved[2]])
+    }
+
+    /// Range (time times the stated speed of sound, since the first arrival, m) and place of an impact by least squares over its
+    /// arrivals, by Newton's steps from a place near it; `None` where they do not lead anywhere.
+    fn located(&self, near: [f64; 2], arrivals_s: &[f64], scale: f64) -> Option<Vector3<f64>> {
+        const STEPS: usize = 6;
+        let first = *arrivals_s.first()?;
+        let slower = 1.0 + scale;
+        let mut at = Vector3::new(0.0, near[0], near[1]);
+        for _ in 0..STEPS {
+            let distances = self.distances([at[1], at[2]], &Wrong::default());
+            let (mut normal, mut pull) = (Matrix3::zeros(), Vector3::zeros());
+            for ((arrival, d), [x, y, _]) in arrivals_s.iter().zip(distances.iter()).zip(&self.places_m) {
+                let row = Vector3::new(1.0, slower * (at[1] - x) / d, slower * (at[2] - y) / d);
+                let off = (arrival - first) * self.speed_of_sound_m_s - at[0] - slower * d;
+                normal += row * row.transpose();
+                pull += row * off;
+            }
+            at += normal.cholesky()?.solve(&pull);
+        }
+        at.iter().all(|v| v.is_finite()).then_some(at)
+    }
+
     /// What arrivals (s) keep of their own after place and time, less what a wrong array would make of them.
     pub(super) fn misfit(&self, place: [f64; 2], arrivals_s: &[f64], wrong: &Wrong) -> Vec<f64> {
         let first = arrivals_s.first().copied().unwrap_or_default();
@@ -68,6 +98,7 @@ impl Microphones {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
     use super::*;
 
     #[test]
@@ -89,5 +120,26 @@ mod tests {
         let moved = heard(place, &wrong);
         assert!(microphones.misfit(place, &moved, &none)[0].abs() > 3e-6);
         assert!(microphones.misfit(place, &moved, &wrong)[0].abs() < 1e-15);
+    }
+
+    #[test]
+    fn heard_again_with_the_right_speed_an_impact_is_where_and_when_it_was() {
+        let microphones = Microphones {
+            places_m: vec![[0.0, 0.0, 0.07], [0.55, 0.0, 0.07], [0.55, 0.55, 0.07], [0.0, 0.55, 0.07]],
+            speed_of_sound_m_s: 340.0,
+        };
+        let wrong = Wrong { scale: -0.07, ..Wrong::default() };
+        for place in [[0.2, 0.3], [0.4, 0.12]] {
+            let distances = microphones.distances(place, &wrong);
+            let arrivals: Vec<f64> =
+                distances.iter().map(|d| 0.3 + d * (1.0 + wrong.scale) / 340.0).collect();
+            let heard = microphones.located([0.27, 0.2], &arrivals, 0.0).unwrap();
+            let t_s = arrivals[0] + heard[0] / 340.0;
+            let [dt, dx, dy] = microphones.moved([heard[1], heard[2]], &arrivals, wrong.scale).unwrap();
+            assert!(dx.hypot(dy) > 1e-3 && dt.abs() > 1e-5);
+            assert!((heard[1] + dx - place[0]).abs() < 1e-9 && (heard[2] + dy - place[1]).abs() < 1e-9);
+            assert!((t_s + dt - 0.3).abs() < 1e-12, "{}", t_s + dt);
+            assert!(microphones.misfit(place, &arrivals, &wrong)[0].abs() < 1e-14);
+        }
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn errors_by_chance(
             for _ in 0..ROUNDS {
                 linear = linear.likely(&level, judged)?;
             }
-            let white = Weights::new(linear, *judged)?.errors(&level)?;
+            let white = Weights::new(linear, *judged)?.errors(&level, &[])?;
             white.iter().all(|v| v.is_finite()).then(|| white.as_slice().to_vec())
         })
         .collect()

@@ -26,6 +26,8 @@ pub(super) struct Effects {
     /// By how much later a sound is heard that is louder by a factor of e, s: no ear finds weak and loud onsets alike.
     pub(super) walk_s: f64,
     pub(super) position_scale: f64,
+    /// The same, where places have been heard again with the right speed of sound.
+    pub(super) heard_scale: f64,
     /// 1: flights that hide unheard impacts are taken for what they are; 0: for one flight.
     pub(super) unheard: f64,
     /// Candidate terms of an unknown law, added to the logarithm of the restitution: x, y (per m), speed squared (s^2/m^2).
@@ -50,6 +52,7 @@ impl Effects {
             clock_rate: 0.0,
             walk_s: 0.0,
             position_scale: 0.0,
+            heard_scale: 0.0,
             unheard: 0.0,
             terms: [0.0; 3],
         }
@@ -256,7 +259,9 @@ impl Drop {
             (if split { found } else { known }).copied().unwrap_or(0)
         };
         // Times and places in wrong units change every angle alike, the noise of the directions too: no likelier for that.
-        let angles = (1.0 + effects.position_scale) * (1.0 + effects.clock_rate).powi(-2);
+        let angles = (1.0 + effects.position_scale)
+            * (1.0 + effects.heard_scale)
+            * (1.0 + effects.clock_rate).powi(-2);
         let mut before: Option<Velocity> = self.height_m.map(|height| {
             let speed = speed_after_drop(height, effects.gravity_m_s2, effects.drag_per_m);
             let speed = speed * effects.restitution.powi(hidden(0) as i32);

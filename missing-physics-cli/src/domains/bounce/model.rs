@@ -41,7 +41,9 @@ struct Known {
     weights: Weights,
     shown: Vec<f64>,
     /// Where each impact was heard, and when by each microphone.
-    arrivals: Vec<([f64; 2], Vec<f64>)>,
+    heard: Vec<([f64; 2], Vec<f64>)>,
+    /// The first of them about which something is known.
+    first: usize,
     /// What chance alone may do to it, in sigmas, `[world][copy][channel][impact]`.
     by_chance: Vec<Vec<Vec<Vec<f64>>>>,
 }
@@ -118,7 +120,7 @@ impl BounceModel {
         let places = linear.drop.places_m.clone();
         let by_chance = self.by_chance(&linear, drop, copies);
         let weights = Weights::new(linear, self.spread)?;
-        let shown = weights.errors(&self.nominal)?.as_slice().to_vec();
+        let shown = weights.errors(&self.nominal, &[])?.as_slice().to_vec();
         if shown.iter().any(|v| !v.is_finite()) {
             return None;
         }
@@ -127,17 +129,16 @@ impl BounceModel {
         // Likely places: their errors, unlike the measured ones', have nothing to do with those of the impacts.
         inputs.extend((0..2).map(|k| places[first..first + n].iter().map(|p| p[k]).collect()));
         let mut outputs: Vec<Vec<f64>> = (0..PER_IMPACT).map(of).collect();
-        let arrivals: Vec<([f64; 2], Vec<f64>)> = (first..first + n)
-            .filter_map(|i| Some((*drop.places_m.get(i)?, drop.arrivals_s.get(i)?.clone())))
-            .collect();
+        let heard: Vec<([f64; 2], Vec<f64>)> =
+            drop.places_m.iter().copied().zip(drop.arrivals_s.iter().cloned()).collect();
         outputs.extend((0..self.microphones.spare()).map(|k| {
             // A drop that is only imagined is heard as it should be.
-            let heard = |i: usize| {
-                arrivals.get(i).map_or(0.0, |(p, t)| self.microphones.misfit(*p, t, &Wrong::default())[k])
+            let misfit = |i: usize| {
+                heard.get(i).map_or(0.0, |(p, t)| self.microphones.misfit(*p, t, &Wrong::default())[k])
             };
-            (0..n).map(heard).collect::<Vec<f64>>()
+            (first..first + n).map(misfit).collect::<Vec<f64>>()
         }));
-        self.drops.insert(label.to_owned(), Known { weights, shown, arrivals, by_chance });
+        self.drops.insert(label.to_owned(), Known { weights, shown, heard, first, by_chance });
         Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
     }
 
@@ -171,6 +172,17 @@ impl BounceModel {
         Wrong { microphone, offset_m: [shared[x.slot], shared[y.slot]], scale }
     }
 
+    /// By how much each impact of a drop moves in time and place if the speed of sound is another; nothing where no array heard it. What a
+    /// microphone that stands elsewhere does to them is left out: it shows in the arrivals.
+    fn moved(&self, known: &Known, scale: f64) -> Vec<[f64; 3]> {
+        if scale == 0.0 || known.heard.len() < known.weights.linear.drop.times_s.len() {
+            return Vec::new();
+        }
+        let moved =
+            known.heard.iter().map(|(place, arrivals)| self.microphones.moved(*place, arrivals, scale));
+        moved.collect::<Option<_>>().unwrap_or_default()
+    }
+
     fn effects(&self, shared: &[f64]) -> Effects {
         let p = &self.places;
         let at = |at: Option<At>| at.map_or(0.0, |at| shared[at.slot]);
@@ -186,6 +198,7 @@ impl BounceModel {
             friction: at(p.friction),
             clock_rate: at(p.clock),
             position_scale: at(p.position),
+            heard_scale: 0.0,
             unheard: at(p.unheard),
             terms: [at(p.terms.map(|t| t[0])), at(p.terms.map(|t| t[1])), shared[p.squared.slot]],
         }
@@ -222,17 +235,23 @@ impl Model for BounceModel {
     fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
         let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
         let known = self.drops.get(&run.label).ok_or_else(|| wrong("no such drop"))?;
+        let array = self.wrong(shared);
+        let moved = self.moved(known, array.scale);
+        let mut effects = self.effects(shared);
+        if !moved.is_empty() {
+            effects.heard_scale = std::mem::take(&mut effects.position_scale);
+        }
         let errors = known
             .weights
-            .errors(&self.effects(shared))
+            .errors(&effects, &moved)
             .ok_or_else(|| wrong("the covariance of its errors has no root"))?;
         let n = run.len();
         let (impacts, heard) = out.split_at_mut(PER_IMPACT * n);
-        let wrong = self.wrong(shared);
-        let listened = if heard.is_empty() { &[][..] } else { &known.arrivals[..] };
-        for (i, (place, arrivals)) in listened.iter().enumerate() {
+        let listened = if heard.is_empty() { 0 } else { n };
+        for (i, (place, arrivals)) in known.heard.iter().skip(known.first).take(listened).enumerate() {
             let right = self.microphones.misfit(*place, arrivals, &Wrong::default());
-            let now = self.microphones.misfit(*place, arrivals, &wrong);
+            let by = moved.get(known.first + i).map_or([0.0; 2], |[_, x, y]| [*x, *y]);
+            let now = self.microphones.misfit([place[0] + by[0], place[1] + by[1]], arrivals, &array);
             for (k, (right, now)) in right.iter().zip(&now).enumerate() {
                 heard[k * n + i] = right - now;
             }

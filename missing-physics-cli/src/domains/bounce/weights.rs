@@ -72,10 +72,27 @@ impl Linear {
         Self { measured: measured.clone(), drop, sensitivity: [free, change], shift, headings, curved, bent }
     }
 
-    /// The errors under some effects, and the covariance factor they go with.
+    /// The errors under some effects.
     pub(super) fn errors(&self, effects: &Effects) -> DVector<f64> {
+        self.errors_of(&self.drop, effects)
+    }
+
+    /// The errors under some effects if its impacts were elsewhere and at other times than heard, by `[t, x, y]` (s, m).
+    fn errors_moved(&self, effects: &Effects, moved: &[[f64; 3]]) -> DVector<f64> {
+        if moved.is_empty() {
+            return self.errors(effects);
+        }
+        let mut drop = self.drop.clone();
+        for ((t, place), [by, x, y]) in drop.times_s.iter_mut().zip(&mut drop.places_m).zip(moved) {
+            *t += by;
+            *place = [place[0] + x, place[1] + y];
+        }
+        self.errors_of(&drop, effects)
+    }
+
+    fn errors_of(&self, drop: &Drop, effects: &Effects) -> DVector<f64> {
         let mut out = DVector::zeros(self.curved.len());
-        self.drop.errors(effects, out.as_mut_slice());
+        drop.errors(effects, out.as_mut_slice());
         out += &self.shift[0];
         out += &self.shift[1] * effects.friction;
         out + &self.curved
@@ -233,14 +250,14 @@ impl Weights {
         factor.l_dirty().iter().all(|v| v.is_finite()).then_some(Self { linear, spread, factor })
     }
 
-    /// The white errors under some effects; `None` where they cannot be had.
+    /// The white errors under some effects, its impacts moved by `[t, x, y]` (s, m; empty: as heard); `None` where they cannot be had.
     ///
     /// Where an effect changes the covariance too, the errors of each channel are scaled by the geometric mean of its
     /// conditional sigmas: their sum of squares then is the likelihood with the channel's size profiled out.
-    pub(super) fn errors(&self, effects: &Effects) -> Option<DVector<f64>> {
+    pub(super) fn errors(&self, effects: &Effects, moved: &[[f64; 3]]) -> Option<DVector<f64>> {
         let drop = &self.linear.drop;
         let rows = |channel: usize| (0..drop.impacts()).map(move |impact| drop.row(impact, channel));
-        let mut white = self.linear.errors(effects);
+        let mut white = self.linear.errors_moved(effects, moved);
         let mut scale = self.spread.of_channels();
         if effects.friction == 0.0 {
             self.factor.l_dirty().solve_lower_triangular_mut(&mut white).then_some(())?;

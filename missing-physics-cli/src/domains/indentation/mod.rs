@@ -1,5 +1,7 @@
 //! The domain `indentation`: an indenter pressed into a soft body.
 
+#[cfg(test)]
+mod derivatives;
 mod experiments;
 pub mod model;
 mod spec;

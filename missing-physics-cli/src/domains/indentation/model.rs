@@ -1,13 +1,15 @@
 //! The full model of an indentation curve: contact laws from `hertz-contact`, the load cell, and all parameters.
 
+use hertz_contact::Number;
 use hertz_contact::indenter::Indenter;
-use hertz_contact::law::{Base, Indentation, Law, Layer};
+use hertz_contact::law::{Acting, Base, Indentation, Law, Layer};
 use hertz_contact::viscoelastic::{Contact, LinearSolid, Scratch};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
 
 use super::spec::{self, Places};
 use crate::domains::builder::At;
+use crate::domains::dual::{Asked, InDuals};
 
 /// What is known of the set-up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,16 +118,60 @@ impl IndentationModel {
         moduli.get(run.kind as usize).or_else(|| moduli.first()).copied()
     }
 
-    fn press(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
+    /// Forces of a law over the depths of a run.
+    fn follow<T: Number>(
+        &self,
+        run: &Run,
+        law: &impl Law<T>,
+        relaxation: Option<LinearSolid<T>>,
+        depths: &[T],
+        out: &mut [T],
+    ) -> Result<(), String> {
+        let Some(solid) = relaxation else {
+            let segments = run.inputs.get(2);
+            for (i, (force, depth)) in out.iter_mut().zip(depths).enumerate() {
+                // On the way in nothing is felt before contact; on the way out adhesion holds on.
+                let out_of_reach = depth.re() < 0.0 && segments.is_none_or(|s| s[i] != UNLOAD);
+                *force = if out_of_reach { T::from(0.0) } else { law.force(*depth) };
+            }
+            return Ok(());
+        };
+        let times = run.inputs.get(1).ok_or("t_s is missing")?;
+        let contact = match self.setup.indenter {
+            Indenter::Cylinder { .. } => Contact::Fixed,
+            _ => Contact::Shrinks,
+        };
+        solid.forces(law, contact, times, depths, &mut Scratch::new(), out).map_err(|e| e.to_string())
+    }
+
+    /// The square of its root; where there is none, a derivative that keeps its direction, as a small root has it.
+    fn work_of_adhesion<T: Number>(&self, root: T) -> T {
+        let scale = self.places.adhesion.map_or(0.0, |at| self.spec.parameters[at.index].scale);
+        if root.re() > 0.0 { root * root } else { root * (1e-5 * scale) }
+    }
+}
+
+impl InDuals for IndentationModel {
+    /// The forces of a run; an effect whose derivative is asked for is there at its off value too.
+    fn predict_in<T: Number>(
+        &self,
+        run: &Run,
+        shared: &[T],
+        own: &[T],
+        moving: &[usize],
+        out: &mut [T],
+    ) -> Result<(), String> {
         let p = &self.places;
         let depths = run.inputs.first().ok_or("delta_m is missing")?;
-        let value = |at: Option<At>| at.map_or(0.0, |at| shared[at.slot]);
+        let value = |at: Option<At>| at.map_or(T::from(0.0), |at| shared[at.slot]);
+        let on =
+            |at: Option<At>| at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot));
         let modulus = self.modulus(run).ok_or("no condition")?;
-        let inverse_thickness = value(p.thickness) + self.setup.thickness_m.map_or(0.0, f64::recip);
+        let known = self.setup.thickness_m.map_or(0.0, f64::recip);
         let law = Indentation {
-            layer: self.layer.filter(|_| inverse_thickness > 0.0),
-            inverse_thickness_per_m: inverse_thickness,
-            work_of_adhesion_j_m2: value(p.adhesion).powi(2),
+            layer: self.layer.filter(|_| known > 0.0 || on(p.thickness)),
+            inverse_thickness_per_m: value(p.thickness) + known,
+            work_of_adhesion_j_m2: self.work_of_adhesion(value(p.adhesion)),
             stiffening: value(p.stiffening),
             tension_n_m: shared[p.tension.slot],
             stretching_n_m3: shared[p.stretching.slot],
@@ -135,28 +181,19 @@ impl IndentationModel {
             ..Indentation::elastic(self.setup.indenter, shared[modulus.slot], self.setup.poisson_ratio)
         };
         law.check().map_err(|e| e.to_string())?;
-        let (offset, lift) = (own[p.offset.slot], own[p.lift.slot]);
-        let true_depths: Vec<f64> = depths.iter().map(|d| d - offset).collect();
-        let relaxed = value(p.relaxed);
-        if relaxed > 0.0 {
-            let times = run.inputs.get(1).ok_or("t_s is missing")?;
-            let solid = LinearSolid { relaxed_fraction: relaxed, tau_s: value(p.tau) };
-            let contact = match self.setup.indenter {
-                Indenter::Cylinder { .. } => Contact::Fixed,
-                _ => Contact::Shrinks,
-            };
-            solid
-                .forces(&law, contact, times, &true_depths, &mut Scratch::new(), out)
-                .map_err(|e| e.to_string())?;
-        } else {
-            let segments = run.inputs.get(2);
-            for (i, (force, depth)) in out.iter_mut().zip(&true_depths).enumerate() {
-                // On the way in nothing is felt before contact; on the way out adhesion holds on.
-                let out_of_reach = *depth < 0.0 && segments.is_none_or(|s| s[i] != UNLOAD);
-                *force = if out_of_reach { 0.0 } else { law.force(*depth) };
-            }
-        }
-        out.iter_mut().for_each(|force| *force += lift);
+        let relaxation =
+            on(p.relaxed).then(|| LinearSolid { relaxed_fraction: value(p.relaxed), tau_s: value(p.tau) });
+        let offset = own[p.offset.slot];
+        let true_depths: Vec<T> = depths.iter().map(|d| -offset + *d).collect();
+        let acting = Acting {
+            adhesion: on(p.adhesion),
+            stiffening: on(p.stiffening),
+            membrane: on(Some(p.tension)) || on(Some(p.stretching)),
+            rim: on(Some(p.rim_stiffness)),
+            compliance: on(Some(p.compliance)),
+        };
+        self.follow(run, &law.contact(acting), relaxation, &true_depths, out)?;
+        out.iter_mut().for_each(|force| *force += own[p.lift.slot]);
         Ok(())
     }
 }
@@ -167,7 +204,21 @@ impl Model for IndentationModel {
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.press(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+        self.predict_in(run, shared, own, &[], out)
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })
+    }
+
+    fn jacobian(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        own: &[f64],
+        shared_free: &[usize],
+        own_free: &[usize],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), PredictError> {
+        Asked { run, shared, own, shared_free, own_free }.answer(self, out, jacobian)
     }
 
     /// A modulus acts on the runs of its own condition.

@@ -182,7 +182,7 @@ fn modes(
     );
     second.companions = vec![p.second_cos.index, p.second_sin.index];
     second.derived_per_run =
-        vec![amplitude_of(&p, [p.second_omega, p.second_cos, p.second_sin], suffix, unit)];
+        vec![amplitude_of(p, [p.second_omega, p.second_cos, p.second_sin], suffix, unit)];
     second.shapes = vec![p.second_omega.index, p.second_damping.index];
     p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
     p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
@@ -200,7 +200,7 @@ fn modes(
         &["second-mode"],
     );
     arm.companions = vec![p.arm_cos.index, p.arm_sin.index];
-    arm.derived_per_run = vec![amplitude_of(&p, [p.arm_omega, p.arm_cos, p.arm_sin], suffix, unit)];
+    arm.derived_per_run = vec![amplitude_of(p, [p.arm_omega, p.arm_cos, p.arm_sin], suffix, unit)];
     arm.shapes = vec![p.arm_omega.index, p.arm_damping.index];
 }
 

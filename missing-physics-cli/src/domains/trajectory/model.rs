@@ -3,9 +3,10 @@
 use bounce_audio::flight::{Flight, State};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Scope, Spec};
-use num_dual::{Derivative, DualNum, DualSVec64};
+use num_dual::DualNum;
 
 use super::spec;
+use crate::domains::dual::{Asked, InDuals};
 
 /// What was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,10 +38,6 @@ pub struct Setup {
 
 /// A run of this kind films a rod of known length: the z channel reads its ends.
 pub const ROD: u32 = 1;
-
-/// Derivatives are taken this many at a time.
-const CHUNK: usize = 8;
-type Dual = DualSVec64<CHUNK>;
 
 /// The flight's parameters by meaning; each knows where it stands among the shared parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -216,6 +213,19 @@ fn tilted<T: DualNum<Primitive = f64, Real = f64> + Copy>(p: [T; 3], [about_x, a
     [cy * x + sy * z, y, cy * z - sy * x]
 }
 
+impl InDuals for TrajectoryModel {
+    fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+        &self,
+        run: &Run,
+        shared: &[T],
+        own: &[T],
+        moving: &[usize],
+        out: &mut [T],
+    ) -> Result<(), String> {
+        self.fly(run, shared, own, moving, out)
+    }
+}
+
 impl Model for TrajectoryModel {
     fn spec(&self) -> &Spec {
         &self.spec
@@ -266,33 +276,7 @@ impl Model for TrajectoryModel {
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        let rows = out.len();
-        let free: Vec<(bool, usize)> =
-            shared_free.iter().map(|&s| (true, s)).chain(own_free.iter().map(|&s| (false, s))).collect();
-        if free.is_empty() {
-            return self.predict(run, shared, own, out);
-        }
-        let mut dual_out = vec![Dual::from(0.0); rows];
-        for (chunk, columns) in free.chunks(CHUNK).zip(jacobian.chunks_mut((CHUNK * rows).max(1))) {
-            let mut dual_shared: Vec<Dual> = shared.iter().map(|v| Dual::from(*v)).collect();
-            let mut dual_own: Vec<Dual> = own.iter().map(|v| Dual::from(*v)).collect();
-            for (i, &(is_shared, slot)) in chunk.iter().enumerate() {
-                let target = if is_shared { &mut dual_shared[slot] } else { &mut dual_own[slot] };
-                let mut unit = nalgebra::SVector::<f64, CHUNK>::zeros();
-                unit[i] = 1.0;
-                *target = Dual::new(target.re, Derivative::some(unit));
-            }
-            let moving: Vec<usize> = chunk.iter().filter(|c| c.0).map(|c| c.1).collect();
-            self.fly(run, &dual_shared, &dual_own, &moving, &mut dual_out)
-                .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
-            for (row, value) in dual_out.iter().enumerate() {
-                out[row] = value.re;
-                for i in 0..chunk.len() {
-                    columns[i * rows + row] = value.eps.0.map_or(0.0, |e| e[i]);
-                }
-            }
-        }
-        Ok(())
+        Asked { run, shared, own, shared_free, own_free }.answer(self, out, jacobian)
     }
 }
 

@@ -1,6 +1,10 @@
 //! What touches: a ball's radius, a face's plane, a flat face's diameters along both axes.
 
-use nalgebra::{DMatrix, DVector, Matrix4, SMatrix, SVector, Vector3, Vector4};
+mod diameters;
+
+pub use diameters::{Diameters, diameters};
+
+use nalgebra::{Matrix4, SMatrix, SVector, Vector3, Vector4};
 
 use crate::cloud::Cloud;
 use crate::segment::State;
@@ -86,7 +90,9 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
                 (size - radius, Vector4::new(d[0], d[1], d[2], 1.0))
             })
             .collect();
-        let Some(Robust { step, sigma, scatter }) = robust_step(&rows) else { return Err(flat) };
+        let Some(Robust { step, sigma, scatter }) = robust_step(&rows, &[0.0; 4], &[0.0; 4]) else {
+            return Err(flat);
+        };
         centre += step.fixed_rows::<3>(0);
         radius += step[3];
         result = (scatter, sigma[3]);
@@ -113,10 +119,15 @@ struct Robust<const N: usize> {
     scatter: f64,
 }
 
-/// One step on residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights.
-fn robust_step<const N: usize>(rows: &[(f64, SVector<f64, N>)]) -> Option<Robust<N>> {
-    let off: Vec<f64> = rows.iter().map(|r| r.0).collect();
-    let scatter = spread(&off);
+/// One step on residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights; `known` is the precision
+/// with which each parameter is known before, and `off` how far it is below that.
+fn robust_step<const N: usize>(
+    rows: &[(f64, SVector<f64, N>)],
+    known: &[f64; N],
+    off: &[f64; N],
+) -> Option<Robust<N>> {
+    let residuals: Vec<f64> = rows.iter().map(|r| r.0).collect();
+    let scatter = spread(&residuals);
     let cut = TUKEY * scatter.max(1e-9);
     let (mut gram, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
     let (mut weight, mut square) = (0.0, 0.0);
@@ -127,8 +138,12 @@ fn robust_step<const N: usize>(rows: &[(f64, SVector<f64, N>)]) -> Option<Robust
         weight += w;
         square += w * r * r;
     }
-    let inverse = gram.try_inverse()?;
     let variance = square / (weight - N as f64).max(1.0);
+    for k in 0..N {
+        gram[(k, k)] += known[k] * variance;
+        right[k] += known[k] * variance * off[k];
+    }
+    let inverse = gram.try_inverse()?;
     let sigma = inverse.diagonal().map(|v| (v * variance).max(0.0).sqrt());
     Some(Robust { step: inverse * right, sigma, scatter })
 }
@@ -190,7 +205,7 @@ pub fn points(cloud: &Cloud, states: &[State]) -> Vec<[f64; 3]> {
 /// and falls like the logarithm of the distance, `h(rho) = h(a) + a h'(a) ln(rho / a)`.
 ///
 /// # Errors
-/// [`ContactError`].
+/// [`ContactError`]; [`ContactError::Flat`] where so little of the ball shows that its edge, and with it the radius, stays open.
 pub fn cap(cloud: &Cloud, states: &[State]) -> Result<Ball, ContactError> {
     let touching = points(cloud, states);
     let whole = ball(&touching)?;
@@ -201,9 +216,17 @@ pub fn cap(cloud: &Cloud, states: &[State]) -> Result<Ball, ContactError> {
     let rough = *distances.select_nth_unstable_by(outer, f64::total_cmp).1;
     let all = (0..states.len()).filter_map(|i| cloud.raw_point(i));
     let near: Vec<[f64; 3]> = all.filter(|p| from_axis(p) < FLANK * rough).collect();
-    Ok(Cap::start(&whole, rough).fit(&near).unwrap_or(whole))
+    match Cap::start(&whole, rough).fit(&near, rough) {
+        Some(found) if found.radius_m > 3.0 * found.radius_sigma_m => Ok(found),
+        Some(open) => Err(ContactError::Flat { radius_m: open.radius_m, sigma_m: open.radius_sigma_m }),
+        // Far around the ball its own points tell enough.
+        None if rough > WRAPPED * whole.radius_m => Ok(whole),
+        None => Err(ContactError::Flat { radius_m: whole.radius_m, sigma_m: f64::INFINITY }),
+    }
 }
 
+/// Contact's radius over the ball's from which on the edge need not be told from the flank.
+const WRAPPED: f64 = 0.7;
 /// How far the flank is looked at, of the contact's rough radius: near the edge a membrane of any tensions and frame is alike.
 const FLANK: f64 = 1.2;
 
@@ -244,9 +267,18 @@ impl Cap {
         (z, slopes.into())
     }
 
+    /// Precision and mean of what is known before: the edge lies about where the contact seems to end, and a flank of any tensions
+    /// bends little. A cap that is too small to tell its edge then says so in the radius's standard deviation.
+    fn prior(rough: f64) -> [(f64, f64); 7] {
+        let free = (0.0, 0.0);
+        let edge = ((0.3 * rough).powi(-2), 0.7 * rough);
+        [free, free, free, free, edge, (1.0, 0.0), (1.0, 0.0)]
+    }
+
     /// Gauss-Newton with Tukey's weights; none where it does not settle within the contact.
-    fn fit(mut self, near: &[[f64; 3]]) -> Option<Ball> {
-        for _ in 0..60 {
+    fn fit(mut self, near: &[[f64; 3]], rough: f64) -> Option<Ball> {
+        let prior = Self::prior(rough);
+        for round in 0..60 {
             let rows: Vec<(f64, SVector<f64, 7>)> = near
                 .iter()
                 .map(|p| {
@@ -254,183 +286,22 @@ impl Cap {
                     (p[2] - z, slope)
                 })
                 .collect();
-            let Robust { step, sigma, scatter } = robust_step(&rows)?;
-            // Radius and edge by a quarter at most, so that the edge stays inside the ball.
-            let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(1.0, f64::min);
+            let known = prior.map(|(precision, _)| precision);
+            let off = std::array::from_fn(|k| prior[k].1 - self.0[k]);
+            let Robust { step, sigma, scatter } = robust_step(&rows, &known, &off)?;
+            // Radius and edge by a quarter at most, so that the edge stays inside the ball; later by half a step, since weights may swing.
+            let half = if round < 20 { 1.0 } else { 0.5 };
+            let part = [3, 4].iter().map(|k| 0.25 * self.0[*k] / step[*k].abs()).fold(half, f64::min);
             self.0 += part * step;
             let [x, y, top, radius_m, edge, ..] = <[f64; 7]>::from(self.0);
             if !(radius_m.is_finite() && radius_m > 0.0 && edge > 0.05 * radius_m && edge < 0.97 * radius_m) {
                 return None;
             }
-            if step.fixed_rows::<5>(0).norm() < 1e-8 * radius_m {
+            if (0..5).all(|k| step[k].abs() < 1e-3 * sigma[k]) {
                 let (radius_sigma_m, scatter_m) = (sigma[3], scatter);
-                let settled = radius_m > 3.0 * radius_sigma_m;
-                let centre_m = [x, y, top + radius_m];
-                return settled.then_some(Ball { centre_m, radius_m, radius_sigma_m, scatter_m });
+                return Some(Ball { centre_m: [x, y, top + radius_m], radius_m, radius_sigma_m, scatter_m });
             }
         }
         None
-    }
-}
-
-/// Diameters of a flat round face.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Diameters {
-    /// Along i, from row to row, m, and its standard deviation.
-    pub i_m: (f64, f64),
-    /// Along j, along the stretch, m, and its standard deviation.
-    pub j_m: (f64, f64),
-    /// Height of the face over the plane at rest, m.
-    pub height_m: f64,
-}
-
-/// Half the width of the strip along an axis through the middle that a profile is averaged over, of the rough radius.
-const STRIP: f64 = 0.35;
-/// Part of the rough radius that is surely inside.
-const INSIDE: f64 = 0.6;
-
-/// Diameters of a flat face that is pressed into the membrane (figure 6.4).
-///
-/// The edge is where the free membrane's profile meets the face's height. Smoothed points round it off by the width of the smoothing; so
-/// the profile outside is fitted on raw heights, over the first part of the flank, and met with the face's. Around a round contact a
-/// membrane falls like the logarithm of the distance: the profile is a parabola in that.
-///
-/// # Errors
-/// [`ContactError`].
-pub fn diameters(cloud: &Cloud, states: &[State]) -> Result<Diameters, ContactError> {
-    let columns = cloud.columns().max(1);
-    let touching: Vec<usize> = (0..states.len()).filter(|&i| states[i] == State::Contact).collect();
-    if touching.len() < 30 {
-        return Err(ContactError::TooFew { expected: 30, got: touching.len() });
-    }
-    let n = touching.len() as f64;
-    let middle = [
-        touching.iter().map(|i| (i % columns) as f64).sum::<f64>() / n,
-        touching.iter().map(|i| (i / columns) as f64).sum::<f64>() / n,
-    ];
-    let rough = (n / std::f64::consts::PI).sqrt();
-    let mut core: Vec<f64> = touching
-        .iter()
-        .filter(|i| {
-            ((*i % columns) as f64 - middle[0]).hypot((*i / columns) as f64 - middle[1]) < INSIDE * rough
-        })
-        .map(|&i| f64::from(cloud.heights[i]))
-        .filter(|h| h.is_finite())
-        .collect();
-    if core.len() < 10 {
-        return Err(ContactError::TooFew { expected: 10, got: core.len() });
-    }
-    let half = core.len() / 2;
-    let height_m = *core.select_nth_unstable_by(half, f64::total_cmp).1;
-    let off: Vec<f64> = core.iter().map(|h| h - height_m).collect();
-    let noise = spread(&off).max(1e-6);
-    // Metres a pixel on the face.
-    let near = touching[touching.len() / 2];
-    let pitch = |by: usize, axis: usize| {
-        let other = if near + by < cloud.points.len() { near + by } else { near - by };
-        f64::from(cloud.points[other][axis] - cloud.points[near][axis]).abs()
-    };
-    let pitches = [pitch(columns, 1), pitch(1, 0)];
-    let face = Edge { cloud, middle, rough, height_m, noise };
-    let along = |axis: &'static str, rows: bool, pitch: f64| -> Result<(f64, f64), ContactError> {
-        let (a, b) = (face.find(axis, rows, 1.0)?, face.find(axis, rows, -1.0)?);
-        Ok(((a.0 + b.0) * pitch, a.1.hypot(b.1) * pitch))
-    };
-    Ok(Diameters { i_m: along("i", true, pitches[0])?, j_m: along("j", false, pitches[1])?, height_m })
-}
-
-struct Edge<'a> {
-    cloud: &'a Cloud,
-    middle: [f64; 2],
-    rough: f64,
-    height_m: f64,
-    noise: f64,
-}
-
-impl Edge<'_> {
-    /// Distance of the edge from the middle in pixels, and its standard deviation.
-    fn find(&self, axis: &'static str, rows: bool, sign: f64) -> Result<(f64, f64), ContactError> {
-        let profile = self.profile(rows, sign);
-        let mut edge = self.rough;
-        let mut found = (f64::NAN, f64::INFINITY);
-        for _ in 0..25 {
-            // The first pixels outside hold the edge's own uncertainty.
-            let flank: Vec<(f64, f64, f64)> = profile
-                .iter()
-                .copied()
-                .filter(|p| p.0 > edge + 1.5 && p.0 < edge + 1.5 + (2.0 * self.rough).clamp(30.0, 70.0))
-                .collect();
-            if flank.len() < 8 {
-                return Err(ContactError::NoEdge {
-                    axis,
-                    reason: "too little of the flank is in the window",
-                });
-            }
-            found = self
-                .meet(&flank, edge)
-                .ok_or(ContactError::NoEdge { axis, reason: "the flank does not fall" })?;
-            let next = 0.5 * (edge + found.0);
-            if (next - edge).abs() < 1e-3 {
-                break;
-            }
-            edge = next.clamp(0.3 * self.rough, 2.0 * self.rough);
-        }
-        if !(found.1 < 0.5 * self.rough) {
-            return Err(ContactError::NoEdge { axis, reason: "the flank is lost in the noise" });
-        }
-        Ok(found)
-    }
-
-    /// Distance, mean height and number of pixels across a strip.
-    fn profile(&self, rows: bool, sign: f64) -> Vec<(f64, f64, f64)> {
-        let columns = self.cloud.columns().max(1);
-        let height = self.cloud.heights.len() / columns;
-        let [u, v] = self.middle;
-        let (start, across, end, side) = if rows { (v, u, height, columns) } else { (u, v, columns, height) };
-        let half = (STRIP * self.rough).max(2.0);
-        let (low, high) = ((across - half).max(0.0) as usize, ((across + half) as usize + 1).min(side));
-        let mut profile = Vec::new();
-        for k in 0..end {
-            let out = sign * (k as f64 - start);
-            if out < 0.0 {
-                continue;
-            }
-            let (mut sum, mut n) = (0.0, 0.0);
-            for s in low..high {
-                let i = if rows { k * columns + s } else { s * columns + k };
-                let h = f64::from(self.cloud.heights[i]);
-                if h.is_finite() {
-                    (sum, n) = (sum + h, n + 1.0);
-                }
-            }
-            if n > 0.0 {
-                // The strip crosses a circle: its mean chord is shorter than the diameter by about half^2/6 of the radius.
-                profile.push((out + half * half / (6.0 * self.rough), sum / n, n));
-            }
-        }
-        profile.sort_by(|a, b| a.0.total_cmp(&b.0));
-        profile
-    }
-
-    /// Where a parabola in the logarithm of the distance reaches the face's height, nearest to where the edge was thought.
-    fn meet(&self, flank: &[(f64, f64, f64)], edge: f64) -> Option<(f64, f64)> {
-        let rows = DMatrix::from_fn(flank.len(), 3, |r, c| {
-            (flank[r].0 / edge).ln().powi(c as i32) * flank[r].2.sqrt()
-        });
-        let values = DVector::from_fn(flank.len(), |r, _| (flank[r].1 - self.height_m) * flank[r].2.sqrt());
-        let gram = (rows.transpose() * &rows).try_inverse()?;
-        let x = &gram * rows.transpose() * values;
-        let (c, b, a) = (x[0], x[1], x[2]);
-        // c + b s + a s^2 = 0 with b < 0: the root near zero, in the form that does not cancel.
-        if !(b < 0.0) {
-            return None;
-        }
-        let root = (b * b - 4.0 * a * c).max(0.0).sqrt();
-        let s = 2.0 * c / (-b + root);
-        let slope = (b + 2.0 * a * s).abs().max(1e-12);
-        let row = DVector::from_column_slice(&[1.0, s, s * s]);
-        let sigma = self.noise * (&gram * &row).dot(&row).max(0.0).sqrt() / slope;
-        let found = edge * s.exp();
-        found.is_finite().then_some((found, sigma * found))
     }
 }

@@ -1,0 +1,168 @@
+//! Figures 6.6 and 6.8: objects put together from touches, and a cookie.
+
+use examples::plot::{Panel, hue};
+use hw_traits::arm::{Arm, Pose};
+use hw_traits::camera::DepthCamera;
+use hw_traits::gripper::Gripper;
+use rayon::prelude::*;
+use stretch::contact::points;
+use stretch::fake::{Filling, Lump, Rig, Shape};
+use stretch::reconstruct::Merged;
+use stretch::segment::State;
+use stretch::shape::{Rolling, Settling, circularity, roll};
+
+use super::{Outcome, at, look};
+
+/// Objects: what they are, half their sides along x and y (m), and where they are touched along x (m).
+const OBJECTS: [(&str, Shape, [f64; 2], &[f64]); 3] = [
+    ("cube, 1 touch", Shape::Box { half_m: [0.015, 0.015] }, [0.015, 0.015], &[0.0]),
+    (
+        "half-cylinder, 3",
+        Shape::Ridge { radius_m: 0.012, half_length_m: 0.03 },
+        [0.03, 0.012],
+        &[-0.016, 0.0, 0.016],
+    ),
+    ("bridge, 3", Shape::Box { half_m: [0.03, 0.01] }, [0.03, 0.01], &[-0.016, 0.0, 0.016]),
+];
+
+/// Figure 6.6: touches at no stretch, merged in the world.
+pub(crate) fn reconstructed(panels: &mut Vec<Panel>) -> Outcome<()> {
+    println!("\nObjects from touches at no stretch (figure 6.6; the thesis: dimensions within 2 mm)");
+    println!("{:>18} {:>8} {:>24} {:>14}", "", "points", "off the surface: median", "95 % (mm)");
+    let objects = if examples::small() { &OBJECTS[..1] } else { &OBJECTS[..] };
+    for (name, shape, half_m, places) in objects.iter().copied() {
+        let mut merged = Merged::new(1.5e-3)?;
+        for (k, &x) in places.iter().enumerate() {
+            let mut rig = Rig::new(shape, Filling::Rigid, 660 + k as u64);
+            let (cloud, segmenter) = look(&mut rig, 0.0, at(x, -8e-3))?;
+            // The camera looks down on the membrane: its rows go against the world's y.
+            let z = rig.eye.distance_m - 8e-3;
+            let camera = Pose { position_m: [x, 0.0, z], rotation_xyzw: [1.0, 0.0, 0.0, 0.0] };
+            merged.add(&camera, &points(&cloud, &segmenter.states))?;
+        }
+        let seen = merged.points(3);
+        let surface = surface(&shape, half_m);
+        let mut off: Vec<f64> = seen.iter().map(|p| nearest_m(&surface, p)).collect();
+        off.sort_by(f64::total_cmp);
+        let share = |part: usize| off.get(off.len() * part / 100).map_or(f64::NAN, |d| 1e3 * d);
+        println!("{name:>18} {:>8} {:>24.2} {:>14.2}", seen.len(), share(50), share(95));
+        panels.push(heights(name, &seen, half_m));
+    }
+    Ok(())
+}
+
+/// Points of an object's upper side every half millimetre, m.
+fn surface(shape: &Shape, half_m: [f64; 2]) -> Vec<[f64; 3]> {
+    let steps = |half: f64| (0..=(4e3 * half) as usize).map(move |k| 5e-4 * k as f64 - half);
+    let at = |x: f64, y: f64| shape.height_m(x, y).map(|z| [x, y, z]);
+    steps(half_m[0])
+        .flat_map(|x| steps(half_m[1]).filter_map(move |y| at(x, y)).collect::<Vec<_>>())
+        .collect()
+}
+
+/// Distance from the nearest of some points, m.
+fn nearest_m(points: &[[f64; 3]], to: &[f64; 3]) -> f64 {
+    let square = |p: &[f64; 3]| (0..3).map(|k| (p[k] - to[k]).powi(2)).sum::<f64>();
+    points.iter().map(square).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// A map of heights with the object's outline.
+fn heights(name: &str, seen: &[[f64; 3]], half_m: [f64; 2]) -> Panel {
+    let mut panel =
+        Panel::new(format!("6.6: {name}"), "x (mm)", "y (mm), colour: height, blue 0, red -5 mm").map();
+    for p in seen {
+        let level = (10.0 + 2e3 * p[2]).clamp(0.0, 10.0) as usize;
+        panel.cell([1e3 * p[0], 1e3 * p[1]], [1.5, 1.5], &hue(10 - level, 11));
+    }
+    let [a, b] = half_m.map(|h| 1e3 * h);
+    panel.line([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]], "black");
+    panel
+}
+
+/// What became of a lump of dough.
+struct Cookie {
+    heights_mm: Vec<f64>,
+    settled: bool,
+    roundness: f64,
+    mask: (Vec<bool>, usize),
+}
+
+/// Side of the cube of dough, m.
+const SIDE_M: f64 = 0.02;
+
+/// Figure 6.8: a cube of dough rolled in circles until its height settles, then pressed flat; and one that is only pressed.
+pub(crate) fn cookies(panels: &mut Vec<Panel>) -> Outcome<()> {
+    println!(
+        "\nCookies from a cube of 20 mm (figure 6.8; the thesis: circularity 0.888 on average, a square 0.785)"
+    );
+    println!("{:>10} {:>8} {:>8} {:>18} {:>12}", "", "circles", "settled", "height (mm)", "circularity");
+    let ways = [("rolled", true), ("not rolled", false)];
+    let ways = if examples::small() { &ways[..1] } else { &ways[..] };
+    let cookies: Vec<Cookie> = ways.par_iter().map(|(_, rolls)| cookie(*rolls)).collect::<Outcome<_>>()?;
+    let mut heights = Panel::new("6.8: height while rolled (mm)", "circle", "");
+    for ((name, rolls), cookie) in ways.iter().zip(&cookies) {
+        let [first, last] =
+            [cookie.heights_mm.first(), cookie.heights_mm.last()].map(|h| h.copied().unwrap_or(f64::NAN));
+        let words = if *rolls { format!("{first:.1} to {last:.1}") } else { "-".into() };
+        println!(
+            "{name:>10} {:>8} {:>8} {words:>18} {:>12.3}",
+            cookie.heights_mm.len(),
+            cookie.settled,
+            cookie.roundness
+        );
+        if *rolls {
+            let line: Vec<[f64; 2]> =
+                cookie.heights_mm.iter().enumerate().map(|(k, h)| [k as f64 + 1.0, *h]).collect();
+            heights.line(line.clone(), "steelblue").dots(line, "steelblue");
+        }
+    }
+    panels.push(heights);
+    for ((name, _), cookie) in ways.iter().zip(cookies) {
+        let (mask, columns) = cookie.mask;
+        let title = format!("6.8: {name}, circularity {:.2}", cookie.roundness);
+        let mut panel = Panel::new(title, "column (px)", "row (px)").map();
+        for k in (0..mask.len()).filter(|k| mask[*k]) {
+            panel.cell([(k % columns) as f64, (k / columns) as f64], [1.0, 1.0], "peru");
+        }
+        panels.push(panel);
+    }
+    Ok(())
+}
+
+fn cookie(rolls: bool) -> Outcome<Cookie> {
+    let lump = Lump::cube(SIDE_M);
+    let mut rig = Rig::new(Shape::Lump(lump), Filling::Dough(0.15, 1.2), 68);
+    rig.top_m = [0.0, 0.0, lump.height_m()];
+    let (mut heights_mm, mut settled) = (Vec::new(), !rolls);
+    if rolls {
+        // Medium firmness; half a circle's way to each side.
+        rig.open_to(0.13, 0.05)?;
+        let rolling = Rolling { middle: at(0.0, SIDE_M - 6e-3), circle_m: 8e-3, moves: (6, 0.17), most: 60 };
+        let height = |rig: &mut Rig| top_m(rig);
+        let done = roll(&mut rig, &rolling, Settling::thesis(), height).map_err(|e| e.to_string())?;
+        settled = done.settled;
+        heights_mm = done.heights_m.iter().map(|h| 1e3 * h).collect();
+    }
+    // The highest stiffness, from above.
+    rig.move_to(at(0.0, 0.08), 1.0)?;
+    rig.open_to(0.18, 0.05)?;
+    let start = rig.top_m[2];
+    for k in 1..=12 {
+        rig.move_to(at(0.0, start - 2e-3 * f64::from(k)), 1.0)?;
+    }
+    let flat = at(0.0, rig.top_m[2] - 6e-3);
+    let (cloud, segmenter) = look(&mut rig, 0.0, flat)?;
+    let mask: Vec<bool> = segmenter.states.iter().map(|s| *s == State::Contact).collect();
+    let roundness = circularity(&mask, cloud.columns())?;
+    Ok(Cookie { heights_mm, settled, roundness, mask: (mask, cloud.columns()) })
+}
+
+/// Height of the dough's top over the table, m: the membrane's highest part, by the arm.
+fn top_m(rig: &mut Rig) -> Result<f64, stretch::fake::FakeError> {
+    let tool = rig.pose()?.value.position_m[2];
+    let picture = rig.depth_m()?.value;
+    let mut near: Vec<f32> = picture.data().iter().copied().filter(|z| z.is_finite()).collect();
+    near.sort_by(f32::total_cmp);
+    let part = near.get(near.len() / 200).map_or(f64::NAN, |z| f64::from(*z));
+    Ok(tool + rig.eye.distance_m - part)
+}

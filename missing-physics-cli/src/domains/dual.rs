@@ -1,0 +1,90 @@
+//! Derivatives of a prediction that is written in dual numbers, several parameters at a time.
+
+use missing_physics::data::Run;
+use missing_physics::model::{Model, PredictError};
+use num_dual::{Derivative, DualNum, DualSVec64};
+
+/// A model whose prediction is written in any number.
+pub(super) trait InDuals: Model {
+    /// As [`Model::predict`]; `moving` are the shared slots that carry a derivative.
+    fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+        &self,
+        run: &Run,
+        shared: &[T],
+        own: &[T],
+        moving: &[usize],
+        out: &mut [T],
+    ) -> Result<(), String>;
+}
+
+/// What [`Model::jacobian`] is asked for.
+pub(super) struct Asked<'a> {
+    pub(super) run: &'a Run,
+    pub(super) shared: &'a [f64],
+    pub(super) own: &'a [f64],
+    pub(super) shared_free: &'a [usize],
+    pub(super) own_free: &'a [usize],
+}
+
+/// A free parameter: its column, whether it is shared, and its slot.
+type Free = (usize, bool, usize);
+
+impl Asked<'_> {
+    /// Fills `out` and `jacobian`.
+    pub(super) fn answer(
+        &self,
+        model: &impl InDuals,
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), PredictError> {
+        let rows = out.len();
+        let own = self.own_free.iter().enumerate().map(|(k, &s)| (self.shared_free.len() + k, false, s));
+        let all = self.shared_free.iter().enumerate().map(|(k, &s)| (k, true, s)).chain(own);
+        let (acting, idle): (Vec<Free>, Vec<Free>) =
+            all.partition(|&(_, is_shared, slot)| !is_shared || model.acts_on(self.run, slot));
+        idle.iter().for_each(|(column, ..)| jacobian[column * rows..][..rows].fill(0.0));
+        if acting.is_empty() {
+            return model.predict(self.run, self.shared, self.own, out);
+        }
+        // Numbers no longer than needed: most time goes into their derivatives.
+        for chunk in acting.chunks(8) {
+            match chunk.len() {
+                0..=2 => self.columns::<2>(model, chunk, out, jacobian),
+                3..=4 => self.columns::<4>(model, chunk, out, jacobian),
+                5..=6 => self.columns::<6>(model, chunk, out, jacobian),
+                _ => self.columns::<8>(model, chunk, out, jacobian),
+            }
+            .map_err(|reason| PredictError { run: self.run.label.clone(), reason })?;
+        }
+        Ok(())
+    }
+
+    /// The columns of at most `N` parameters.
+    fn columns<const N: usize>(
+        &self,
+        model: &impl InDuals,
+        free: &[Free],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), String> {
+        let rows = out.len();
+        let mut shared: Vec<DualSVec64<N>> = self.shared.iter().map(|v| (*v).into()).collect();
+        let mut own: Vec<DualSVec64<N>> = self.own.iter().map(|v| (*v).into()).collect();
+        for (i, &(_, is_shared, slot)) in free.iter().enumerate() {
+            let target = if is_shared { &mut shared[slot] } else { &mut own[slot] };
+            let mut unit = nalgebra::SVector::<f64, N>::zeros();
+            unit[i] = 1.0;
+            target.eps = Derivative::some(unit);
+        }
+        let moving: Vec<usize> = free.iter().filter(|f| f.1).map(|f| f.2).collect();
+        let mut values = vec![DualSVec64::<N>::from(0.0); rows];
+        model.predict_in(self.run, &shared, &own, &moving, &mut values)?;
+        for (row, value) in values.iter().enumerate() {
+            out[row] = value.re;
+            for (i, (column, ..)) in free.iter().enumerate() {
+                jacobian[column * rows + row] = value.eps.0.map_or(0.0, |e| e[i]);
+            }
+        }
+        Ok(())
+    }
+}
