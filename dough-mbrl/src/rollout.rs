@@ -1,5 +1,6 @@
 //! Rollouts: a policy rolls a dough on a rig until the goal.
 
+use hw_traits::ErrorKind;
 use hw_traits::arm::{Arm, Pose};
 use hw_traits::camera::DepthCamera;
 use hw_traits::clock::Clock;
@@ -59,6 +60,8 @@ pub enum End {
     TooLong,
     /// All rolls were made.
     OutOfRolls,
+    /// The rig stopped for safety in the middle of a roll (fingers that hit the dough); the rolls before it count.
+    Stopped,
 }
 
 /// A rollout that ended.
@@ -143,10 +146,15 @@ impl Setup {
             } else if rolls.len() >= self.most_rolls {
                 End::OutOfRolls
             } else {
-                let (rolled, after) = self.step(rig, policy, goal, rng)?;
-                rolls.push(rolled);
-                shape = after;
-                continue;
+                match self.step(rig, policy, goal, rng) {
+                    Ok((rolled, after)) => {
+                        rolls.push(rolled);
+                        shape = after;
+                        continue;
+                    }
+                    Err(RolloutError::Rig(RigError::Device { kind: ErrorKind::Stopped, .. })) => End::Stopped,
+                    Err(other) => return Err(other),
+                }
             };
             return Ok(Rollout { rolls, end });
         }

@@ -7,17 +7,19 @@
 )]
 
 use dough_mbrl::dough::{DoughError, View};
+use dough_mbrl::dynamics::{Action, State};
 use dough_mbrl::fake::{DoughKind, Effects, Eye, FakeRig};
 use dough_mbrl::goal::{Goal, GoalError};
-use dough_mbrl::policy::{Explore, Heuristic};
-use dough_mbrl::roll::{Motion, RigError, Side};
+use dough_mbrl::policy::{Explore, Heuristic, Policy};
+use dough_mbrl::predictor::PlanError;
+use dough_mbrl::roll::{Limits, Motion, RigError, Side};
 use dough_mbrl::rollout::{End, RolloutError, Setup};
 use dough_mbrl::stiffness::{BandForce, Palpation, Press, StiffnessError};
 use hw_traits::camera::DepthCamera;
 use hw_traits::clock::Clock;
 use hw_traits::{Error, ErrorKind};
 use proptest::prelude::*;
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const NONE: Effects =
@@ -178,6 +180,24 @@ fn what_a_rig_refuses_is_said() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let run = setup.run(&mut rig, &mut Explore, &goal, 4e-5, &mut rng);
     assert!(matches!(run, Err(RolloutError::Goal(GoalError::Volume { .. }))), "{run:?}");
+}
+
+/// Always the same: fingers that stand in the dough.
+struct Narrow;
+
+impl Policy for Narrow {
+    fn act(&mut self, _: &State, _: &Goal, _: &Limits, _: &mut dyn Rng) -> Result<Action, PlanError> {
+        Ok([0.02, 0.03])
+    }
+}
+
+#[test]
+fn a_rig_that_stops_ends_the_rollout() {
+    let mut rig = FakeRig::new(DoughKind::A, NONE, 1);
+    let setup = Setup::of(rig.camera_in_world());
+    let goal = Goal::cylinder(0.2, 4e-5).unwrap();
+    let done = setup.run(&mut rig, &mut Narrow, &goal, 4e-5, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+    assert_eq!((done.end, done.rolls.len()), (End::Stopped, 0));
 }
 
 #[test]

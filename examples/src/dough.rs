@@ -90,8 +90,9 @@ pub fn mean_and_half(values: &[f64]) -> (f64, f64) {
     (mean, 1.96 * (variance / n).sqrt())
 }
 
-/// Rolls of each rollout that did not roll past its goal (one that never reached it counts all its rolls), and how many missed it.
+/// Rolls of each rollout that was neither rolled past its goal nor stopped (one that never reached it counts all its rolls), and how
+/// many missed it.
 pub fn counts(rollouts: &[Rollout]) -> (Vec<f64>, usize) {
-    let kept = rollouts.iter().filter(|r| r.end != End::TooLong);
+    let kept = rollouts.iter().filter(|r| matches!(r.end, End::Reached | End::OutOfRolls));
     (kept.map(|r| r.rolls.len() as f64).collect(), rollouts.iter().filter(|r| r.end != End::Reached).count())
 }
