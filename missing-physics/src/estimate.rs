@@ -149,7 +149,8 @@ fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun) -> Estimate {
             let along: Vec<f64> = (0..selection.shared.len())
                 .map(|k| by_shared.iter().map(|run| run[k]).sum::<f64>() / n)
                 .collect();
-            let own = own_variances.iter().map(|v| v + between(&values, &own_variances)).sum::<f64>();
+            let differ = between(&values, &own_variances);
+            let own = own_variances.iter().map(|v| v + differ).sum::<f64>();
             (mean, own / (n * n) + quadratic(&along, &covariance))
         }
         Over::Largest => {
@@ -213,11 +214,11 @@ impl<'a> Profile<'a> {
         self.at(value).map(|f| f.chi2 - self.fit.chi2)
     }
 
-    /// The top of the likelihood to which a fit climbs from a value, and by how much its sum of squares is higher than the estimate's.
-    fn top_from(&self, value: f64) -> Option<(f64, f64)> {
-        let near = self.at(value)?;
-        let top = solve(self.problem, self.all, &near.noise, &near.shared, &near.own).ok()?;
-        Some((top.shared[self.slot], top.chi2 - self.fit.chi2))
+    /// The top of the likelihood to which a fit climbs from a value, the parameter being free again; none where the sum of squares
+    /// at the value is `most` or more.
+    fn top_from(&self, value: f64, most: f64) -> Option<Fit> {
+        let near = self.at(value).filter(|f| f.chi2 < most)?;
+        solve(self.problem, self.all, &near.noise, &near.shared, &near.own).ok()
     }
 
     fn bound(&self, side: f64) -> f64 {
@@ -254,7 +255,10 @@ impl<'a> Profile<'a> {
             }
             // Another top beyond the first fall may be as likely as the interval's own end.
             for value in self.looks(side, half / Z95).filter(|value| (value - quadratic[end]) * side > 0.0) {
-                if let Some((top, risen)) = self.top_from(value).filter(|(_, risen)| *risen < CHI95) {
+                let top = self
+                    .top_from(value, f64::INFINITY)
+                    .map(|f| (f.shared[self.slot], f.chi2 - self.fit.chi2));
+                if let Some((top, risen)) = top.filter(|(_, risen)| *risen < CHI95) {
                     let reach = top + side * half * (1.0 - risen / CHI95).min(1.0).sqrt();
                     let reach = if (reach - bound) * side < 0.0 { reach } else { bound };
                     if (reach - interval[end]) * side > 0.0 {
@@ -281,10 +285,7 @@ pub(crate) fn better_top(problem: &Problem<'_>, candidate: &Candidate) -> Option
         let profile = Profile::new(problem, candidate, i);
         for value in [-1.0, 1.0].into_iter().flat_map(|side| profile.looks(side, error)) {
             let least = best.as_ref().map_or(candidate.fit.chi2, |b| b.chi2) - BETTER;
-            // A slope that is still falling towards the fit's own top is none: the parameter is freed again.
-            let near = profile.at(value).filter(|f| f.chi2 < least + CHI95);
-            let top = near.and_then(|f| solve(problem, selection, &f.noise, &f.shared, &f.own).ok());
-            if let Some(top) = top.filter(|f| f.chi2 < least) {
+            if let Some(top) = profile.top_from(value, least + CHI95).filter(|f| f.chi2 < least) {
                 best = Some(top);
             }
         }

@@ -10,6 +10,7 @@ use crate::GRAVITY_M_S2;
 use crate::concealed::draw::{self, between, log_between, sign, stated, strength, whole};
 use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
 use crate::noise::Noise;
+use crate::runge_kutta::step;
 use crate::sizing::{change, sized};
 
 /// The domain `custom`.
@@ -120,7 +121,7 @@ impl World {
     }
 
     /// Rates of change of position and speed.
-    fn rates(&self, [x, v]: [f64; 2], t: f64, size: f64) -> [f64; 2] {
+    fn rates(&self, &[x, v]: &[f64; 2], t: f64, size: f64) -> [f64; 2] {
         use Effect::{First, Nothing, Second, Sudden};
         let after = if t >= self.at_s { 1.0 } else { 0.0 };
         match self.rig {
@@ -161,19 +162,12 @@ impl World {
     fn run(&self, start: f64, size: f64) -> Vec<f64> {
         let h = 1.0 / (self.rate_hz * STEPS as f64);
         let mut state = [start, 0.0];
-        let along = |s: [f64; 2], k: [f64; 2], h: f64| [s[0] + h * k[0], s[1] + h * k[1]];
         let mut readings = Vec::with_capacity(self.rows);
         for row in 0..self.rows {
             readings.push(state[0]);
-            for step in 0..STEPS {
-                let t = (row * STEPS + step) as f64 * h;
-                let k1 = self.rates(state, t, size);
-                let k2 = self.rates(along(state, k1, 0.5 * h), t + 0.5 * h, size);
-                let k3 = self.rates(along(state, k2, 0.5 * h), t + 0.5 * h, size);
-                let k4 = self.rates(along(state, k3, h), t + h, size);
-                for i in 0..2 {
-                    state[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-                }
+            for part in 0..STEPS {
+                let t = (row * STEPS + part) as f64 * h;
+                state = step(&state, t, h, |x, t| self.rates(x, t, size));
             }
         }
         readings

@@ -15,6 +15,7 @@ pub mod pendulum;
 pub mod press;
 pub mod presses;
 mod quadrature;
+mod runge_kutta;
 mod set_up;
 mod sizing;
 pub mod sound;

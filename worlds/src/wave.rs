@@ -4,6 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::GRAVITY_M_S2;
+use crate::runge_kutta::step;
 
 /// Roots of the first and second antisymmetric mode of a cylinder (k R).
 pub(crate) const ROOTS: [f64; 2] = [1.841_184, 5.331_443];
@@ -189,12 +190,7 @@ impl Run<'_> {
     }
 
     fn classical(&self, x: &State, h: f64, motion: f64) -> State {
-        let add = |k: &State, h: f64| -> State { std::array::from_fn(|i| x[i] + h * k[i]) };
-        let k1 = self.rates(x, motion);
-        let k2 = self.rates(&add(&k1, 0.5 * h), motion);
-        let k3 = self.rates(&add(&k2, 0.5 * h), motion);
-        let k4 = self.rates(&add(&k3, h), motion);
-        std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
+        step(x, 0.0, h, |x, _| self.rates(x, motion))
     }
 
     /// One step, split where the friction turns round.

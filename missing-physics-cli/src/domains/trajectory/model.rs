@@ -104,8 +104,10 @@ impl TrajectoryModel {
     pub fn own_count(&self) -> usize {
         self.spec.count(Scope::PerRun)
     }
+}
 
-    fn fly<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+impl InDuals for TrajectoryModel {
+    fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,
         run: &Run,
         shared: &[T],
@@ -213,26 +215,14 @@ fn tilted<T: DualNum<Primitive = f64, Real = f64> + Copy>(p: [T; 3], [about_x, a
     [cy * x + sy * z, y, cy * z - sy * x]
 }
 
-impl InDuals for TrajectoryModel {
-    fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
-        &self,
-        run: &Run,
-        shared: &[T],
-        own: &[T],
-        moving: &[usize],
-        out: &mut [T],
-    ) -> Result<(), String> {
-        self.fly(run, shared, own, moving, out)
-    }
-}
-
 impl Model for TrajectoryModel {
     fn spec(&self) -> &Spec {
         &self.spec
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.fly(run, shared, own, &[], out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+        self.predict_in(run, shared, own, &[], out)
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
     fn start(&self, run: &Run, own: &mut [f64]) {
