@@ -4,17 +4,17 @@
 //! The cut is part of the density that is trained, exact in one dimension: nothing leaks, no draw is refused, and any shape can be
 //! learned, curved ridges included. The price is that a posterior is no mixture in all dimensions together.
 
-use rand::Rng;
+use rand::{Rng, RngExt};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::ensemble::{Ensemble, networks};
 use crate::error::Error;
+use crate::head::choose;
 use crate::mdn::check_components;
 use crate::network::Scratch;
-use crate::normal::truncated_quantile;
 use crate::points::{Points, check_length, check_row};
-use crate::posterior::{ConditionalDensity, open_uniform};
+use crate::posterior::ConditionalDensity;
 use crate::prior::Prior;
 use crate::scaling::{InputScaling, OutputScaling};
 use crate::simulations::{Prepared, Simulations};
@@ -64,19 +64,18 @@ impl Autoregressive {
         settings.training.check()?;
         let prepared = Prepared::new(prior, simulations, settings.training.validation_share, seed)?;
         let plans = networks(&settings.hidden, settings.components, settings.members);
-        let bounds = prior.bounds();
+        let bounds = prepared.bounds(prior);
         let factors = (0..prior.dim())
             .into_par_iter()
             .map(|i| {
                 let (pairs, held_out) = prepared.pairs(i, i..i + 1);
-                let scaled = |b: f64| (b - prepared.output.centre[i]) / prepared.output.scale[i];
-                let cut = bounds[i].map(|b| b.is_finite().then(|| scaled(b)));
+                let cut = bounds[i].map(|b| b.is_finite().then_some(b));
                 let cut = cut.iter().any(Option::is_some).then_some(cut);
                 Ensemble::train(
                     &plans,
                     cut,
-                    &pairs,
-                    &held_out,
+                    &bounds[i..=i],
+                    [&pairs, &held_out],
                     &settings.training,
                     seed.wrapping_add(i as u64),
                 )
@@ -98,7 +97,7 @@ impl Autoregressive {
     }
 
     /// Draws the next standardised coordinate of each row of `inputs` (column after column).
-    fn draw_factor(&self, i: usize, inputs: &[f64], count: usize, rng: &mut dyn Rng) -> Vec<f64> {
+    fn draw_factor(&self, i: usize, inputs: &[f64], count: usize, mut rng: &mut dyn Rng) -> Vec<f64> {
         let factor = &self.factors[i];
         let mut scratches: Vec<Scratch> = factor.members.iter().map(|_| Scratch::default()).collect();
         let outputs: Vec<&[f64]> = factor
@@ -109,35 +108,18 @@ impl Autoregressive {
             .collect();
         (0..count)
             .map(|row| {
-                let (u, v, w) = (open_uniform(rng), open_uniform(rng), open_uniform(rng));
-                let m = choose(factor.weights.iter().copied(), u);
+                let m = choose(factor.weights.iter().copied(), rng.random());
                 let head = &factor.members[m].head;
-                let block = &outputs[m][row * head.outputs()..(row + 1) * head.outputs()];
-                let stride = head.stride();
-                let top = block.iter().step_by(stride).fold(f64::NEG_INFINITY, |a, &b| a.max(b));
-                let k = choose(block.iter().step_by(stride).map(|l| (l - top).exp()), v);
-                let part = &block[k * stride..(k + 1) * stride];
-                let (mean, precision) = (part[1], head.precision(part, 0));
-                let [low, high] = head.interval().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-                let z = truncated_quantile(precision * (low - mean), precision * (high - mean), w);
-                (mean + z / precision).clamp(low, high)
+                let mut drawn = [0.0];
+                head.draw(
+                    &outputs[m][row * head.outputs()..(row + 1) * head.outputs()],
+                    &mut drawn,
+                    &mut rng,
+                );
+                drawn[0]
             })
             .collect()
     }
-}
-
-/// The index at which the running sum of the weights passes a share of their total.
-fn choose(weights: impl Iterator<Item = f64> + Clone, share: f64) -> usize {
-    let mut left = share * weights.clone().sum::<f64>();
-    let mut last = 0;
-    for (i, w) in weights.enumerate() {
-        last = i;
-        left -= w;
-        if left <= 0.0 {
-            break;
-        }
-    }
-    last
 }
 
 impl ConditionalDensity for Autoregressive {

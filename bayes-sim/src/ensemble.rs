@@ -15,11 +15,6 @@ use crate::network::{Activation, Network, Scratch, Shape};
 use crate::random_features::{Draw, RandomFeatures};
 use crate::training::{Pairs, TrainingReport, TrainingSettings, ln_densities, train};
 
-/// How far the spread of an ensemble is thought to be off, as the standard deviation of its logarithm.
-const TEMPER_SD: f64 = 0.05;
-/// Steps in which it is looked for.
-const TEMPER_STEP: f64 = 0.02;
-
 /// What one member is made of.
 #[derive(Debug, Clone)]
 pub(crate) enum Plan {
@@ -35,7 +30,7 @@ pub(crate) enum Plan {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Member {
     features: Option<RandomFeatures>,
-    network: Network,
+    pub(crate) network: Network,
     pub(crate) head: Head,
 }
 
@@ -201,7 +196,7 @@ pub(crate) fn networks(hidden: &[usize], components: usize, members: usize) -> V
 
 impl Ensemble {
     /// Trains a member a plan, in parallel; each has a seed of its own, so that the result does not depend on threads.
-    pub(crate) fn train(
+    pub(crate) fn fit(
         plans: &[Plan],
         cut: Option<[Option<f64>; 2]>,
         pairs: &Pairs,
@@ -237,30 +232,7 @@ impl Ensemble {
         }
         let total: f64 = out.weights.iter().sum();
         out.weights.iter_mut().for_each(|w| *w /= total);
-        out.temper(held_out);
         Ok(out)
-    }
-
-    /// Widens all components alike, by the biases of their log precisions, as far as the held-out log density gains by it (temperature
-    /// scaling; Guo et al. 2017, arXiv:1706.04599). Never narrows: the held-out simulations have already chosen when to stop, and
-    /// flatter. The logarithm of the factor is normal with [`TEMPER_SD`] before anything is seen, so that a few do not say much.
-    fn temper(&mut self, held_out: &Pairs) {
-        let mut widened = |at: f64, step: f64| {
-            for member in &mut self.members {
-                let rows = member.head.precision_rows();
-                member.network.shift_biases(&rows, -step);
-            }
-            robust_sum(&self.ln_densities(held_out), held_out) - 0.5 * (at / TEMPER_SD).powi(2)
-        };
-        let (mut at, mut best) = (0.0, widened(0.0, 0.0));
-        loop {
-            let value = widened(at + TEMPER_STEP, TEMPER_STEP);
-            if !(value > best) {
-                widened(at, -TEMPER_STEP);
-                return;
-            }
-            (at, best) = (at + TEMPER_STEP, value);
-        }
     }
 
     /// Log density of each target under the weighted members.
@@ -285,17 +257,6 @@ impl Ensemble {
             .collect();
         crate::normal::ln_sum_exp(terms.into_iter())
     }
-}
-
-/// Sum of the log densities with one in a hundred thought to come from anywhere, so that a single target far from everything does not
-/// decide.
-fn robust_sum(ln_densities: &[f64], pairs: &Pairs) -> f64 {
-    let floor = |i: usize| {
-        let squares = pairs.target(i).iter().map(|z| z * z).sum::<f64>();
-        0.01_f64.ln() - 0.5 * squares - pairs.target_dim as f64 * crate::normal::LN_SQRT_2PI
-    };
-    let terms = ln_densities.iter().enumerate();
-    terms.map(|(i, ln)| crate::normal::ln_sum_exp([0.99_f64.ln() + ln, floor(i)].into_iter())).sum()
 }
 
 /// Weights that maximise the held-out log density of the weighted sum (stacking of predictive distributions, Yao et al. 2018,

@@ -1,8 +1,11 @@
 //! What a network's outputs mean: K Gaussian components, and the negative log density of a target under them.
 
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::normal::{LN_SQRT_2PI, ln_mass};
+use crate::normal::{LN_SQRT_2PI, ln_mass, truncated_quantile};
+use crate::posterior::open_uniform;
 
 /// Least standard deviation of a component, in standard deviations of the target: `exp(-MAX_LOG_PRECISION)`.
 pub(crate) const MAX_LOG_PRECISION: f64 = 9.0;
@@ -93,10 +96,49 @@ impl Head {
         ln_density - cut.map_or(0.0, |c| c.0)
     }
 
+    /// A draw of the mixture that the outputs mean.
+    pub(crate) fn draw<R: Rng>(&self, outputs: &[f64], out: &mut [f64], rng: &mut R) {
+        let (d, stride) = (self.dim, self.stride());
+        let logits = outputs.iter().step_by(stride);
+        let top = logits.clone().fold(f64::NEG_INFINITY, |m, &l| m.max(l));
+        let k = choose(logits.map(|l| (l - top).exp()), rng.random());
+        let block = &outputs[k * stride..(k + 1) * stride];
+        if let Some([low, high]) = self.interval() {
+            let (mean, precision) = (block[1], self.precision(block, 0));
+            let edges = [low, high].map(|b| precision * (b - mean));
+            let z = truncated_quantile(edges[0], edges[1], open_uniform(rng));
+            out[0] = (mean + z / precision).clamp(low, high);
+            return;
+        }
+        // Residuals first: each needs those before it.
+        let mut at = 2 * d + 1;
+        for i in 0..d {
+            let y: f64 = StandardNormal.sample(rng);
+            let dot: f64 = block[at..at + i].iter().zip(&*out).map(|(l, r)| l * r).sum();
+            out[i] = y / self.precision(block, i) - dot;
+            at += i;
+        }
+        out.iter_mut().zip(&block[1..=d]).for_each(|(r, mean)| *r += mean);
+    }
+
     /// `exp(a_i)` of one component, floored as in the loss.
     pub(crate) fn precision(&self, block: &[f64], i: usize) -> f64 {
         block[self.dim + 1 + i].min(MAX_LOG_PRECISION).exp()
     }
+}
+
+/// The index at which the running sum of the weights passes a share of their total.
+pub(crate) fn choose(weights: impl Iterator<Item = f64> + Clone, share: f64) -> usize {
+    let mut left = share * weights.clone().sum::<f64>();
+    let mut last = 0;
+    for (i, w) in weights.enumerate() {
+        last = i;
+        left -= w;
+        if left <= 0.0 {
+            break;
+        }
+    }
+    last
 }
 
 /// `ln` of the mass that a one-dimensional component `[mean, a]` has within the interval, and its derivatives by the two; none where

@@ -27,5 +27,6 @@ pub mod rounds;
 pub mod save;
 mod scaling;
 pub mod simulations;
+mod temper;
 pub mod training;
 pub mod truncation;

@@ -66,7 +66,8 @@ impl Trained {
         training.check()?;
         let prepared = Prepared::new(prior, simulations, training.validation_share, seed)?;
         let (pairs, held_out) = prepared.pairs(0, 0..prior.dim());
-        let ensemble = Ensemble::train(plans, None, &pairs, &held_out, training, seed)?;
+        let bounds = prepared.bounds(prior);
+        let ensemble = Ensemble::train(plans, None, &bounds, [&pairs, &held_out], training, seed)?;
         Ok(Self { prior: prior.clone(), input: prepared.input, output: prepared.output, ensemble })
     }
 

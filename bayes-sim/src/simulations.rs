@@ -92,6 +92,13 @@ impl Prepared {
         Ok(Self { input, output, x, z, train, held_out })
     }
 
+    /// The prior's bounds as the networks see them.
+    pub(crate) fn bounds(&self, prior: &Prior) -> Vec<[f64; 2]> {
+        let OutputScaling { centre, scale } = &self.output;
+        let scaled = |(i, b): (usize, [f64; 2])| b.map(|b| (b - centre[i]) / scale[i]);
+        prior.bounds().into_iter().enumerate().map(scaled).collect()
+    }
+
     /// Inputs `x` and the first `known` targets; targets those of `targets`. For learning and held out.
     pub(crate) fn pairs(&self, known: usize, targets: std::ops::Range<usize>) -> (Pairs, Pairs) {
         let gather = |rows: &[usize]| {

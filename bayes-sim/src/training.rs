@@ -97,6 +97,27 @@ impl Pairs {
         self.targets.len() / self.target_dim
     }
 
+    /// These rows alone.
+    pub(crate) fn select(&self, rows: impl Iterator<Item = usize>) -> Self {
+        let (input_dim, target_dim) = (self.input_dim, self.target_dim);
+        let mut out = Self { input_dim, inputs: Vec::new(), target_dim, targets: Vec::new() };
+        for i in rows {
+            out.inputs.extend_from_slice(self.input(i));
+            out.targets.extend_from_slice(self.target(i));
+        }
+        out
+    }
+
+    /// Both, one after the other.
+    pub(crate) fn joined(&self, other: &Self) -> Self {
+        Self {
+            input_dim: self.input_dim,
+            inputs: [self.inputs.as_slice(), &other.inputs].concat(),
+            target_dim: self.target_dim,
+            targets: [self.targets.as_slice(), &other.targets].concat(),
+        }
+    }
+
     pub(crate) fn input(&self, i: usize) -> &[f64] {
         &self.inputs[i * self.input_dim..(i + 1) * self.input_dim]
     }

@@ -39,8 +39,7 @@ fn all(task: &Task, count: usize) -> Vec<(&'static str, Box<dyn ConditionalDensi
 }
 
 /// Published for neural posterior estimation at a thousand simulations: 0.7251 on two_moons, 0.7161 on gaussian_mixture, 0.6945 on
-/// gaussian_linear (shared/sbibm/c2st_wide.csv). Random features cannot bend as fast as the crescents: they are not asked for them
-/// here, and what they reach is in the readme.
+/// gaussian_linear (shared/sbibm/c2st_wide.csv).
 #[test]
 fn a_thousand_simulations_do_as_well_as_published() {
     as_well_as_published(&common::two_moons(), 0.7251, 2, 600);
@@ -55,14 +54,8 @@ fn a_thousand_simulations_do_as_well_as_published_in_ten_dimensions() {
 /// Counts of which one never changes, under log-normal priors; ten parameters that are correlated beforehand (0.8151 and 0.8630).
 #[test]
 fn a_thousand_simulations_do_as_well_as_published_under_gaussian_priors() {
-    as_well_as_published(&common::simulators::sir(), 0.8151, 2, 300);
-    // Too wide to be held to its coverage: the readme says by how much.
-    let task = common::simulators::bernoulli_glm();
-    for (name, density) in all(&task, 1000) {
-        let Some(score) = score(&task, density.as_ref(), 1) else { return };
-        println!("{} {name}: C2ST {score:.3}", task.name);
-        assert!(score < 0.8630 + 0.02, "{} {name}: {score}", task.name);
-    }
+    as_well_as_published(&common::simulators::sir(), 0.8151, 2, 600);
+    as_well_as_published(&common::simulators::bernoulli_glm(), 0.8630, 1, 600);
 }
 
 /// Mean C2ST against the references of the first observations.
@@ -80,15 +73,13 @@ fn score(task: &Task, density: &dyn ConditionalDensity, observations: usize) -> 
 
 fn as_well_as_published(task: &Task, published: f64, most: usize, tests: usize) {
     for (name, density) in all(task, 1000) {
-        if name == "mdrff" && task.name == "two_moons" {
-            continue;
-        }
         let Some(sum) = score(task, density.as_ref(), most) else { return };
         let coverage = expected_coverage(density.as_ref(), &task.simulations(tests, 7), 200, 3).unwrap();
         println!("{} {name}: C2ST {sum:.3}, coverage off by {:+.3}", task.name, coverage.mean_error());
         let bound = published + 0.02;
         assert!(sum < bound, "{} {name}: {sum} {bound}", task.name);
-        assert!(coverage.mean_error().abs() < 0.05, "{} {name}: {}", task.name, coverage.mean_error());
+        // 0.03 is wanted; 600 tests leave a mean uncertain by 0.012, 300 by 0.017.
+        assert!(coverage.mean_error().abs() < 0.04, "{} {name}: {}", task.name, coverage.mean_error());
     }
 }
 
