@@ -20,16 +20,21 @@ const MOST: usize = 2000;
 const FOLDS: usize = 5;
 /// Draws that say how credible a region is.
 const DRAWS: u32 = 32;
-/// Logarithms of the factors on all spreads among which one is looked for, and how often their interval is halved.
+/// Logarithms of the factors on all spreads among which one is looked for, and how often their interval is cut.
 const RANGE: [f64; 2] = [-0.4, 0.8];
-const HALVINGS: usize = 8;
+const SECTIONS: usize = 9;
+/// What of the mean log density may be given for coverage, and how a loss beyond it counts.
+const GIVEN: f64 = 0.02;
+const BEYOND: f64 = 10.0;
+/// No single target counts for less than this log density.
+const LEAST_LN: f64 = -20.0;
 
 impl Ensemble {
-    /// Trains, and widens or narrows all components alike until regions of highest density hold simulations that were not trained on
-    /// as often as they should, on average over all levels. `bounds` are those of the targets.
+    /// Trains, and widens or narrows all components alike so that regions of highest density hold simulations that were not trained on
+    /// as often as they should. `bounds` are those of the targets.
     ///
-    /// Where few are held out they say little, and have chosen when to stop besides: then all are asked, a fifth at a time, of
-    /// ensembles that are trained without it (cross-validation).
+    /// Where few are held out they say little: then all are asked, a fifth at a time, of ensembles that are trained on the rest
+    /// (cross-validation).
     pub(crate) fn train(
         plans: &[Plan],
         cut: Option<[Option<f64>; 2]>,
@@ -122,8 +127,8 @@ impl Judge {
         ln_sum_exp(terms.into_iter())
     }
 
-    /// Probability of the smallest region that holds target `i`; none where no draw is within the bounds.
-    fn credibility(&self, i: usize, bounds: &[[f64; 2]], rng: &mut ChaCha8Rng) -> Option<f64> {
+    /// Probability of the smallest region that holds target `i`, and the log density there; none where no draw is within the bounds.
+    fn credibility(&self, i: usize, bounds: &[[f64; 2]], rng: &mut ChaCha8Rng) -> Option<[f64; 2]> {
         let mut scratch = HeadScratch::default();
         let truth = self.ln_density(i, self.pairs.target(i), &mut scratch);
         let mut draw = vec![0.0; self.pairs.target_dim];
@@ -136,35 +141,68 @@ impl Judge {
                 above += u32::from(self.ln_density(i, &draw, &mut scratch) > truth);
             }
         }
-        (inside > 0).then(|| (f64::from(above) + 0.5) / f64::from(inside + 1))
+        (inside > 0)
+            .then(|| [(f64::from(above) + rng.random::<f64>()) / f64::from(inside + 1), truth.max(LEAST_LN)])
     }
 }
 
-/// The logarithm of the factor on all spreads with which the mean credibility of what was not seen is one half.
-fn wanted(mut judges: Vec<Judge>, bounds: &[[f64; 2]], seed: u64) -> f64 {
+/// The logarithm of the factor on all spreads with which coverage is nearest to its level, over all levels, by golden sections. Where the
+/// shape is wrong no factor mends it: one that costs density is not taken.
+fn wanted(judges: Vec<Judge>, bounds: &[[f64; 2]], seed: u64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let mut court = Court { judges, at: 0.0, ln_density: f64::NEG_INFINITY };
+    court.ln_density = court.seen(0.0, bounds, seed).1;
     let [mut low, mut high] = RANGE;
-    let mut at = 0.0;
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        judges.iter_mut().for_each(|j| j.widen(middle - at));
-        at = middle;
+    let inner = |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+    let mut points = inner(low, high);
+    let mut errors = points.map(|p| court.error(p, bounds, seed));
+    for _ in 0..SECTIONS {
+        if errors[0] < errors[1] {
+            high = points[1];
+            points = inner(low, high);
+            errors = [court.error(points[0], bounds, seed), errors[0]];
+        } else {
+            low = points[0];
+            points = inner(low, high);
+            errors = [errors[1], court.error(points[1], bounds, seed)];
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Judges, all widened alike.
+struct Court {
+    judges: Vec<Judge>,
+    at: f64,
+    /// Mean log density before.
+    ln_density: f64,
+}
+
+impl Court {
+    /// What is to be least where spreads are multiplied by `exp(by)`.
+    fn error(&mut self, by: f64, bounds: &[[f64; 2]], seed: u64) -> f64 {
+        let (off, ln_density) = self.seen(by, bounds, seed);
+        off + BEYOND * (self.ln_density - GIVEN - ln_density).max(0.0)
+    }
+
+    /// Mean square of coverage less level over all levels (Cramer and von Mises), and the mean log density.
+    fn seen(&mut self, by: f64, bounds: &[[f64; 2]], seed: u64) -> (f64, f64) {
+        self.judges.iter_mut().for_each(|j| j.widen(by - self.at));
+        self.at = by;
         // The same dice for every factor, and for any number of threads.
         let credibility = |(k, i): (usize, usize)| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(((k as u64) << 32) + i as u64);
-            judges[k].credibility(i, bounds, &mut rng)
+            self.judges[k].credibility(i, bounds, &mut rng)
         };
-        let rows: Vec<(usize, usize)> =
-            judges.iter().enumerate().flat_map(|(k, j)| (0..j.pairs.len()).map(move |i| (k, i))).collect();
-        let all: Vec<f64> = rows.into_par_iter().filter_map(credibility).collect();
-        // Truths further out than they should be: too narrow.
-        if all.iter().sum::<f64>() > 0.5 * all.len() as f64 {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        let judges = self.judges.iter().enumerate();
+        let rows: Vec<_> = judges.flat_map(|(k, j)| (0..j.pairs.len()).map(move |i| (k, i))).collect();
+        let mut all: Vec<[f64; 2]> = rows.into_par_iter().filter_map(credibility).collect();
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let n = all.len().max(1) as f64;
+        let off = all.iter().enumerate().map(|(i, c)| (c[0] - (i as f64 + 0.5) / n).powi(2)).sum::<f64>();
+        (off / n, all.iter().map(|c| c[1]).sum::<f64>() / n)
     }
-    0.5 * (low + high)
 }
 
 #[cfg(test)]
