@@ -119,6 +119,7 @@ impl Answer<'_> {
                         (Some(_), _) => NoiseSource::Replicates,
                     },
                     correlated_share: shape.correlated,
+                    correlation_rows: shape.length_steps,
                     correlation_length: shape.length_steps * self.problem.step,
                 }
             })
