@@ -10,7 +10,6 @@ mod common;
 use bounce_audio::hear::{HearSettings, hear, hear_times};
 use bounce_audio::wav::Sound;
 use common::{quantile, shared};
-use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -110,76 +109,4 @@ fn a_real_ball_is_heard_when_its_author_heard_it() {
     // The flights shorten as a ball's do, beyond the author's last time: no echo was taken for an impact.
     let flights: Vec<f64> = at.windows(2).map(|w| w[1] - w[0]).collect();
     assert!(flights.windows(2).all(|f| (0.85..1.0).contains(&(f[1] / f[0]))), "{flights:.4?} s");
-    drag_shows_as_far_as_times_are_read(&times, &at[..times.len()], &late);
-}
-
-/// Drag takes what a constant restitution leaves of the heard times to half a millisecond; of the author's it leaves what his marks are
-/// late by, now more and now less.
-fn drag_shows_as_far_as_times_are_read(marked: &[f64], heard: &[f64], late_ms: &[f64]) {
-    let n = late_ms.len() as f64;
-    let mean = late_ms.iter().sum::<f64>() / n;
-    let off: Vec<f64> = late_ms.iter().map(|l| l - mean).collect();
-    let squares = off.iter().map(|o| o * o).sum::<f64>();
-    let (sd, tied) = ((squares / n).sqrt(), off.windows(2).map(|o| o[0] * o[1]).sum::<f64>() / squares);
-    println!("the author's marks: late by {mean:.1} ms, sd {sd:.2} ms, neighbours correlated by {tied:.2}");
-    let rounded: Vec<f64> = heard.iter().map(|t| (1e3 * t).round() / 1e3).collect();
-    let mut left = Vec::new();
-    for (name, times) in [("heard", heard), ("heard, rounded to 1 ms", &rounded), ("marked", marked)] {
-        let [without, with] = [fitted(times, false), fitted(times, true)];
-        println!("{name}: {:.2} ms left, with drag {:.2} ms, k = {:.3} /m", without.0, with.0, with.1);
-        left.push([without.0, with.0]);
-    }
-    let without = |row: usize| {
-        let others: Vec<usize> = (0..marked.len()).filter(|i| *i != row).collect();
-        fitted_rows(marked, &others, true).0
-    };
-    let least = (0..marked.len()).map(without).fold(f64::INFINITY, f64::min);
-    println!("marked, without the worst row: {least:.2} ms");
-    assert!(left[0][0] > 1.3 && left[0][1] < 0.6, "{left:?}");
-    assert!(sd > 0.9 && left[2][1] > 0.9 && least > 0.9, "{sd} {left:?} {least}");
-}
-
-fn fitted(times: &[f64], drag: bool) -> (f64, f64) {
-    fitted_rows(times, &(0..times.len()).collect::<Vec<_>>(), drag)
-}
-
-/// Root mean square of what a ball of constant restitution leaves of these rows' times, ms, and its drag, 1/m: Gauss-Newton.
-fn fitted_rows(times: &[f64], rows: &[usize], drag: bool) -> (f64, f64) {
-    // First impact, its speed, restitution, drag.
-    let mut p = [times[0], 1.0, 0.94, if drag { 0.1 } else { 0.0 }];
-    let free = if drag { 4 } else { 3 };
-    let residuals = |p: &[f64; 4]| {
-        let foretold = impact_times(p, times.len());
-        DVector::from_iterator(rows.len(), rows.iter().map(|&i| times[i] - foretold[i]))
-    };
-    for _ in 0..30 {
-        let slopes = DMatrix::from_columns(
-            &(0..free)
-                .map(|k| {
-                    let [mut up, mut down] = [p, p];
-                    (up[k], down[k]) = (p[k] + 1e-6, p[k] - 1e-6);
-                    (residuals(&down) - residuals(&up)) / 2e-6
-                })
-                .collect::<Vec<_>>(),
-        );
-        let step = slopes.svd(true, true).solve(&residuals(&p), 1e-12).unwrap();
-        step.iter().enumerate().for_each(|(k, s)| p[k] += s);
-        p[3] = p[3].max(0.0);
-    }
-    (1e3 * (residuals(&p).norm_squared() / rows.len() as f64).sqrt(), p[3])
-}
-
-/// Impacts of a ball that goes straight up and down through quadratic drag, in closed form.
-fn impact_times(&[first, speed, restitution, drag]: &[f64; 4], count: usize) -> Vec<f64> {
-    let (mut t, mut v, g) = (first, speed, 9.80665);
-    let k = drag.max(1e-9);
-    (0..count)
-        .map(|_| {
-            let at = t;
-            let x = restitution * v * (k / g).sqrt();
-            t += (x.atan() + x.asinh()) / (k * g).sqrt();
-            v = restitution * v / (1.0 + x * x).sqrt();
-            at
-        })
-        .collect()
 }
