@@ -1,13 +1,6 @@
 //! Pours a shard of a campaign: `cargo run --release -p granular-infer --example campaign -- FIRST LAST FILE`.
 //!
-//! 1,000 grains of 4 mm and 1,300 kg/m3 through the funnel of the recordings. Shards of one campaign merge with `cat`. The pours
-//! that come with the domain `grain-pour` (some 20 CPU minutes; a test pours four of them again):
-//!
-//! ```text
-//! cargo run --release -p granular-infer --example campaign -- 0 440 a.bin
-//! cargo run --release -p granular-infer --example campaign -- 1000 1160 b.bin
-//! cat a.bin b.bin | gzip -9n > missing-physics-cli/src/domains/grain_pour/campaign.bin.gz
-//! ```
+//! 1,000 grains of 4 mm and 1,300 kg/m3 through the funnel of the recordings. Shards of one campaign merge with `cat`.
 #![allow(
     clippy::print_stdout,
     clippy::approx_constant,

@@ -46,41 +46,81 @@ pub struct Emulator {
 
 /// Mean of the log of a chi-squared variable with one degree of freedom.
 const LOG_CHI2: f64 = -1.270_362_845_461_478;
-/// Mean of such a variable where it is cut at nine.
-const CLIPPED_CHI2: f64 = 0.994_957;
-/// Rounds in which a level under such a cut settles.
-const LEVELLING: usize = 8;
 /// Weight of a coefficient's distance from zero, in samples.
 const RIDGE: f64 = 1e-3;
-/// Parts into which pours are dealt: each is predicted from the others.
-const FOLDS: usize = 6;
 /// Blur variance (px^2) at which half of its effect is there.
 const HALF_BLUR: f64 = 1.0;
 /// Work of adhesion (J/m2) likewise.
 const HALF_ADHESION: f64 = 0.05;
 
 impl Emulator {
-    /// Learns from the pictures of a campaign with these ranges. Pictures of one pour have to follow each other.
+    /// Learns from the pictures of a campaign with these ranges.
     ///
     /// # Errors
     /// [`EmulatorError`].
     pub fn learn(ranges: &Ranges, samples: &[Sample]) -> Result<Self, EmulatorError> {
         let scaled: Vec<Scaled> =
             samples.iter().map(|s| Scaled::new(ranges, &s.conditions, s.blur_px2)).collect();
-        let expected = 4 * scaled.first().map_or(1, |s| s.scalar().len());
+        let expected = 3 * scaled.first().map_or(1, |s| s.scalar().len());
         if samples.len() < expected {
             return Err(EmulatorError::TooFew { received: samples.len(), expected });
         }
-        let table = Table::new(samples, &scaled);
-        let all: Vec<usize> = (0..samples.len()).collect();
-        let means: Vec<DVector<f64>> = (0..COUNT).map(|k| table.mean(k, &all)).collect();
-        // What a fit leaves of the pours that it has seen is too little; what it leaves of others is what matters.
-        let left = table.left_of_others();
-        let spread: Vec<DVector<f64>> = (0..COUNT).map(|k| table.spread(k, &left)).collect();
-        let standard = DMatrix::from_fn(samples.len(), COUNT, |i, k| {
-            left[(i, k)] * (-0.5 * table.spread_rows[i].dot(&spread[k])).exp()
-        });
-        Ok(Self { ranges: *ranges, mean: means, spread, correlation: correlation(&standard) })
+        let spread_rows: Vec<DVector<f64>> = scaled.iter().map(Scaled::spread).collect();
+        let mut emulator = Self {
+            ranges: *ranges,
+            mean: Vec::new(),
+            spread: Vec::new(),
+            correlation: DMatrix::identity(COUNT, COUNT),
+        };
+        let mut standard = DMatrix::zeros(samples.len(), COUNT);
+        let mut k = 0;
+        while k < COUNT {
+            // A pair's two parts share their coefficients.
+            let width = if k + 1 < COUNT && STATISTICS[k + 1].1 == Symmetry::Second { 2 } else { 1 };
+            let rows: Vec<Vec<DVector<f64>>> =
+                (k..k + width).map(|s| scaled.iter().map(|p| p.features(s)).collect()).collect();
+            let values = |s: usize, i: usize| samples[i].statistics[k + s];
+            let mut weights = vec![1.0; samples.len()];
+            let (mut mean, mut spread) = (DVector::zeros(0), DVector::zeros(0));
+            for _ in 0..3 {
+                mean = least_squares((0..width).flat_map(|s| {
+                    let (rows, weights) = (&rows[s], &weights);
+                    (0..samples.len()).map(move |i| (&rows[i], values(s, i), weights[i]))
+                }));
+                let freedom = (width * samples.len()) as f64 / (width * samples.len() - mean.len()) as f64;
+                let left = |s: usize, i: usize| values(s, i) - rows[s][i].dot(&mean);
+                let floor =
+                    (0..samples.len()).map(|i| left(0, i).powi(2)).sum::<f64>() / samples.len() as f64;
+                let log = |s: usize, i: usize| {
+                    (freedom * left(s, i).powi(2) + 1e-6 * floor + 1e-300).ln() - LOG_CHI2
+                };
+                spread = least_squares((0..width).flat_map(|s| {
+                    let (rows, log) = (&spread_rows, &log);
+                    (0..samples.len()).map(move |i| (&rows[i], log(s, i), 1.0))
+                }));
+                // Logs of squares are anything but normal: the level is set by the squares themselves.
+                let ratio = (0..width)
+                    .flat_map(|s| (0..samples.len()).map(move |i| (s, i)))
+                    .map(|(s, i)| freedom * left(s, i).powi(2) / spread_rows[i].dot(&spread).exp())
+                    .sum::<f64>()
+                    / (width * samples.len()) as f64;
+                spread[0] += ratio.max(1e-12).ln();
+                for (w, row) in weights.iter_mut().zip(&spread_rows) {
+                    *w = (spread[0] - row.dot(&spread)).exp();
+                }
+            }
+            for s in 0..width {
+                for i in 0..samples.len() {
+                    let sigma = (0.5 * spread_rows[i].dot(&spread)).exp();
+                    standard[(i, k + s)] = (values(s, i) - rows[s][i].dot(&mean)) / sigma;
+                }
+                emulator.mean.push(mean.clone());
+                emulator.spread.push(spread.clone());
+            }
+            k += width;
+        }
+        emulator.correlation = correlation(&standard);
+        Ok(emulator)
     }
 
     /// The mean statistics.
@@ -98,105 +138,6 @@ impl Emulator {
     /// Correlations of the statistics from pour to pour.
     pub fn correlation(&self) -> &DMatrix<f64> {
         &self.correlation
-    }
-}
-
-/// Samples as rows of features and values.
-struct Table<'a> {
-    samples: &'a [Sample],
-    scaled: &'a [Scaled],
-    spread_rows: Vec<DVector<f64>>,
-    /// Which pour each sample is of.
-    pour: Vec<usize>,
-}
-
-impl<'a> Table<'a> {
-    fn new(samples: &'a [Sample], scaled: &'a [Scaled]) -> Self {
-        let mut pour = Vec::new();
-        let mut last = 0;
-        for (i, s) in samples.iter().enumerate() {
-            last += usize::from(i > 0 && samples[i - 1].conditions != s.conditions);
-            pour.push(last);
-        }
-        Self { samples, scaled, spread_rows: scaled.iter().map(Scaled::spread).collect(), pour }
-    }
-
-    /// The statistics that share their coefficients with one: a pair's two parts, or it alone.
-    fn shared(k: usize) -> std::ops::Range<usize> {
-        if STATISTICS[k].1 == Symmetry::Second {
-            k - 1..k + 1
-        } else if STATISTICS[k].1 == Symmetry::Scalar {
-            k..k + 1
-        } else {
-            k..k + 2
-        }
-    }
-
-    /// Coefficients of a statistic's mean, learned from some samples, each weighted by how little it scatters.
-    fn mean(&self, k: usize, among: &[usize]) -> DVector<f64> {
-        let parts = Self::shared(k);
-        let rows: Vec<Vec<DVector<f64>>> =
-            parts.clone().map(|s| among.iter().map(|&i| self.scaled[i].features(s)).collect()).collect();
-        let value = |s: usize, m: usize| self.samples[among[m]].statistics[parts.start + s];
-        let mut weights = vec![1.0; among.len()];
-        let mut mean = DVector::zeros(0);
-        for _ in 0..3 {
-            mean = least_squares((0..rows.len()).flat_map(|s| {
-                let (rows, weights) = (&rows[s], &weights);
-                (0..among.len()).map(move |m| (&rows[m], value(s, m), weights[m]))
-            }));
-            let left: Vec<(usize, f64)> = (0..rows.len())
-                .flat_map(|s| (0..among.len()).map(move |m| (s, m)))
-                .map(|(s, m)| (among[m], value(s, m) - rows[s][m].dot(&mean)))
-                .collect();
-            let spread = self.log_variance(&left);
-            for (w, &i) in weights.iter_mut().zip(among) {
-                *w = (spread[0] - self.spread_rows[i].dot(&spread)).exp();
-            }
-        }
-        mean
-    }
-
-    /// Every sample less the mean that was learned without its pour.
-    fn left_of_others(&self) -> DMatrix<f64> {
-        let mut left = DMatrix::zeros(self.samples.len(), COUNT);
-        for fold in 0..FOLDS {
-            let (out, among): (Vec<usize>, Vec<usize>) =
-                (0..self.samples.len()).partition(|&i| self.pour[i] % FOLDS == fold);
-            for k in 0..COUNT {
-                let mean = self.mean(k, &among);
-                for &i in &out {
-                    left[(i, k)] = self.samples[i].statistics[k] - self.scaled[i].features(k).dot(&mean);
-                }
-            }
-        }
-        left
-    }
-
-    /// Coefficients of a statistic's log variance, from what is left.
-    fn spread(&self, k: usize, left: &DMatrix<f64>) -> DVector<f64> {
-        let all: Vec<(usize, f64)> =
-            Self::shared(k).flat_map(|s| (0..left.nrows()).map(move |i| (i, left[(i, s)]))).collect();
-        self.log_variance(&all)
-    }
-
-    /// Coefficients of the log variance, from samples and what is left of them.
-    fn log_variance(&self, left: &[(usize, f64)]) -> DVector<f64> {
-        let n = left.len() as f64;
-        let floor = 1e-6 * left.iter().map(|(_, v)| v * v).sum::<f64>() / n + 1e-300;
-        let mut spread = least_squares(
-            left.iter().map(|(i, v)| (&self.spread_rows[*i], (v * v + floor).ln() - LOG_CHI2, 1.0)),
-        );
-        // Logs of squares are anything but normal: the level is set by the squares themselves, a wild one counted as three sigmas.
-        for _ in 0..LEVELLING {
-            let ratio = left
-                .iter()
-                .map(|(i, v)| (v * v / self.spread_rows[*i].dot(&spread).exp()).min(9.0))
-                .sum::<f64>()
-                / (n * CLIPPED_CHI2);
-            spread[0] += ratio.max(1e-12).ln();
-        }
-        spread
     }
 }
 
@@ -279,7 +220,7 @@ impl Scaled {
     fn spread(&self) -> DVector<f64> {
         let mut row = vec![1.0];
         row.extend(self.base);
-        row.extend(self.base.iter().enumerate().flat_map(|(i, b)| self.base[i..].iter().map(move |c| b * c)));
+        row.extend(self.base.map(|b| b * b));
         row.extend(self.effects);
         DVector::from_vec(row)
     }

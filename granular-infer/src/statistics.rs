@@ -12,8 +12,6 @@ use crate::seeing::HeightMap;
 pub const RINGS: [f64; 10] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1, 3.0];
 /// Added to a ring's mean height before its root is taken, in diameters.
 const RING_FLOOR: f64 = 0.01;
-/// Added to mean square differences before their log is taken, in square diameters: where no grain is left, noise is not magnified.
-const ROUGHNESS_FLOOR: f64 = 0.02;
 /// Least height that moments are divided by, over what the grains' volume should give.
 const LEAST: f64 = 0.3;
 /// Heap and strays part here, in L.
@@ -112,7 +110,7 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
     let at = 3 + ring.len();
     let [one, two, four] = LAGS.map(|lag| {
         let all = differences(map, &radii, lag) - 2.0 * variance;
-        all.max(0.0) + ROUGHNESS_FLOOR * d * d
+        all.max(1e-4 * d * d)
     });
     out[at] = (one / (d * d)).ln();
     out[at + 1] = (two / one).ln();
