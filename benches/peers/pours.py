@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Recordings of the domain grain-pour by another simulator, with a key: worlds on which the domain was not made.
 
-    benches/peers/pours.py make FOLDER [--worlds NAME ...]     LIGGGHTS pours, a camera looks
-    benches/peers/pours.py score FOLDER MISSING_PHYSICS        diagnoses each, and says how it did
+    benches/peers/pours.py make FOLDER [--seed 1] [--kinds NAME ...]     LIGGGHTS pours, a camera looks
+    benches/peers/pours.py score FOLDER MISSING_PHYSICS                  diagnoses each, and says how it did
 
-Needs numpy. 16 worlds of four pours take some 10 CPU minutes. Debian: apt install liggghts.
+Needs numpy. A world of four pours takes some 35 CPU s (rods: 90). Debian: apt install liggghts.
 """
 
 import argparse
@@ -41,30 +41,90 @@ def tilted(angle, azimuth):
     return (side * math.cos(azimuth), side * math.sin(azimuth), -down)
 
 
-# Per world: what is concealed (of the scene; of the camera; the funnel's offset) and the key.
-WORLDS = {
-    "null-1": ({}, {}, []),
-    "null-2": ({}, {}, []),
-    "null-3": ({}, {}, []),
-    "null-4": ({}, {}, []),
-    "cohesion-1": ({"work_of_adhesion": 0.02}, {}, [("cohesion", {"work_of_adhesion_j_m2": 0.02})]),
-    "cohesion-2": ({"work_of_adhesion": 0.08}, {}, [("cohesion", {"work_of_adhesion_j_m2": 0.08})]),
-    "ground-1": ({"ground": 0.2}, {}, [("ground-friction", {"mu_ground": 0.2})]),
-    "ground-2": ({"ground": 0.9}, {}, [("ground-friction", {"mu_ground": 0.9})]),
-    "spread": ({"variation": 0.25}, {}, [("size-spread", {"coefficient_of_variation": 0.25})]),
-    "tilt": ({"gravity": tilted(0.04, 2.2)}, {}, [("tilted-ground", {"angle_rad": 0.04})]),
-    "rods": ({"clump": rod(1.8)}, {}, [("non-spherical-grains", {"aspect_ratio": 1.8})]),
-    "funnel": ({}, {"funnel": 0.02}, [("funnel-offset", {"offset_m": 0.02})]),
-    "blur": ({}, {"blur": 1.4}, [("depth-blur", {"sigma_px": 1.4})]),
-    "offset": ({}, {"offset": -0.004}, [("depth-offset", {"offset_m": -0.004})]),
-    "drag": ({"drag": 3.0}, {}, [("air-drag", {"k_per_m": 3.0})]),
-    "tilt-blur": (
-        {"gravity": tilted(0.05, -0.7)},
-        {"blur": 1.2},
-        [("tilted-ground", {"angle_rad": 0.05}), ("depth-blur", {"sigma_px": 1.2})],
-    ),
-    # The camera does not stand over the funnel: no mechanism of the list.
-    "aside": ({}, {"aside": (0.012, 0.006)}, []),
+def scene(**changes):
+    """A mechanism of the scene alone."""
+    return changes, {}
+
+
+def camera(**changes):
+    """One of the camera (or of where the funnel is said to stand) alone."""
+    return {}, changes
+
+
+def either(dice, low, high):
+    return dice.choice((-1, 1)) * dice.uniform(low, high)
+
+
+def cohesion(dice, truth):
+    w = round(math.exp(dice.uniform(math.log(0.02), math.log(0.1))), 4)
+    return *scene(work_of_adhesion=w), [("cohesion", {"work_of_adhesion_j_m2": w})]
+
+
+def ground(dice, truth):
+    mu = round(truth["friction"] * math.exp(either(dice, 0.6, 1.0)), 3)
+    return *scene(ground=mu), [("ground-friction", {"mu_ground": mu})]
+
+
+def spread(dice, truth):
+    cv = round(dice.uniform(0.15, 0.3), 3)
+    return *scene(variation=cv), [("size-spread", {"coefficient_of_variation": cv})]
+
+
+def tilt(dice, truth):
+    angle = round(dice.uniform(0.025, 0.06), 4)
+    return *scene(gravity=tilted(angle, dice.uniform(-math.pi, math.pi))), [("tilted-ground", {"angle_rad": angle})]
+
+
+def rods(dice, truth):
+    aspect = round(dice.uniform(1.4, 2.2), 2)
+    return *scene(clump=rod(aspect)), [("non-spherical-grains", {"aspect_ratio": aspect})]
+
+
+def funnel(dice, truth):
+    offset = round(either(dice, 0.01, 0.02), 4)
+    # The lowest funnel still has to let the grains out.
+    return *camera(funnel=max(offset, -0.012)), [("funnel-offset", {"offset_m": max(offset, -0.012)})]
+
+
+def blur(dice, truth):
+    sigma = round(dice.uniform(0.8, 2.0), 2)
+    return *camera(blur=sigma), [("depth-blur", {"sigma_px": sigma})]
+
+
+def offset(dice, truth):
+    by = round(either(dice, 2e-3, 6e-3), 4)
+    return *camera(offset=by), [("depth-offset", {"offset_m": by})]
+
+
+def drag(dice, truth):
+    k = round(dice.uniform(1.5, 5.0), 2)
+    return *scene(drag=k), [("air-drag", {"k_per_m": k})]
+
+
+def both(first, second):
+    def world(dice, truth):
+        (s1, c1, m1), (s2, c2, m2) = first(dice, truth), second(dice, truth)
+        return {**s1, **s2}, {**c1, **c2}, m1 + m2
+
+    return world
+
+
+# What is concealed, of the scene and of the camera, and the key. The camera of `aside` does not stand over the funnel: no
+# mechanism of the list.
+KINDS = {
+    "null": lambda dice, truth: ({}, {}, []),
+    "cohesion": cohesion,
+    "ground": ground,
+    "spread": spread,
+    "tilt": tilt,
+    "rods": rods,
+    "funnel": funnel,
+    "blur": blur,
+    "offset": offset,
+    "drag": drag,
+    "tilt-blur": both(tilt, blur),
+    "cohesion-offset": both(cohesion, offset),
+    "aside": lambda dice, truth: (*camera(aside=(0.012, 0.006)), []),
 }
 
 
@@ -119,15 +179,17 @@ def png(path, counts):
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + body)
 
 
-def make(folder, name):
+def make(folder, kind, seed):
     """One world: pours, pictures, recording, key."""
-    hidden, seen, mechanisms = WORLDS[name]
+    name = f"{kind}-{seed}"
+    folder = folder / name
     dice = random.Random(f"grain-pour {name}")
     truth = {
         "friction": round(dice.uniform(0.35, 0.7), 3),
         "rolling": round(math.exp(dice.uniform(math.log(0.08), math.log(0.2))), 3),
         "restitution": round(dice.uniform(0.35, 0.65), 3),
     }
+    hidden, seen, mechanisms = KINDS[kind](dice, truth)
     camera = {
         "size": 240, "c": 119.5, "f": round(dice.uniform(230, 280), 2), "height": round(dice.uniform(0.33, 0.4), 3),
         "noise": dice.uniform(5e-4, 1e-3), "blur": 0.0, "offset": 0.0, "funnel": 0.0,
@@ -139,9 +201,9 @@ def make(folder, name):
         scene = Scene(
             count=COUNT, height=height + camera["funnel"], duration=2.0, step=6e-5, modulus=1.5e6, **truth, **hidden
         )
-        at = folder / "pours" / str(run)
+        at, fill = folder / "pours" / str(run), dice.randrange(10**6)
         if not (at / "end.txt").exists():
-            cpu += grains.pour("liggghts", at.resolve(), scene, dice.randrange(10**6)) or 0.0
+            cpu += grains.pour("liggghts", at.resolve(), scene, fill) or 0.0
         # The funnel is gone in the picture, and with it what stuck in it.
         x, y = camera["aside"]
         places = [(p[0] + x, p[1] + y, *p[2:]) for p in grains.end(at / "end.txt") if p[2] < scene.height]
@@ -171,7 +233,7 @@ funnel = {{ outlet_radius_m = {grains.OUTLET}, cone_half_angle_rad = {math.pi / 
 """)
     key = {
         "accepted": [sorted(m for m, _ in mechanisms)],
-        "kind": "unlisted" if name == "aside" else "listed" if mechanisms else "null",
+        "kind": "unlisted" if kind == "aside" else "listed" if mechanisms else "null",
         "mechanisms": [{"id": m, "parameters": p} for m, p in mechanisms],
         "truth": truth,
     }
@@ -179,44 +241,57 @@ funnel = {{ outlet_radius_m = {grains.OUTLET}, cone_half_angle_rad = {math.pi / 
     print(f"{name}: {cpu:.0f} CPU s", flush=True)
 
 
+def outcome(key, answer):
+    """How an answer stands to the key."""
+    said, wanted = sorted(answer["chosen"]), key["accepted"][0]
+    alarm = answer["verdict"] != "adequate"
+    if key["kind"] == "null":
+        return "false alarm" if alarm else "right"
+    if said == wanted and (key["kind"] == "listed" or answer["verdict"] == "unexplained"):
+        return "right" if alarm else "missed"
+    if wanted in map(sorted, answer["confused_with"]):
+        return "among the named"
+    return "wrong name" if said else "unexplained" if alarm else "missed"
+
+
+def strengths(key, answer):
+    """Hidden parameters beside what was found."""
+    wanted = key["accepted"][0]
+    found = {p["name"]: p for m in answer["mechanisms"] for p in m["parameters"] if m["id"] in wanted}
+    for mechanism in key["mechanisms"]:
+        for name, value in mechanism["parameters"].items():
+            if name in found:
+                low, high = found[name]["ci95"]
+                yield f"{name} {value:g}: {found[name]['value']:.4g} [{low:.4g}, {high:.4g}]"
+
+
 def score(folder, program):
-    """Diagnoses every world below a folder: verdict, names, strengths beside the key's."""
-    tally = dict.fromkeys(["worlds", "false alarms", "named", "among the named", "wrong names", "missed"], 0)
-    for at in sorted(p.parent for p in folder.glob("*/key.json")):
+    """Diagnoses every world below a folder: verdict, names, strengths beside the key's; then mechanism by answer."""
+    table, tally = {}, {}
+    for at in sorted(p.parent for p in folder.glob("**/key.json")):
         key = json.loads((at / "key.json").read_text())
         begun = time.monotonic()
-        subprocess.run([program, "diagnose", at, "--json", at / "answer.json", "--threads", "1"], check=True, capture_output=True)
+        command = [program, "diagnose", at, "--json", at / "answer.json", "--threads", "1"]
+        subprocess.run(command, check=True, capture_output=True)
         answer = json.loads((at / "answer.json").read_text())
-        said = sorted(answer["chosen"])
-        others = [sorted(s) for s in answer["confused_with"]]
-        wanted = key["accepted"][0]
-        alarm = answer["verdict"] != "adequate"
-        listed = key["kind"] == "listed"
-        tally["worlds"] += 1
-        if key["kind"] == "null":
-            outcome = "false alarms" if alarm else None
-        elif said == wanted and alarm and (listed or answer["verdict"] == "unexplained"):
-            outcome = "named"
-        elif wanted in others:
-            outcome = "among the named"
-        else:
-            outcome = "wrong names" if answer["verdict"] in ("explained", "ambiguous") or not listed and said else "missed"
-        if outcome:
-            tally[outcome] += 1
-        values = []
-        found = {p["name"]: p for m in answer["mechanisms"] for p in m["parameters"] if m["id"] in wanted}
-        for mechanism in key["mechanisms"]:
-            for name, value in mechanism["parameters"].items():
-                if name in found:
-                    low, high = found[name]["ci95"]
-                    values.append(f"{name} {value:g}: {found[name]['value']:.4g} [{low:.4g}, {high:.4g}]")
+        said = "+".join(sorted(answer["chosen"])) or answer["verdict"]
+        others = ["+".join(sorted(s)) for s in answer["confused_with"]]
+        result = outcome(key, answer)
+        hidden = "+".join(key["accepted"][0]) or ("nothing" if key["kind"] == "null" else "something unlisted")
+        answers = table.setdefault(hidden, {})
+        answers[said] = answers.get(said, 0) + 1
+        tally[result] = tally.get(result, 0) + 1
         print(
-            f"{at.name:12} {answer['verdict']:12} {'+'.join(said) or '-':32} p {answer['p_value']:<8.2g} "
-            f"{outcome or 'right':16} {time.monotonic() - begun:4.0f} s  {'; '.join(values)}"
-            + (f"  (or {', '.join('+'.join(o) for o in others)})" if others else ""),
+            f"{at.name:18} {answer['verdict']:12} {said:32} p {answer['p_value']:<8.2g} "
+            f"{result:16} {time.monotonic() - begun:4.0f} s  {'; '.join(strengths(key, answer))}"
+            + (f"  (or {', '.join(others)})" if others else ""),
             flush=True,
         )
-    print(", ".join(f"{name} {count}" for name, count in tally.items()))
+    print("\n| hidden | worlds | answers |\n|---|---|---|")
+    for hidden, answers in sorted(table.items()):
+        each = ", ".join(f"{said} {n}" for said, n in sorted(answers.items(), key=lambda a: -a[1]))
+        print(f"| {hidden} | {sum(answers.values())} | {each} |")
+    print("\n" + ", ".join(f"{name} {count}" for name, count in sorted(tally.items())))
 
 
 def main():
@@ -224,18 +299,21 @@ def main():
     commands = parser.add_subparsers(dest="command", required=True)
     making = commands.add_parser("make")
     making.add_argument("folder", type=pathlib.Path)
-    making.add_argument("--worlds", nargs="*", default=list(WORLDS), choices=list(WORLDS))
+    making.add_argument("--seed", type=int, default=1)
+    making.add_argument("--kinds", nargs="*", default=list(KINDS), choices=list(KINDS))
     scoring = commands.add_parser("score")
     scoring.add_argument("folder", type=pathlib.Path)
     scoring.add_argument("program")
     options = parser.parse_args()
     if options.command == "score":
         return score(options.folder, options.program)
-    for name in options.worlds:
+    if not grains.installed("liggghts"):
+        sys.exit("liggghts is not installed: these worlds are poured by it (Debian: apt install liggghts)")
+    for kind in options.kinds:
         try:
-            make(options.folder / name, name)
+            make(options.folder, kind, options.seed)
         except RuntimeError as error:
-            print(f"{name}: {error}", file=sys.stderr)
+            print(f"{kind}: {error}", file=sys.stderr)
 
 
 if __name__ == "__main__":
