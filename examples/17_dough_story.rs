@@ -62,7 +62,15 @@ impl Size {
             Self { trained, recorded, days: 1, first, goals: vec![4.0], rollouts: 2, replicates: 19 }
         } else {
             let (trained, recorded) = ([20, 24], [5, 12]);
-            Self { trained, recorded, days: 4, first, goals: vec![4.0, 5.0, 6.0], rollouts: 3, replicates: 199 }
+            Self {
+                trained,
+                recorded,
+                days: 4,
+                first,
+                goals: vec![4.0, 5.0, 6.0],
+                rollouts: 3,
+                replicates: 199,
+            }
         })
     }
 }
@@ -89,7 +97,8 @@ fn main() -> Outcome<()> {
         "learned from {} doughs of up to {} random rolls, each day anew; recorded: {} doughs of up to {}",
         trained[0], trained[1], recorded[0], recorded[1]
     );
-    let days: Vec<Day> = (0..size.days).map(|day| live(size.first + day, &size, band)).collect::<Outcome<_>>()?;
+    let days: Vec<Day> =
+        (0..size.days).map(|day| live(size.first + day, &size, band)).collect::<Outcome<_>>()?;
     println!(
         "\nall days, {} rollouts to each goal: rolls, and doughs that missed it",
         size.days * size.rollouts

@@ -6,9 +6,9 @@ use argmin::core::{CostFunction, Error, Executor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 use crate::dynamics::{LearnError, Own, Roll};
-use crate::filter::{Fresh, Noise, Step, follow};
+use crate::filter::{Fresh, Noise, follow};
 use crate::powell::Powell;
-use crate::sensitivity::{COURSES, OWN, PER_ROLL, courses, sensitivity, white};
+use crate::sensitivity::{COURSES, OWN, PER_ROLL, courses, sensitivity, surprise, white};
 use crate::surface::Surface;
 
 /// Rounds of following the doughs, and learning again from where this leads.
@@ -116,8 +116,8 @@ impl Learning<'_> {
         let n = 3 * self.surface.terms_of_each();
         let mut sums = Sums { square: DMatrix::zeros(n, n), pull: DVector::zeros(n), own: Vec::new() };
         for (at, dough) in self.doughs.iter().enumerate() {
-            let steps =
-                follow(dough, &fresh, &self.noise, 0.0, |i, x| x + self.surface.change(x, &dough[i].action));
+            let next = |i: usize, x: &Vector3<f64>| x + self.surface.change(x, &dough[i].action);
+            let steps = follow(dough, &fresh, &self.noise, 0.0, |_| 0.0, next);
             let terms = |i: usize| self.surface.slopes(&steps[i].state, &dough[i].action);
             let all = sensitivity(&steps, terms, |_| 1.0, n / 3);
             let (off, shared, own) = (white(&steps), all.columns(0, n), all.columns(n, OWN));
@@ -284,12 +284,9 @@ impl CostFunction for Process<'_, '_> {
                 let level: Vector3<f64> = own.courses.iter().zip(&courses).map(|(own, c)| own * c[i]).sum();
                 x + (1.0 + own.softness) * surface.change(x, &dough[i].action) + level
             };
-            for Step { before, after, .. } in follow(dough, &fresh, &noise, 0.0, next) {
-                for innovation in [before, after] {
-                    spread += 2.0 * innovation.factor.diagonal().map(f64::ln).sum();
-                    square += innovation.white().norm_squared();
-                }
-            }
+            let of = surprise(&follow(dough, &fresh, &noise, 0.0, |_| 0.0, next));
+            spread += of.spread;
+            square += of.square;
         }
         // What was learned from these innovations has made them smaller.
         let rows = PER_ROLL as f64 * doughs.iter().map(Vec::len).sum::<usize>() as f64;

@@ -17,6 +17,25 @@ pub fn white(steps: &[Step]) -> DVector<f64> {
     DVector::from_iterator(PER_ROLL * steps.len(), rolls.flat_map(|w| [w[0], w[1], w[2]]))
 }
 
+/// How unlikely the innovations of a dough are: the two parts of minus twice the logarithm of their likelihood, but for a constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surprise {
+    /// Logarithm of the determinant of their covariance.
+    pub spread: f64,
+    /// Sum of squares of [`white`].
+    pub square: f64,
+}
+
+/// How unlikely innovations are.
+pub fn surprise(steps: &[Step]) -> Surprise {
+    let mut all = Surprise { spread: 0.0, square: 0.0 };
+    for innovation in steps.iter().flat_map(|s| [&s.before, &s.after]) {
+        all.spread += 2.0 * innovation.factor.diagonal().map(f64::ln).sum();
+        all.square += innovation.white().norm_squared();
+    }
+    all
+}
+
 /// Derivatives of [`white`]: with respect to the coefficients of each dimension's change, one dimension after the other, and (the last
 /// [`OWN`] columns) to what the dough does for itself.
 ///

@@ -57,7 +57,8 @@ impl Surface {
         let states: Vec<Vector3<f64>> = rolls.iter().map(|r| Vector3::from(r.state)).collect();
         let mean_m = states.iter().sum::<Vector3<f64>>() / n.max(1) as f64;
         let usual = usual_size(&states).unwrap_or_default();
-        let rows: Vec<Vec<f64>> = rolls.iter().zip(&states).map(|(r, s)| inputs(s, &r.action, &usual)).collect();
+        let rows: Vec<Vec<f64>> =
+            rolls.iter().zip(&states).map(|(r, s)| inputs(s, &r.action, &usual)).collect();
         let mut features = Polynomial::standardised(&rows, REMAINDER);
         // A size is as much as the same ratio of lengths.
         features.scale_as(SIZE, 0);
@@ -69,8 +70,7 @@ impl Surface {
         let sizeless: Vec<usize> = (0..free).filter(|&term| features.power(term, SIZE) == 0).collect();
         let terms: Vec<Vec<f64>> = rows.iter().map(|r| features.terms(r)).collect();
         let design = DMatrix::from_fn(n, sizeless.len(), |i, j| terms[i][sizeless[j]] * weights[sizeless[j]]);
-        let change =
-            DMatrix::from_fn(n, 3, |i, k| (rolls[i].next[k] / rolls[i].state[k] - 1.0) * mean_m[k]);
+        let change = DMatrix::from_fn(n, 3, |i, k| (rolls[i].next[k] / rolls[i].state[k] - 1.0) * mean_m[k]);
         if design.iter().chain(change.iter()).any(|v| !v.is_finite()) {
             return Err(Self::undetermined());
         }

@@ -129,7 +129,14 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
         let first: Vec<[f64; 3]> = others.iter().map(|d| d[0].state).collect();
         let fresh = Fresh::of(&first, dynamics.noise());
         let follow_one = |dough: &Vec<Roll>| {
-            follow(dough, &fresh, dynamics.noise(), 0.0, |i, x| x + dynamics.change(x, &dough[i].action))
+            follow(
+                dough,
+                &fresh,
+                dynamics.noise(),
+                0.0,
+                |_| 0.0,
+                |i, x| x + dynamics.change(x, &dough[i].action),
+            )
         };
         let steps: Vec<_> = others.iter().map(follow_one).collect();
         let answers: Vec<_> =
@@ -178,7 +185,8 @@ fn innovations_are_white() {
     let fresh = Fresh::of(&first, &noise);
     let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);
     for dough in &doughs {
-        let steps = follow(dough, &fresh, &noise, 0.0, |i, x| law((*x).into(), dough[i].action, 0.0).into());
+        let steps =
+            follow(dough, &fresh, &noise, 0.0, |_| 0.0, |i, x| law((*x).into(), dough[i].action, 0.0).into());
         for step in &steps {
             squares += step.after.white().norm_squared();
             tied += step.after.white().dot(&step.before.white());

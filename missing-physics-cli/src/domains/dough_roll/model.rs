@@ -7,7 +7,7 @@ use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::{Dynamics, Roll};
 use dough_mbrl::filter::{Fresh, Step as Followed, follow};
 use dough_mbrl::repair::answered;
-use dough_mbrl::sensitivity::{PER_ROLL, white};
+use dough_mbrl::sensitivity::{PER_ROLL, surprise, white};
 use dough_mbrl::tie::Tie;
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
@@ -95,10 +95,11 @@ impl DoughModel {
         runs.iter().enumerate().map(|(k, (label, _))| self.shown(label, k)).collect()
     }
 
-    /// The common response, springback and loss that make the innovations least, one after the other.
+    /// The common response, springback and loss that are most likely, one after the other.
     fn at_first_sight(&self, doughs: &[Dough], fresh: &Fresh) -> Effects {
         let cost = |effects: &Effects| -> f64 {
-            doughs.iter().map(|d| white(&self.follow(d, fresh, effects)).norm_squared()).sum()
+            let off = |d| surprise(&self.follow(d, fresh, effects));
+            doughs.iter().map(off).map(|s| s.spread + s.square).sum()
         };
         let mut shown = Effects::OFF;
         for _ in 0..2 {
@@ -116,21 +117,30 @@ impl DoughModel {
     fn tie(&self, doughs: &[Dough], fresh: &Fresh, shown: &Effects) -> Tie {
         let answers = |dough: &Dough| {
             let steps = self.follow(dough, fresh, shown);
-            self.dynamics.unlearned(&steps, &dough.rolls, |_| shown.factor)
+            self.dynamics
+                .unlearned(&steps, &dough.rolls, |i| self.response(dough, i, shown, steps[i].state[0]))
         };
         Tie::new(&doughs.iter().map(answers).collect::<Vec<_>>())
     }
 
     fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
         let left = (1.0 - effects.volume_loss).max(0.0).cbrt();
-        follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, |i, x| {
-            let step = &dough.steps[i];
-            let [throw, depth] = step.roll.action;
-            let response =
-                effects.response(step.step, step.t_s, self.band.force_n(throw, depth), throw, x[0]);
-            let learned = x + self.dynamics.change(x, &step.roll.action);
+        let unsure = |i: usize| effects.unsure(self.force_n(&dough.steps[i]));
+        follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, unsure, |i, x| {
+            let response = self.response(dough, i, effects, x[0]);
+            let learned = x + self.dynamics.change(x, &dough.steps[i].roll.action);
             left * Vector3::from(answered(&(*x).into(), &learned.into(), response))
         })
+    }
+
+    /// What of the learned response of a roll takes place.
+    fn response(&self, dough: &Dough, roll: usize, effects: &Effects, length_m: f64) -> f64 {
+        let step = &dough.steps[roll];
+        effects.response(step.step, step.t_s, self.force_n(step), step.roll.action[0], length_m)
+    }
+
+    fn force_n(&self, step: &Step) -> f64 {
+        self.band.force_n(step.roll.action[0], step.roll.action[1])
     }
 
     /// The errors of a block under some effects: independent, of variance one.
@@ -177,7 +187,7 @@ impl DoughModel {
             expected(2),
             of(&|s| s.roll.action[0]),
             of(&|s| s.roll.action[1]),
-            of(&|s| self.band.force_n(s.roll.action[0], s.roll.action[1])),
+            of(&|s| self.force_n(s)),
         ];
         let channel = |c: usize| {
             let of = |i| self.scale[c] * block.off[dough.first + PER_ROLL * i + c];
