@@ -60,6 +60,8 @@ pub struct ChannelNoise {
     pub source: NoiseSource,
     /// The part of the variance that is correlated from row to row, in [0, 1].
     pub correlated_share: f64,
+    /// Correlation length of that part in rows; 0 for white noise.
+    pub correlation_rows: f64,
     /// Correlation length of that part along the noise variable, in that variable's unit; 0 for white noise.
     pub correlation_length: f64,
 }

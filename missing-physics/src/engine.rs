@@ -1,15 +1,10 @@
 //! The diagnosis from end to end.
 
-use rayon::prelude::*;
-
-use crate::adequacy;
-use crate::compare::{Candidate, HeldOut, candidate, confusion, held_out, nested, search};
+use crate::adequacy::{self, Adequacy};
+use crate::answer::Answer;
+use crate::compare::{Candidate, HeldOut, candidate, confusion, held_out, search};
 use crate::data::{Recording, RecordingError};
-use crate::diagnosis::{
-    ChannelFit, ChannelNoise, Confusion, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport,
-    Verdict,
-};
-use crate::estimate::{estimates, of_mechanism};
+use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Outlier, Verdict};
 use crate::experiment;
 use crate::fit::{Fit, NoiseRule, NoiseState, fit, solve};
 use crate::law;
@@ -20,7 +15,7 @@ use crate::noise_rule::noise_rule;
 use crate::observer::{Observer, Progress};
 use crate::outliers::set_aside;
 use crate::problem::Problem;
-use crate::repaired::Repaired;
+use crate::ranking::{Best, Ranking};
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,11 +73,6 @@ pub enum DiagnoseError {
     #[error("stopped")]
     Stopped,
 }
-
-/// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
-const RIVAL_GAP: f64 = 3.0;
-/// A richer set must beat an adequate simpler one by this log evidence.
-const EARNED: f64 = 3.0;
 
 /// Diagnoses a recording: is the baseline adequate; if not, where does it miss, and which mechanisms explain it?
 ///
@@ -152,173 +142,169 @@ fn diagnose_with(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let tell = |stage: &str, done: f64| -> Result<(), DiagnoseError> {
-        if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }
-    };
-    tell("reading the noise", 0.0)?;
-    let Begun { problem, outliers, rule, baseline, start } = begin(model, recording, options)?;
-    let (rows, unknowns) = enough_rows(&problem)?;
-    // What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
-    let white =
-        NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(&problem, &rule, &start) };
-    let plain = Candidate {
-        fit: solve(&problem, &baseline.selection, &white, &start.shared, &start.own)?,
-        ..baseline.clone()
-    };
-    let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
-    tell("adequacy of the baseline", 0.0)?;
-    let test = |c: &Candidate, stream: u64| {
-        let rivals: Vec<usize> = everything.iter().copied().filter(|m| !c.set.contains(m)).collect();
-        let seed = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ stream;
-        adequacy::test(&problem, &c.selection, &c.fit, &rivals, &rule, options.replicates, seed)
-    };
-    let adequacy = test(&baseline, 1)?;
-    tell("adequacy of the baseline", 1.0)?;
-
-    let mut work = Work {
-        problem: &problem,
-        rule: &rule,
-        baseline: &baseline,
-        plain: &plain.fit,
-        outliers,
-        rows,
-        unknowns,
-    };
-    if adequacy.p_value > options.alpha {
-        let mut diagnosis = work.skeleton(&adequacy, Verdict::Adequate, &baseline)?;
-        diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
-        diagnosis.after = diagnosis.before.clone();
-        return Ok(diagnosis);
-    }
-
-    tell("comparing mechanisms", 0.0)?;
-    let competing = rule.competing();
-    let among = candidate(&problem, &competing, &[], &[], &baseline.fit, &[])?;
-    let all = search(&problem, &competing, among, &everything, &|done| {
-        observer.progress(Progress { stage: "comparing mechanisms", done })
-    })
-    .ok_or(DiagnoseError::Stopped)?;
-    let mut physical: Vec<&Candidate> =
-        all.iter().filter(|c| c.ruled_out.is_none() && c.evidence.is_finite()).collect();
-    physical.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    let probability = probabilities(&physical);
-
-    tell("adequacy of the best explanation", 0.0)?;
-    // The chosen set has been selected to fit: only a clear failure (a fifth of alpha) speaks against it.
-    let enough = options.alpha / 5.0;
-    // The baseline has been rejected: it is no candidate any more, however cheap it is.
-    let mut best: Option<(&Candidate, f64)> = None;
-    let mut failing = String::new();
-    if let Some(&first) = physical.iter().find(|c| !c.set.is_empty()) {
-        let tested = test(first, 2)?;
-        failing = tested.tests.first().map_or_else(String::new, |t| t.name.clone());
-        let mut current = (first, tested.p_value);
-        loop {
-            let simpler = physical.iter().find(|c| {
-                !c.set.is_empty()
-                    && c.selection.shared.len() + c.selection.own.len()
-                        < current.0.selection.shared.len() + current.0.selection.own.len()
-                    && nested(c, current.0)
-                    && c.evidence > current.0.evidence - EARNED
-            });
-            let Some(&simpler) = simpler else { break };
-            let p = test(simpler, 3)?.p_value;
-            if p <= options.alpha && p < current.1 {
-                break;
-            }
-            current = (simpler, p);
-        }
-        best = Some(current);
-    }
-    tell("predicting unseen data", 0.0)?;
-    let base_score = held_out(&problem, &baseline)?;
-    let scores: Vec<Option<HeldOut>> = all
-        .par_iter()
-        .map(|c| {
-            let wanted = c.set.len() <= 1 || best.is_some_and(|b| b.0.set == c.set);
-            if wanted && c.evidence.is_finite() { held_out(&problem, c).ok() } else { None }
-        })
-        .collect();
-    let score_of = |set: &[usize]| all.iter().position(|c| c.set == set).and_then(|i| scores[i].as_ref());
-    let explained = best
-        .filter(|(c, p)| *p > enough && score_of(&c.set).is_some_and(|s| s.log_score > base_score.log_score));
-
-    let final_model = explained.map_or(&baseline, |(c, _)| c);
-    let mut diagnosis = work.skeleton(&adequacy, Verdict::Unexplained, final_model)?;
-    diagnosis.before = work.errors(&plain.fit, &held_out(&problem, &plain)?)?;
-    diagnosis.after = diagnosis.before.clone();
-    work.mechanisms(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best.map(|b| b.0));
-    work.sets(&mut diagnosis, &all, &scores, &base_score, &physical, &probability, best);
-    let sigma = match explained {
-        Some((c, _)) => c.fit.noise.sigma.clone(),
-        None => rough_sigmas(&problem, &rule, &baseline.fit),
-    };
-    diagnosis.location = locate(&problem, &baseline.selection, &plain.fit, &sigma)?;
-
-    if let Some((chosen, p)) = explained {
-        diagnosis.final_p_value = Some(p);
-        diagnosis.chosen = work.ids(&chosen.set);
-        if let Some(score) = score_of(&chosen.set) {
-            diagnosis.after = work.errors(&chosen.fit, score)?;
-        }
-        work.draw(&mut diagnosis, &chosen.fit)?;
-        tell("telling the rivals apart", 0.0)?;
-        let mut rivals = vec![chosen];
-        rivals.extend(physical.iter().copied().filter(|c| {
-            c.set != chosen.set
-                && !c.set.is_empty()
-                && c.evidence > chosen.evidence - RIVAL_GAP
-                && !nested(chosen, c)
-                && !nested(c, chosen)
-        }));
-        keep_minimal(&mut rivals);
-        rivals.truncate(6);
-        if rivals.len() > 1 {
-            diagnosis.verdict = Verdict::Ambiguous;
-            diagnosis.confused_with = rivals[1..].iter().map(|c| work.ids(&c.set)).collect();
-            let matrix = confusion(&problem, &competing, &rivals, 100, options.seed)?;
-            diagnosis.confusion =
-                Some(Confusion { sets: rivals.iter().map(|c| work.ids(&c.set)).collect(), matrix });
-            tell("choosing the next experiment", 0.0)?;
-            diagnosis.next_experiment = experiment::best(&problem, &rivals, experiments);
-            let names: Vec<String> = rivals.iter().map(|c| work.names(&c.set)).collect();
-            diagnosis.undetermined.push(format!("{} cannot be told apart in these data", listed(&names)));
-            if diagnosis.next_experiment.is_none() {
-                diagnosis.undetermined.push("no experiment in the rig's range would separate them".into());
-            }
-        } else {
-            diagnosis.verdict = Verdict::Explained;
-        }
-    } else {
-        if let Some((closest, p)) = best {
-            let but = if p > enough {
-                "it predicts data that it has not seen no better than the baseline".to_owned()
-            } else {
-                format!("it leaves a misfit of its own (p = {p:.3}; {failing})")
-            };
-            diagnosis
-                .remarks
-                .push(format!("the closest explanation is {}, but {but}", work.names(&closest.set)));
-        }
-        tell("looking for a law in the residual", 0.0)?;
-        if let Some(found) = law::find(&problem, &competing, &baseline, &base_score)? {
-            diagnosis.after = work.errors_of(&found.predictions, &found.held_out);
-            for (run, curves) in diagnosis.curves.iter_mut().enumerate() {
-                curves.after.clone_from(&found.predictions[run]);
-            }
-            diagnosis.noise = work.noise(&found.fit);
-            diagnosis.law = Some(found.law);
-        }
-    }
-    tell("done", 1.0)?;
-    Ok(diagnosis)
+    tell(observer, "reading the noise", 0.0)?;
+    let begun = begin(model, recording, options)?;
+    let plain = plain(&begun)?;
+    Course { begun: &begun, plain: &plain, experiments, options, observer }.run()
 }
 
-/// Drops rivals that only add to another rival.
-fn keep_minimal(rivals: &mut Vec<&Candidate>) {
-    let all = rivals.clone();
-    rivals
-        .retain(|c| !all.iter().any(|o| o.set != c.set && nested(o, c) && o.evidence > c.evidence - EARNED));
+fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseError> {
+    if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }
+}
+
+/// What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
+fn plain(begun: &Begun<'_>) -> Result<Candidate, PredictError> {
+    let Begun { problem, rule, baseline, start, .. } = begun;
+    let white = NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(problem, rule, start) };
+    let fit = solve(problem, &baseline.selection, &white, &start.shared, &start.own)?;
+    Ok(Candidate { fit, ..baseline.clone() })
+}
+
+/// The way from a fitted baseline to an answer.
+struct Course<'a> {
+    begun: &'a Begun<'a>,
+    plain: &'a Candidate,
+    experiments: &'a [Experiment],
+    options: &'a Options,
+    observer: &'a dyn Observer,
+}
+
+impl Course<'_> {
+    fn tell(&self, stage: &str, done: f64) -> Result<(), DiagnoseError> {
+        tell(self.observer, stage, done)
+    }
+
+    /// Is a candidate adequate?
+    fn test(&self, candidate: &Candidate, stream: u64) -> Result<Adequacy, PredictError> {
+        let Begun { problem, rule, .. } = self.begun;
+        let rivals: Vec<usize> =
+            (0..problem.spec().mechanisms.len()).filter(|m| !candidate.set.contains(m)).collect();
+        let seed = self.options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ stream;
+        let replicates = self.options.replicates;
+        adequacy::test(problem, &candidate.selection, &candidate.fit, &rivals, rule, replicates, seed)
+    }
+
+    fn run(&self) -> Result<Diagnosis, DiagnoseError> {
+        let Begun { problem, rule, baseline, .. } = self.begun;
+        self.tell("adequacy of the baseline", 0.0)?;
+        let adequacy = self.test(baseline, 1)?;
+        self.tell("adequacy of the baseline", 1.0)?;
+        let answer =
+            Answer { problem, rule, baseline, plain: &self.plain.fit, outliers: &self.begun.outliers };
+        if adequacy.p_value > self.options.alpha {
+            return Ok(answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?);
+        }
+        let mut ranking = self.compare()?;
+        self.tell("adequacy of the best explanation", 0.0)?;
+        let best = ranking.best(self.options.alpha, |c, stream| self.test(c, stream))?;
+        self.tell("predicting unseen data", 0.0)?;
+        ranking.score(problem, best.as_ref());
+        // The chosen set has been selected to fit: only a clear failure (a fifth of alpha) speaks against it.
+        let fails = |best: &Best| best.p_value <= self.options.alpha / 5.0;
+        let explained = best.as_ref().filter(|b| !fails(b) && ranking.gains(b.at));
+
+        let ended_with = explained.map_or(baseline, |b| ranking.at(b.at));
+        let mut diagnosis =
+            answer.skeleton(&adequacy, Verdict::Unexplained, ended_with, self.before(&answer)?)?;
+        diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref());
+        diagnosis.sets = answer.sets(&ranking, best.as_ref());
+        let sigma = match explained {
+            Some(_) => ended_with.fit.noise.sigma.clone(),
+            None => rough_sigmas(problem, rule, &baseline.fit),
+        };
+        diagnosis.location = locate(problem, &baseline.selection, &self.plain.fit, &sigma)?;
+        if let Some(chosen) = explained {
+            diagnosis.final_p_value = Some(chosen.p_value);
+            self.explained(&mut diagnosis, &answer, &ranking, chosen.at)?;
+        } else {
+            if let Some(closest) = &best {
+                diagnosis.remarks.push(answer.closest(ranking.at(closest.at), closest, fails(closest)));
+            }
+            self.unexplained(&mut diagnosis, &answer, ranking.base())?;
+        }
+        self.tell("done", 1.0)?;
+        Ok(diagnosis)
+    }
+
+    /// Errors of the plain simulation.
+    fn before(&self, answer: &Answer<'_>) -> Result<Vec<ChannelFit>, PredictError> {
+        answer.errors(&self.plain.fit, &held_out(&self.begun.problem, self.plain)?)
+    }
+
+    /// Every set of mechanisms worth looking at, fitted.
+    fn compare(&self) -> Result<Ranking, DiagnoseError> {
+        const STAGE: &str = "comparing mechanisms";
+        let Begun { problem, rule, baseline, .. } = self.begun;
+        self.tell(STAGE, 0.0)?;
+        let competing = rule.competing();
+        let among = candidate(problem, &competing, &[], &[], &baseline.fit, &[])?;
+        let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
+        let progress = |done| self.observer.progress(Progress { stage: STAGE, done });
+        let all = search(problem, &competing, among, &everything, &progress).ok_or(DiagnoseError::Stopped)?;
+        Ok(Ranking::new(all, held_out(problem, baseline)?))
+    }
+
+    /// A set explains the data: does another as well, and what would tell them apart?
+    fn explained(
+        &self,
+        diagnosis: &mut Diagnosis,
+        answer: &Answer<'_>,
+        ranking: &Ranking,
+        at: usize,
+    ) -> Result<(), DiagnoseError> {
+        let problem = &self.begun.problem;
+        let chosen = ranking.at(at);
+        diagnosis.chosen = answer.ids(&chosen.set);
+        let after = law::predictions(problem, &chosen.fit)?;
+        if let Some(score) = ranking.score_of(&chosen.set) {
+            diagnosis.after = answer.errors_of(&after, score);
+        }
+        draw(diagnosis, &after);
+        self.tell("telling the rivals apart", 0.0)?;
+        let rivals = ranking.rivals(chosen);
+        if rivals.len() == 1 {
+            diagnosis.verdict = Verdict::Explained;
+            return Ok(());
+        }
+        diagnosis.verdict = Verdict::Ambiguous;
+        let mut sets: Vec<Vec<String>> = rivals.iter().map(|c| answer.ids(&c.set)).collect();
+        let matrix = confusion(problem, &self.begun.rule.competing(), &rivals, 100, self.options.seed)?;
+        diagnosis.confusion = Some(Confusion { sets: sets.clone(), matrix });
+        diagnosis.confused_with = sets.split_off(1);
+        self.tell("choosing the next experiment", 0.0)?;
+        diagnosis.next_experiment = experiment::best(problem, &rivals, self.experiments);
+        let names: Vec<String> = rivals.iter().map(|c| answer.names(&c.set)).collect();
+        diagnosis.undetermined.push(format!("{} cannot be told apart in these data", listed(&names)));
+        if diagnosis.next_experiment.is_none() {
+            diagnosis.undetermined.push("no experiment in the rig's range would separate them".into());
+        }
+        Ok(())
+    }
+
+    /// Nothing on the list explains the data: is there a law in what is left?
+    fn unexplained(
+        &self,
+        diagnosis: &mut Diagnosis,
+        answer: &Answer<'_>,
+        base: &HeldOut,
+    ) -> Result<(), DiagnoseError> {
+        let Begun { problem, rule, baseline, .. } = self.begun;
+        self.tell("looking for a law in the residual", 0.0)?;
+        if let Some(found) = law::find(problem, &rule.competing(), baseline, base)? {
+            diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);
+            draw(diagnosis, &found.predictions);
+            diagnosis.noise = answer.noise(&found.fit);
+            diagnosis.law = Some(found.law);
+        }
+        Ok(())
+    }
+}
+
+/// Puts what a fit predicts into the curves.
+fn draw(diagnosis: &mut Diagnosis, predictions: &[Vec<Vec<f64>>]) {
+    for (curves, after) in diagnosis.curves.iter_mut().zip(predictions) {
+        curves.after.clone_from(after);
+    }
 }
 
 fn listed(names: &[String]) -> String {
@@ -345,15 +331,16 @@ fn check(recording: &Recording, options: &Options) -> Result<(), DiagnoseError> 
     Ok(())
 }
 
-/// Measured values and unknowns of the baseline, where the former are more.
-fn enough_rows(problem: &Problem<'_>) -> Result<(usize, usize), DiagnoseError> {
+/// Measured values, and unknowns of the baseline and its noise.
+pub(crate) fn size(problem: &Problem<'_>) -> (usize, usize) {
     let selection = problem.select(&[], &[]);
     let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-    let unknowns = selection.shared.len() + selection.own.len() * problem.rows.len() + problem.channels();
-    if rows <= unknowns {
-        return Err(DiagnoseError::TooFewRows { rows, parameters: unknowns });
-    }
-    Ok((rows, unknowns))
+    (rows, selection.shared.len() + selection.own.len() * problem.rows.len() + problem.channels())
+}
+
+fn enough_rows(problem: &Problem<'_>) -> Result<(), DiagnoseError> {
+    let (rows, parameters) = size(problem);
+    if rows <= parameters { Err(DiagnoseError::TooFewRows { rows, parameters }) } else { Ok(()) }
 }
 
 /// Sigma of each channel's rough part, whatever the model: what is left once everything smooth is taken away.
@@ -375,226 +362,4 @@ fn rough_sigmas(problem: &Problem<'_>, rule: &NoiseRule, fallback: &Fit) -> Vec<
                 .map_or(fallback.noise.sigma[c], |s| s.max(rule.floor[c]))
         })
         .collect()
-}
-
-fn probabilities(physical: &[&Candidate]) -> Vec<f64> {
-    let most = physical.iter().map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = physical.iter().map(|c| (c.evidence - most).exp()).collect();
-    let total: f64 = weights.iter().sum();
-    weights.into_iter().map(|w| w / total).collect()
-}
-
-/// What the parts of a diagnosis are made from.
-struct Work<'a> {
-    problem: &'a Problem<'a>,
-    rule: &'a NoiseRule,
-    baseline: &'a Candidate,
-    plain: &'a Fit,
-    outliers: Vec<Outlier>,
-    rows: usize,
-    unknowns: usize,
-}
-
-impl Work<'_> {
-    fn ids(&self, set: &[usize]) -> Vec<String> {
-        set.iter().map(|&m| self.problem.spec().mechanisms[m].id.clone()).collect()
-    }
-
-    fn names(&self, set: &[usize]) -> String {
-        let names: Vec<String> =
-            set.iter().map(|&m| self.problem.spec().mechanisms[m].name.clone()).collect();
-        names.join(" with ")
-    }
-
-    fn skeleton(
-        &mut self,
-        adequacy: &adequacy::Adequacy,
-        verdict: Verdict,
-        model: &Candidate,
-    ) -> Result<Diagnosis, PredictError> {
-        let recording = &self.problem.recording;
-        let pairs =
-            |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
-        let mut remarks = Vec::new();
-        if !self.baseline.fit.converged {
-            remarks.push("the baseline's fit did not converge; its best estimate is used".to_owned());
-        }
-        if self.rows < 3 * self.unknowns {
-            remarks.push(format!("few data: {} measured values for {} unknowns", self.rows, self.unknowns));
-        }
-        let free: Vec<usize> =
-            self.baseline.selection.shared.iter().map(|&slot| self.problem.shared.index[slot]).collect();
-        let mut diagnosis = Diagnosis {
-            verdict,
-            p_value: adequacy.p_value,
-            p_floor: adequacy.p_floor,
-            tests: adequacy.tests.clone(),
-            channels: pairs(&recording.channels),
-            variables: pairs(&recording.variables),
-            baseline: self.problem.spec().baseline.clone(),
-            baseline_parameters: estimates(self.problem, self.baseline, &free, &[], None),
-            noise: self.noise(&model.fit),
-            location: Vec::new(),
-            mechanisms: Vec::new(),
-            sets: Vec::new(),
-            chosen: Vec::new(),
-            confused_with: Vec::new(),
-            confusion: None,
-            final_p_value: None,
-            before: Vec::new(),
-            after: Vec::new(),
-            law: None,
-            next_experiment: None,
-            undetermined: Vec::new(),
-            outliers: std::mem::take(&mut self.outliers),
-            remarks,
-            repaired: Repaired::of(self.problem, model),
-            curves: Vec::new(),
-        };
-        let before = law::predictions(self.problem, self.plain)?;
-        diagnosis.curves = recording
-            .runs
-            .iter()
-            .zip(before)
-            .map(|(run, before)| Curves {
-                run: run.label.clone(),
-                inputs: run.inputs.clone(),
-                measured: run.outputs.clone(),
-                after: before.clone(),
-                before,
-            })
-            .collect();
-        Ok(diagnosis)
-    }
-
-    fn noise(&self, fit: &Fit) -> Vec<ChannelNoise> {
-        let recording = &self.problem.recording;
-        (0..self.problem.channels())
-            .map(|c| {
-                let shape = self.problem.family.shape(fit.noise.shape[c]);
-                ChannelNoise {
-                    channel: recording.channels[c].name.clone(),
-                    sigma: fit.noise.sigma[c],
-                    source: match (self.rule.fixed_sigma[c], recording.calibration.get(c)) {
-                        (None, _) => NoiseSource::Differences,
-                        (Some(_), Some(Some(_))) => NoiseSource::Calibration,
-                        (Some(_), _) => NoiseSource::Replicates,
-                    },
-                    correlated_share: shape.correlated,
-                    correlation_length: shape.length_steps * self.problem.step,
-                }
-            })
-            .collect()
-    }
-
-    fn errors(&self, fit: &Fit, score: &HeldOut) -> Result<Vec<ChannelFit>, PredictError> {
-        Ok(self.errors_of(&law::predictions(self.problem, fit)?, score))
-    }
-
-    fn errors_of(&self, predictions: &[Vec<Vec<f64>>], score: &HeldOut) -> Vec<ChannelFit> {
-        let recording = &self.problem.recording;
-        (0..self.problem.channels())
-            .map(|c| {
-                let squares = recording.runs.iter().zip(predictions).flat_map(|(run, predicted)| {
-                    run.outputs[c]
-                        .iter()
-                        .zip(&predicted[c])
-                        .map(|(m, p)| (m - p).powi(2))
-                        .filter(|v| v.is_finite())
-                });
-                let (sum, n) = squares.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
-                ChannelFit {
-                    channel: recording.channels[c].name.clone(),
-                    rmse: (sum / n.max(1) as f64).sqrt(),
-                    heldout_rmse: score.rmse[c],
-                }
-            })
-            .collect()
-    }
-
-    fn draw(&self, diagnosis: &mut Diagnosis, fit: &Fit) -> Result<(), PredictError> {
-        for (curves, after) in diagnosis.curves.iter_mut().zip(law::predictions(self.problem, fit)?) {
-            curves.after = after;
-        }
-        Ok(())
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "the parts of one table")]
-    fn mechanisms(
-        &self,
-        diagnosis: &mut Diagnosis,
-        all: &[Candidate],
-        scores: &[Option<HeldOut>],
-        base: &HeldOut,
-        physical: &[&Candidate],
-        probability: &[f64],
-        best: Option<&Candidate>,
-    ) {
-        let channels = &self.problem.recording.channels;
-        for (m, mechanism) in self.problem.spec().mechanisms.iter().enumerate() {
-            let single = all.iter().position(|c| c.set == [m]);
-            let holder = best
-                .filter(|c| c.set.contains(&m))
-                .or_else(|| physical.iter().copied().find(|c| c.set.contains(&m)))
-                .or_else(|| single.map(|i| &all[i]));
-            let Some(holder) = holder else { continue };
-            let alone = single.map(|i| &all[i]);
-            let score = all
-                .iter()
-                .position(|c| c.set == holder.set)
-                .and_then(|i| scores[i].as_ref())
-                .or_else(|| single.and_then(|i| scores[i].as_ref()));
-            let profile = best.is_some_and(|b| b.set == holder.set).then_some(self.rule);
-            diagnosis.mechanisms.push(MechanismReport {
-                id: mechanism.id.clone(),
-                name: mechanism.name.clone(),
-                equation: mechanism.equation.clone(),
-                reference: mechanism.reference.clone(),
-                probability: physical
-                    .iter()
-                    .zip(probability)
-                    .filter(|(c, _)| c.set.contains(&m))
-                    .map(|(_, p)| p)
-                    .sum::<f64>()
-                    .min(1.0),
-                parameters: of_mechanism(self.problem, holder, mechanism, profile),
-                heldout_log_score_gain: score.map_or(f64::NAN, |s| s.log_score - base.log_score),
-                heldout_rmse: score.map_or(Vec::new(), |s| {
-                    channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()
-                }),
-                ruled_out: alone.and_then(|c| c.ruled_out.clone()),
-            });
-        }
-        diagnosis.mechanisms.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "the parts of one table")]
-    fn sets(
-        &self,
-        diagnosis: &mut Diagnosis,
-        all: &[Candidate],
-        scores: &[Option<HeldOut>],
-        base: &HeldOut,
-        physical: &[&Candidate],
-        probability: &[f64],
-        best: Option<(&Candidate, f64)>,
-    ) {
-        diagnosis.sets = physical
-            .iter()
-            .zip(probability)
-            .take(12)
-            .map(|(c, &probability)| {
-                let at = all.iter().position(|o| o.set == c.set);
-                SetReport {
-                    ids: self.ids(&c.set),
-                    probability,
-                    p_value: best.filter(|b| b.0.set == c.set).map(|b| b.1),
-                    heldout_log_score_gain: at
-                        .and_then(|i| scores[i].as_ref())
-                        .map(|s| s.log_score - base.log_score),
-                    ruled_out: None,
-                }
-            })
-            .collect();
-    }
 }

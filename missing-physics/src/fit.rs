@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::data::Run;
-use crate::linalg::{backward, cholesky, determined, dot, forward, log_determinant};
+use crate::linalg::{backward, cholesky, determined, dot, forward, gram, log_determinant};
 use crate::model::{Model, PredictError};
 use crate::noise::Shape;
 use crate::problem::{Problem, Selection};
@@ -142,18 +142,6 @@ pub(crate) fn whitened_columns(
         push(free, residual);
     }
     Ok(columns)
-}
-
-fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
-    let n = columns.len();
-    let mut gram = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            gram[(i, j)] = dot(&columns[i], &columns[j]);
-            gram[(j, i)] = gram[(i, j)];
-        }
-    }
-    gram
 }
 
 /// Normal equations of one run with the prior of its own parameters, which come first, then the shared ones, then the residual.

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 mod adequacy;
+mod answer;
 mod bank;
 mod compare;
 pub mod data;
@@ -20,6 +21,7 @@ pub mod observer;
 mod outliers;
 mod own_prior;
 mod problem;
+mod ranking;
 pub mod repaired;
 mod step;
 pub mod synthetic;

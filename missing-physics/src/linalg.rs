@@ -16,6 +16,19 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
 }
 
+/// Dot products of columns with each other.
+pub(crate) fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
+    let n = columns.len();
+    let mut gram = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            gram[(i, j)] = dot(&columns[i], &columns[j]);
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    gram
+}
+
 /// Cholesky factor of a positive semidefinite matrix in place (lower triangle); a pivot below `floor` times its
 /// diagonal entry is dropped (its row and column count as zero). Returns which pivots were kept.
 pub(crate) fn cholesky(matrix: &mut DMatrix<f64>, floor: f64) -> Vec<bool> {
@@ -52,6 +65,19 @@ pub(crate) fn cholesky(matrix: &mut DMatrix<f64>, floor: f64) -> Vec<bool> {
         }
     }
     kept
+}
+
+/// Cholesky with pivots judged against the columns' sums of squares before elimination.
+pub(crate) fn cholesky_against(matrix: &mut DMatrix<f64>, scales: &[f64]) -> Vec<bool> {
+    for (i, scale) in scales.iter().enumerate() {
+        if matrix[(i, i)] <= 1e-9 * scale {
+            for j in 0..scales.len() {
+                matrix[(i, j)] = 0.0;
+                matrix[(j, i)] = 0.0;
+            }
+        }
+    }
+    cholesky(matrix, 1e-9)
 }
 
 /// Solves `L x = b` in place; entries of dropped pivots become zero.

@@ -187,18 +187,18 @@ fn better(d: &Diagnosis) -> Vec<String> {
         .collect()
 }
 
+/// Noise that is correlated over more rows than this can hide a slow misfit.
+const SLOW: f64 = 5.0;
+
 /// A channel's noise, in one sentence.
 pub(super) fn noise_sentence(d: &Diagnosis, n: &missing_physics::diagnosis::ChannelNoise) -> String {
     let unit = d.channels.iter().find(|(c, _)| *c == n.channel).map(|(_, u)| u.clone()).unwrap_or_default();
     let colour = if n.correlated_share > 0.0 {
-        let along = d.variables.first().map_or(("rows", ""), |(_, u)| ("", u.as_str()));
-        format!(
-            ", {:.0} % of its variance correlated over {} {}{}: a slow misfit of that size would not be seen",
-            100.0 * n.correlated_share,
-            significant(n.correlation_length, 2),
-            along.1,
-            along.0
-        )
+        let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
+        let over = significant(n.correlation_length, 2);
+        let blind =
+            if n.correlation_rows > SLOW { ": a slow misfit of that size would not be seen" } else { "" };
+        format!(", {:.0} % of its variance correlated over {over} {along}{blind}", 100.0 * n.correlated_share)
     } else {
         ", white".into()
     };

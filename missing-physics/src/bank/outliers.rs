@@ -6,8 +6,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{Bank, cholesky_against};
-use crate::linalg::{RANK_FLOOR, cholesky, dot, forward};
+use super::Bank;
+use crate::linalg::{RANK_FLOOR, cholesky, cholesky_against, dot, forward};
 use crate::noise::median;
 
 /// Rows after which the whitened image of a single row's shift has died away.

@@ -16,6 +16,7 @@ use super::{Domain, Loaded, Template};
 use crate::recording::{Column, Header, ReadError, Table, quoted};
 use model::{Asked, CustomModel, Simulation};
 use process::Pool;
+pub use process::{Failure, read_answer};
 use terms::Sizes;
 
 /// A run with fewer rows says nothing of a curve.

@@ -40,12 +40,14 @@ struct Reply {
     error: Option<String>,
 }
 
-/// Why there is no prediction.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Failure {
+/// Why a simulator gives no prediction.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Failure {
     /// None at these parameters; others may do.
+    #[error("{0}")]
     Here(String),
     /// None any more.
+    #[error("{0}")]
     Forever(String),
 }
 
@@ -100,7 +102,7 @@ impl Pool {
         let (mut process, id) = self.take()?;
         let answer = process
             .ask(&Request { id, run, parameters, inputs }, self.start.limit)
-            .and_then(|line| understood(&line, id, channels, out));
+            .and_then(|line| read_answer(&line, id, channels, out));
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match &answer {
             Err(Failure::Forever(why)) => {
@@ -143,8 +145,12 @@ impl Pool {
     }
 }
 
-/// Reads an answer into `out`.
-fn understood(line: &str, id: u64, channels: &[String], out: &mut [f64]) -> Result<(), Failure> {
+/// Reads a simulator's line that answers question `id` into `out`: the channels one after the other, as many rows of each.
+///
+/// # Errors
+/// [`Failure::Here`] where the simulator says that it cannot, or a number is not finite; [`Failure::Forever`] where the line is no
+/// such answer, with what came.
+pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) -> Result<(), Failure> {
     let forever = |why: String| Err(Failure::Forever(why));
     // Python and others write NaN and Infinity, which are no JSON.
     let reply: Result<Reply, _> = serde_json::from_str(line).or_else(|e| {

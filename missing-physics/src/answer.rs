@@ -1,0 +1,210 @@
+//! What a diagnosis says, put together from fits.
+
+use crate::adequacy::Adequacy;
+use crate::compare::{Candidate, HeldOut};
+use crate::data::Run;
+use crate::diagnosis::{
+    ChannelFit, ChannelNoise, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
+};
+use crate::engine::size;
+use crate::estimate::{estimates, of_mechanism};
+use crate::fit::{Fit, NoiseRule};
+use crate::law;
+use crate::model::PredictError;
+use crate::problem::Problem;
+use crate::ranking::{Best, Ranking};
+use crate::repaired::Repaired;
+
+/// Sets that are listed.
+const LISTED_SETS: usize = 12;
+
+/// What the parts of a diagnosis are made from.
+pub(crate) struct Answer<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) rule: &'a NoiseRule,
+    pub(crate) baseline: &'a Candidate,
+    /// The baseline by plain least squares.
+    pub(crate) plain: &'a Fit,
+    pub(crate) outliers: &'a [Outlier],
+}
+
+impl Answer<'_> {
+    pub(crate) fn ids(&self, set: &[usize]) -> Vec<String> {
+        set.iter().map(|&m| self.problem.spec().mechanisms[m].id.clone()).collect()
+    }
+
+    pub(crate) fn names(&self, set: &[usize]) -> String {
+        let names: Vec<String> =
+            set.iter().map(|&m| self.problem.spec().mechanisms[m].name.clone()).collect();
+        names.join(" with ")
+    }
+
+    pub(crate) fn skeleton(
+        &self,
+        adequacy: &Adequacy,
+        verdict: Verdict,
+        model: &Candidate,
+        before: Vec<ChannelFit>,
+    ) -> Result<Diagnosis, PredictError> {
+        let recording = &self.problem.recording;
+        let pairs =
+            |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
+        let free: Vec<usize> =
+            self.baseline.selection.shared.iter().map(|&slot| self.problem.shared.index[slot]).collect();
+        Ok(Diagnosis {
+            verdict,
+            p_value: adequacy.p_value,
+            p_floor: adequacy.p_floor,
+            tests: adequacy.tests.clone(),
+            channels: pairs(&recording.channels),
+            variables: pairs(&recording.variables),
+            baseline: self.problem.spec().baseline.clone(),
+            baseline_parameters: estimates(self.problem, self.baseline, &free, &[], None),
+            noise: self.noise(&model.fit),
+            location: Vec::new(),
+            mechanisms: Vec::new(),
+            sets: Vec::new(),
+            chosen: Vec::new(),
+            confused_with: Vec::new(),
+            confusion: None,
+            final_p_value: None,
+            after: before.clone(),
+            before,
+            law: None,
+            next_experiment: None,
+            undetermined: Vec::new(),
+            outliers: self.outliers.to_vec(),
+            remarks: self.remarks(),
+            repaired: Repaired::of(self.problem, model),
+            curves: self.curves()?,
+        })
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if !self.baseline.fit.converged {
+            remarks.push("the baseline's fit did not converge; its best estimate is used".to_owned());
+        }
+        let (rows, unknowns) = size(self.problem);
+        if rows < 3 * unknowns {
+            remarks.push(format!("few data: {rows} measured values for {unknowns} unknowns"));
+        }
+        remarks
+    }
+
+    /// The data beside the plain simulation.
+    fn curves(&self) -> Result<Vec<Curves>, PredictError> {
+        let curves = |(run, before): (&Run, Vec<Vec<f64>>)| Curves {
+            run: run.label.clone(),
+            inputs: run.inputs.clone(),
+            measured: run.outputs.clone(),
+            after: before.clone(),
+            before,
+        };
+        let before = law::predictions(self.problem, self.plain)?;
+        Ok(self.problem.recording.runs.iter().zip(before).map(curves).collect())
+    }
+
+    pub(crate) fn noise(&self, fit: &Fit) -> Vec<ChannelNoise> {
+        let recording = &self.problem.recording;
+        (0..self.problem.channels())
+            .map(|c| {
+                let shape = self.problem.family.shape(fit.noise.shape[c]);
+                ChannelNoise {
+                    channel: recording.channels[c].name.clone(),
+                    sigma: fit.noise.sigma[c],
+                    source: match (self.rule.fixed_sigma[c], recording.calibration.get(c)) {
+                        (None, _) => NoiseSource::Differences,
+                        (Some(_), Some(Some(_))) => NoiseSource::Calibration,
+                        (Some(_), _) => NoiseSource::Replicates,
+                    },
+                    correlated_share: shape.correlated,
+                    correlation_rows: shape.length_steps,
+                    correlation_length: shape.length_steps * self.problem.step,
+                }
+            })
+            .collect()
+    }
+
+    pub(crate) fn errors(&self, fit: &Fit, score: &HeldOut) -> Result<Vec<ChannelFit>, PredictError> {
+        Ok(self.errors_of(&law::predictions(self.problem, fit)?, score))
+    }
+
+    pub(crate) fn errors_of(&self, predictions: &[Vec<Vec<f64>>], score: &HeldOut) -> Vec<ChannelFit> {
+        let recording = &self.problem.recording;
+        (0..self.problem.channels())
+            .map(|c| {
+                let squares = recording.runs.iter().zip(predictions).flat_map(|(run, predicted)| {
+                    run.outputs[c]
+                        .iter()
+                        .zip(&predicted[c])
+                        .map(|(m, p)| (m - p).powi(2))
+                        .filter(|v| v.is_finite())
+                });
+                let (sum, n) = squares.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
+                ChannelFit {
+                    channel: recording.channels[c].name.clone(),
+                    rmse: (sum / n.max(1) as f64).sqrt(),
+                    heldout_rmse: score.rmse[c],
+                }
+            })
+            .collect()
+    }
+
+    /// Why the closest explanation is none.
+    pub(crate) fn closest(&self, closest: &Candidate, best: &Best, fails: bool) -> String {
+        let but = if fails {
+            format!("it leaves a misfit of its own (p = {:.3}; {})", best.p_value, best.failing)
+        } else {
+            "it predicts data that it has not seen no better than the baseline".to_owned()
+        };
+        format!("the closest explanation is {}, but {but}", self.names(&closest.set))
+    }
+
+    /// Every mechanism that the data can speak of, likeliest first.
+    pub(crate) fn mechanisms(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<MechanismReport> {
+        let mut reports: Vec<MechanismReport> = (0..self.problem.spec().mechanisms.len())
+            .filter_map(|m| self.mechanism(m, ranking, best.map(|b| ranking.at(b.at))))
+            .collect();
+        reports.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        reports
+    }
+
+    fn mechanism(&self, m: usize, ranking: &Ranking, best: Option<&Candidate>) -> Option<MechanismReport> {
+        let mechanism = &self.problem.spec().mechanisms[m];
+        let alone = ranking.of(&[m]);
+        let holder = best
+            .filter(|c| c.set.contains(&m))
+            .or_else(|| ranking.physical().map(|p| p.0).find(|c| c.set.contains(&m)))
+            .or(alone)?;
+        let score = ranking.score_of(&holder.set).or_else(|| ranking.score_of(&[m]));
+        let profile = best.is_some_and(|b| b.set == holder.set).then_some(self.rule);
+        let holding = ranking.physical().filter(|(c, _)| c.set.contains(&m));
+        let channels = &self.problem.recording.channels;
+        Some(MechanismReport {
+            id: mechanism.id.clone(),
+            name: mechanism.name.clone(),
+            equation: mechanism.equation.clone(),
+            reference: mechanism.reference.clone(),
+            probability: holding.map(|(_, p)| p).sum::<f64>().min(1.0),
+            parameters: of_mechanism(self.problem, holder, mechanism, profile),
+            heldout_log_score_gain: score.map_or(f64::NAN, |s| s.log_score - ranking.base().log_score),
+            heldout_rmse: score.map_or(Vec::new(), |s| {
+                channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()
+            }),
+            ruled_out: alone.and_then(|c| c.ruled_out.clone()),
+        })
+    }
+
+    /// The leading sets, likeliest first.
+    pub(crate) fn sets(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<SetReport> {
+        let set = |(c, probability): (&Candidate, f64)| SetReport {
+            ids: self.ids(&c.set),
+            probability,
+            p_value: best.filter(|b| ranking.at(b.at).set == c.set).map(|b| b.p_value),
+            heldout_log_score_gain: ranking.score_of(&c.set).map(|s| s.log_score - ranking.base().log_score),
+            ruled_out: None,
+        };
+        ranking.physical().take(LISTED_SETS).map(set).collect()
+    }
+}

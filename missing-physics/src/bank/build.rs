@@ -1,0 +1,179 @@
+//! Linearises a model around a fit: the columns of its plane, and of the directions in which it might be wrong.
+
+use super::{Alternative, Bank, Block, Curves, DEGREE};
+use crate::fit::{Fit, NoiseRule, NoiseState, whitened_columns};
+use crate::linalg::{determined, dot};
+use crate::model::{Mechanism, PredictError, Scope};
+use crate::problem::{Problem, Selection};
+
+/// Everything that the model or any rival frees, and where its columns stand in a block: own of the model, shared of the model, own
+/// of rivals, shared of rivals, polynomials.
+struct Layout {
+    wide: Selection,
+    n_own: usize,
+    n_shared: usize,
+}
+
+impl Layout {
+    fn own(&self, i: usize) -> usize {
+        if i < self.n_own { i } else { self.n_shared + i }
+    }
+
+    fn shared(&self, i: usize) -> usize {
+        if i < self.n_shared { self.n_own + i } else { self.wide.own.len() + i }
+    }
+
+    /// Where the polynomials begin.
+    fn base(&self) -> usize {
+        self.wide.own.len() + self.wide.shared.len()
+    }
+}
+
+/// What a mechanism frees beyond the model: places among the own and the shared parameters of all, and the sign of its strength.
+struct Freed {
+    own: Vec<usize>,
+    shared: Vec<usize>,
+    sign: f64,
+}
+
+/// Adds what a mechanism frees to `wide`.
+fn freed(problem: &Problem<'_>, selection: &Selection, wide: &mut Selection, mechanism: &Mechanism) -> Freed {
+    let spec = problem.spec();
+    let mut freed = Freed { own: Vec::new(), shared: Vec::new(), sign: 0.0 };
+    for &p in mechanism.parameters.iter().chain(&mechanism.companions) {
+        let (slot, info) = (problem.slots[p], &spec.parameters[p]);
+        let (list, target, of_model) = if info.scope == Scope::Shared {
+            (&mut wide.shared, &mut freed.shared, &selection.shared)
+        } else {
+            (&mut wide.own, &mut freed.own, &selection.own)
+        };
+        let at = list.iter().position(|&s| s == slot).unwrap_or_else(|| {
+            list.push(slot);
+            list.len() - 1
+        });
+        if !of_model.contains(&slot) {
+            target.push(at);
+        }
+        freed.sign = if info.lower >= info.start {
+            1.0
+        } else if info.upper <= info.start {
+            -1.0
+        } else {
+            0.0
+        };
+    }
+    if freed.shared.len() != 1 || !freed.own.is_empty() {
+        freed.sign = 0.0;
+    }
+    freed
+}
+
+/// The layout, and the rivals as alternatives in it.
+fn mechanisms(problem: &Problem<'_>, selection: &Selection, rivals: &[usize]) -> (Layout, Vec<Alternative>) {
+    let mut wide = selection.clone();
+    let all: Vec<(String, Freed)> = rivals
+        .iter()
+        .map(|&m| {
+            let mechanism = &problem.spec().mechanisms[m];
+            (mechanism.id.clone(), freed(problem, selection, &mut wide, mechanism))
+        })
+        .filter(|(_, freed)| !(freed.own.is_empty() && freed.shared.is_empty()))
+        .collect();
+    let layout = Layout { wide, n_own: selection.own.len(), n_shared: selection.shared.len() };
+    let placed = |(name, freed): (String, Freed)| Alternative {
+        name,
+        own: freed.own.into_iter().map(|i| layout.own(i)).collect(),
+        shared: freed.shared.into_iter().map(|i| layout.shared(i)).collect(),
+        sign: freed.sign,
+    };
+    let alternatives = all.into_iter().map(placed).collect();
+    (layout, alternatives)
+}
+
+/// Smooth functions of every variable as alternatives.
+fn smooth<'a>(
+    problem: &'a Problem<'_>,
+    curves: &'a Curves,
+    base: usize,
+) -> impl Iterator<Item = Alternative> + 'a {
+    problem.recording.channels.iter().enumerate().flat_map(move |(channel, quantity)| {
+        curves.names(channel).into_iter().enumerate().map(move |(k, name)| {
+            let first = base + (curves.offset(channel) + k) * DEGREE;
+            Alternative {
+                name: format!("{} depends on {name}", quantity.name),
+                own: Vec::new(),
+                shared: (first..first + DEGREE).collect(),
+                sign: 0.0,
+            }
+        })
+    })
+}
+
+/// The blocks of one run, one for each channel.
+fn blocks(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    layout: &Layout,
+    curves: &Curves,
+    run: usize,
+) -> Result<Vec<Block>, PredictError> {
+    let unit = NoiseState { shape: vec![0; problem.channels()], sigma: vec![1.0; problem.channels()] };
+    let Layout { wide, n_own, .. } = layout;
+    let columns = whitened_columns(problem, wide, &unit, run, &fit.shared, &fit.own[run])?;
+    let mut start = 0;
+    let mut row = Vec::with_capacity(problem.channels());
+    for channel in 0..problem.channels() {
+        let n = problem.rows[run].valid[channel].len();
+        let mut raw = vec![vec![0.0; n]; layout.base() + curves.total() * DEGREE];
+        for i in 0..wide.own.len() {
+            raw[layout.own(i)].copy_from_slice(&columns[i][start..start + n]);
+        }
+        for i in 0..wide.shared.len() {
+            raw[layout.shared(i)].copy_from_slice(&columns[wide.own.len() + i][start..start + n]);
+        }
+        curves.fill(problem, run, channel, &mut raw[layout.base()..]);
+        start += n;
+        row.push(Block { raw, mine: Vec::new(), shapes: Vec::new() });
+    }
+    let squares: Vec<Vec<f64>> =
+        row.iter().map(|b| b.raw[..*n_own].iter().map(|c| dot(c, c)).collect()).collect();
+    let largest: Vec<f64> = (0..*n_own).map(|k| squares.iter().map(|s| s[k]).fold(0.0, f64::max)).collect();
+    for (block, here) in row.iter_mut().zip(&squares) {
+        block.mine = determined(here, &largest);
+    }
+    Ok(row)
+}
+
+impl<'a> Bank<'a> {
+    /// Linearises around `fit`; the mechanisms in `rivals` become alternatives beside smooth functions of each variable.
+    pub(crate) fn new(
+        problem: &'a Problem<'a>,
+        selection: &Selection,
+        fit: &Fit,
+        rivals: &[usize],
+        rule: &NoiseRule,
+    ) -> Result<Self, PredictError> {
+        let (layout, mut alternatives) = mechanisms(problem, selection, rivals);
+        let mechanisms = alternatives.len();
+        let curves = Curves::new(problem, fit)?;
+        alternatives.extend(smooth(problem, &curves, layout.base()));
+        let blocks: Vec<Vec<Block>> = (0..problem.rows.len())
+            .map(|run| blocks(problem, fit, &layout, &curves, run))
+            .collect::<Result<_, _>>()?;
+        let Layout { n_own, n_shared, .. } = layout;
+        let counted: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+        let freedom = (0..problem.channels())
+            .map(|c| {
+                let used: usize = blocks.iter().map(|row| row[c].mine.len()).sum();
+                let rows = problem.count(c) as f64;
+                (rows - used as f64 - n_shared as f64 * rows / counted.max(1) as f64).max(1.0)
+            })
+            .collect();
+        let rule = rule.clone();
+        let in_play = Vec::new();
+        let mut bank =
+            Self { problem, in_play, blocks, n_own, n_shared, alternatives, mechanisms, rule, freedom };
+        bank.play(&bank.rule.allowed.clone());
+        Ok(bank)
+    }
+}

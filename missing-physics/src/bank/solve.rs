@@ -1,0 +1,224 @@
+//! Refits of the linearised model, of an alternative and of the noise.
+
+use nalgebra::DMatrix;
+
+use super::{Bank, Product, Products};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, cholesky_against, dot, forward};
+
+impl Bank<'_> {
+    pub(super) fn products(&self, data: &[Vec<Vec<f64>>]) -> Products {
+        let values = self
+            .blocks
+            .iter()
+            .zip(data)
+            .enumerate()
+            .map(|(run, (row, data))| {
+                row.iter()
+                    .zip(data)
+                    .enumerate()
+                    .map(|(channel, (block, raw))| {
+                        block
+                            .shapes
+                            .iter()
+                            .zip(&self.in_play)
+                            .map(|(shape, &index)| {
+                                let mut y = raw.clone();
+                                self.problem.whitener(run, channel, index).whiten(&mut y);
+                                let with: Vec<f64> = shape.columns.iter().map(|c| dot(c, &y)).collect();
+                                let mut own: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
+                                forward(&shape.own.0, &shape.own.1, &mut own);
+                                let total = dot(&y, &y);
+                                Product { with, left: total - dot(&own, &own), own, total }
+                            })
+                            .collect()
+                    })
+                    .collect()
+            })
+            .collect();
+        Products { values }
+    }
+
+    /// Fits the model with an alternative's columns added, for a given noise.
+    pub(super) fn solve(
+        &self,
+        products: &Products,
+        noise: &[(usize, f64)],
+        own: &[usize],
+        shared: &[usize],
+    ) -> Vec<Vec<f64>> {
+        let (q, s) = (own.len(), shared.len());
+        let mut information = DMatrix::zeros(s, s);
+        let mut right = vec![0.0; s];
+        let mut parts = Vec::with_capacity(self.blocks.len());
+        for (row, values) in self.blocks.iter().zip(&products.values) {
+            let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+            let mut normal = DMatrix::zeros(q + s, q + s);
+            let mut b = vec![0.0; q + s];
+            for ((block, value), &(shape, sigma)) in row.iter().zip(values).zip(noise) {
+                let weight = 1.0 / (sigma * sigma);
+                let gram = &block.shapes[shape].gram;
+                for (i, &a) in ids.iter().enumerate() {
+                    b[i] += weight * value[shape].with[a];
+                    for (j, &c) in ids.iter().enumerate().take(i + 1) {
+                        normal[(i, j)] += weight * gram[(a, c)];
+                    }
+                }
+            }
+            let mut factor = normal.view((0, 0), (q, q)).into_owned();
+            let kept = cholesky(&mut factor, RANK_FLOOR);
+            let borders: Vec<Vec<f64>> = (0..s)
+                .map(|j| {
+                    let mut column: Vec<f64> = (0..q).map(|i| normal[(q + j, i)]).collect();
+                    forward(&factor, &kept, &mut column);
+                    column
+                })
+                .collect();
+            let mut reduced = b[..q].to_vec();
+            forward(&factor, &kept, &mut reduced);
+            for i in 0..s {
+                for j in 0..=i {
+                    information[(i, j)] += normal[(q + i, q + j)] - dot(&borders[i], &borders[j]);
+                }
+                right[i] += b[q + i] - dot(&borders[i], &reduced);
+            }
+            parts.push((factor, kept, borders, reduced));
+        }
+        // A column that the others already span (a polynomial within the nuisances) is dropped.
+        let kept = cholesky_against(&mut information, &self.scales(noise, shared));
+        forward(&information, &kept, &mut right);
+        backward(&information, &kept, &mut right);
+        parts
+            .into_iter()
+            .map(|(factor, kept, borders, mut reduced)| {
+                for (border, x) in borders.iter().zip(&right) {
+                    reduced.iter_mut().zip(border).for_each(|(r, b)| *r -= x * b);
+                }
+                backward(&factor, &kept, &mut reduced);
+                reduced.extend_from_slice(&right);
+                reduced
+            })
+            .collect()
+    }
+
+    /// Sums of squares of the shared columns before anything is eliminated, the measure of "already spanned".
+    pub(super) fn scales(&self, noise: &[(usize, f64)], shared: &[usize]) -> Vec<f64> {
+        shared
+            .iter()
+            .map(|&a| {
+                self.blocks
+                    .iter()
+                    .flat_map(|row| row.iter().zip(noise))
+                    .map(|(block, &(shape, sigma))| block.shapes[shape].gram[(a, a)] / (sigma * sigma))
+                    .sum()
+            })
+            .collect()
+    }
+
+    /// Residual sum of squares of one channel under one shape.
+    fn squares(
+        &self,
+        products: &Products,
+        channel: usize,
+        shape: usize,
+        ids: &[usize],
+        coefficients: &[Vec<f64>],
+    ) -> (f64, f64) {
+        let (mut squares, mut log_determinant) = (0.0, 0.0);
+        for ((row, values), x) in self.blocks.iter().zip(&products.values).zip(coefficients) {
+            // The own coefficients are fitted anew under each shape; the others are given.
+            let block = &row[channel].shapes[shape];
+            let product = &values[channel][shape];
+            let mut form = product.left;
+            let others = || ids.iter().zip(x).filter(|(a, _)| !row[channel].mine.contains(a));
+            for (&a, xa) in others() {
+                let mut inner = -2.0 * (product.with[a] - dot(&block.borders[a], &product.own));
+                for (&c, xc) in others() {
+                    inner += (block.gram[(a, c)] - dot(&block.borders[a], &block.borders[c])) * xc;
+                }
+                form += xa * inner;
+            }
+            squares += form.max(0.0);
+            log_determinant += block.log_determinant;
+        }
+        (squares, log_determinant)
+    }
+
+    fn channel_score(&self, channel: usize, squares: f64, log_determinant: f64) -> (f64, f64) {
+        let freedom = self.freedom[channel];
+        let sigma = match self.rule.fixed_sigma[channel] {
+            Some(sigma) => sigma,
+            None => (squares / freedom).sqrt().max(self.rule.floor[channel]),
+        };
+        (-freedom * sigma.ln() - 0.5 * log_determinant - 0.5 * squares / (sigma * sigma), sigma)
+    }
+
+    /// Fits coefficients and noise in turn; returns the score, the noise and the coefficients.
+    pub(super) fn alternate(
+        &self,
+        products: &Products,
+        own: &[usize],
+        shared: &[usize],
+        start: &[(usize, f64)],
+        rounds: usize,
+    ) -> (f64, Vec<(usize, f64)>, Vec<Vec<f64>>) {
+        let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+        let mut noise = start.to_vec();
+        let mut coefficients = self.solve(products, &noise, own, shared);
+        let mut score = f64::NEG_INFINITY;
+        for round in 0..rounds {
+            let mut total = 0.0;
+            let mut next = noise.clone();
+            for (channel, state) in next.iter_mut().enumerate() {
+                let mut best = f64::NEG_INFINITY;
+                for shape in 0..self.in_play.len() {
+                    let (squares, log_determinant) =
+                        self.squares(products, channel, shape, &ids, &coefficients);
+                    let (mut value, sigma) = self.channel_score(channel, squares, log_determinant);
+                    value += self.problem.family.shape(self.in_play[shape]).log_prior();
+                    if value > best {
+                        best = value;
+                        *state = (shape, sigma);
+                    }
+                }
+                total += best;
+            }
+            score = total;
+            let still = next.iter().zip(&noise).all(|(a, b)| a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-3);
+            noise = next;
+            if still || round + 1 == rounds {
+                break;
+            }
+            coefficients = self.solve(products, &noise, own, shared);
+        }
+        (score, noise, coefficients)
+    }
+
+    /// Sum of squares in units of the noise.
+    pub(super) fn chi2(
+        &self,
+        products: &Products,
+        noise: &[(usize, f64)],
+        own: &[usize],
+        shared: &[usize],
+        coefficients: &[Vec<f64>],
+    ) -> f64 {
+        let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+        noise
+            .iter()
+            .enumerate()
+            .map(|(c, &(shape, sigma))| {
+                self.squares(products, c, shape, &ids, coefficients).0 / (sigma * sigma)
+            })
+            .sum()
+    }
+
+    /// White noise at the level of the whole data, where fits begin.
+    pub(super) fn white_start(&self, products: &Products) -> Vec<(usize, f64)> {
+        (0..self.problem.channels())
+            .map(|c| {
+                let squares: f64 = products.values.iter().map(|row| row[c][0].total).sum();
+                (0, self.channel_score(c, squares, 0.0).1)
+            })
+            .collect()
+    }
+}

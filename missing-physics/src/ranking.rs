@@ -1,0 +1,138 @@
+//! Sets of mechanisms in order: how probable each is, which is preferred, which explain as well, and how they predict what they have
+//! not seen.
+
+use rayon::prelude::*;
+
+use crate::adequacy::Adequacy;
+use crate::compare::{Candidate, HeldOut, held_out, nested};
+use crate::model::PredictError;
+use crate::problem::Problem;
+
+/// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
+const RIVAL_GAP: f64 = 3.0;
+/// A richer set must beat an adequate simpler one by this log evidence.
+const EARNED: f64 = 3.0;
+/// Rivals that are told apart by simulation.
+const MOST_RIVALS: usize = 6;
+
+/// Candidates, compared.
+pub(crate) struct Ranking {
+    all: Vec<Candidate>,
+    /// The physical ones by falling evidence: where they stand, and how probable each is.
+    physical: Vec<(usize, f64)>,
+    /// How the baseline predicts what it has not seen.
+    base: HeldOut,
+    scores: Vec<Option<HeldOut>>,
+}
+
+/// The set that is preferred.
+pub(crate) struct Best {
+    /// Where it stands.
+    pub(crate) at: usize,
+    /// Of its adequacy.
+    pub(crate) p_value: f64,
+    /// What the likeliest set fails in first, if it does.
+    pub(crate) failing: String,
+}
+
+impl Ranking {
+    pub(crate) fn new(all: Vec<Candidate>, base: HeldOut) -> Self {
+        let mut order: Vec<usize> =
+            (0..all.len()).filter(|&i| all[i].ruled_out.is_none() && all[i].evidence.is_finite()).collect();
+        order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
+        let most = order.first().map_or(0.0, |&i| all[i].evidence);
+        let weights: Vec<f64> = order.iter().map(|&i| (all[i].evidence - most).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        let physical = order.into_iter().zip(weights.into_iter().map(|w| w / total)).collect();
+        Self { all, physical, base, scores: Vec::new() }
+    }
+
+    pub(crate) fn at(&self, at: usize) -> &Candidate {
+        &self.all[at]
+    }
+
+    pub(crate) fn base(&self) -> &HeldOut {
+        &self.base
+    }
+
+    /// The physical sets, likeliest first, with their probabilities.
+    pub(crate) fn physical(&self) -> impl Iterator<Item = (&Candidate, f64)> {
+        self.physical.iter().map(|&(i, probability)| (&self.all[i], probability))
+    }
+
+    /// The candidate with just this set.
+    pub(crate) fn of(&self, set: &[usize]) -> Option<&Candidate> {
+        self.all.iter().find(|c| c.set == set)
+    }
+
+    /// How this set predicts what it has not seen, where that was asked.
+    pub(crate) fn score_of(&self, set: &[usize]) -> Option<&HeldOut> {
+        let at = self.all.iter().position(|c| c.set == set)?;
+        self.scores.get(at)?.as_ref()
+    }
+
+    /// The likeliest set, or a simpler one that is adequate and hardly less likely. The baseline has been rejected: it is no
+    /// candidate any more, however cheap it is. `test` takes a candidate and the number of a random stream.
+    pub(crate) fn best(
+        &self,
+        alpha: f64,
+        test: impl Fn(&Candidate, u64) -> Result<Adequacy, PredictError>,
+    ) -> Result<Option<Best>, PredictError> {
+        let standing: Vec<usize> =
+            self.physical.iter().map(|p| p.0).filter(|&i| !self.all[i].set.is_empty()).collect();
+        let Some(&first) = standing.first() else { return Ok(None) };
+        let tested = test(&self.all[first], 2)?;
+        let failing = tested.tests.first().map_or_else(String::new, |t| t.name.clone());
+        let (mut at, mut p_value) = (first, tested.p_value);
+        while let Some(&simpler) = standing.iter().find(|&&i| self.simpler(i, at)) {
+            let p = test(&self.all[simpler], 3)?.p_value;
+            if p <= alpha && p < p_value {
+                break;
+            }
+            (at, p_value) = (simpler, p);
+        }
+        Ok(Some(Best { at, p_value, failing }))
+    }
+
+    /// Is one a part of the other with fewer unknowns, and hardly less likely?
+    fn simpler(&self, small: usize, large: usize) -> bool {
+        let [small, large] = [small, large].map(|i| &self.all[i]);
+        let unknowns = |c: &Candidate| c.selection.shared.len() + c.selection.own.len();
+        unknowns(small) < unknowns(large) && nested(small, large) && small.evidence > large.evidence - EARNED
+    }
+
+    /// Lets the single mechanisms and the preferred set predict what they have not seen.
+    pub(crate) fn score(&mut self, problem: &Problem<'_>, best: Option<&Best>) {
+        let wanted = |i: usize| {
+            let c = &self.all[i];
+            (c.set.len() <= 1 || best.is_some_and(|b| b.at == i)) && c.evidence.is_finite()
+        };
+        self.scores = (0..self.all.len())
+            .into_par_iter()
+            .map(|i| if wanted(i) { held_out(problem, &self.all[i]).ok() } else { None })
+            .collect();
+    }
+
+    /// Does it predict what it has not seen better than the baseline?
+    pub(crate) fn gains(&self, at: usize) -> bool {
+        self.score_of(&self.all[at].set).is_some_and(|s| s.log_score > self.base.log_score)
+    }
+
+    /// The chosen set and those that explain as well and are no more, and no less, of the same.
+    pub(crate) fn rivals<'a>(&'a self, chosen: &'a Candidate) -> Vec<&'a Candidate> {
+        let as_well = |c: &&Candidate| {
+            c.set != chosen.set
+                && !c.set.is_empty()
+                && c.evidence > chosen.evidence - RIVAL_GAP
+                && !nested(chosen, c)
+                && !nested(c, chosen)
+        };
+        let all: Vec<&Candidate> =
+            std::iter::once(chosen).chain(self.physical().map(|p| p.0).filter(as_well)).collect();
+        // One that only adds to another is no further answer.
+        let adds = |c: &Candidate| {
+            all.iter().any(|o| o.set != c.set && nested(o, c) && o.evidence > c.evidence - EARNED)
+        };
+        all.iter().copied().filter(|c| !adds(c)).take(MOST_RIVALS).collect()
+    }
+}
