@@ -120,14 +120,12 @@ impl Both {
 
 /// Follows a dough through its rolls.
 ///
-/// `next(i, x)` is the state after roll `i` from the state `x`, and `unsure(i)` the variance of the part by which that roll may do more or
-/// less, beyond the noise's own scatter; a part `undone` of each change is undone before the next roll.
+/// `next(i, x)` is the state after roll `i` from the state `x`; a part `undone` of each change is undone before the next roll.
 pub fn follow(
     rolls: &[Roll],
     fresh: &Fresh,
     noise: &Noise,
     undone: f64,
-    unsure: impl Fn(usize) -> f64,
     next: impl Fn(usize, &Vector3<f64>) -> Vector3<f64>,
 ) -> Vec<Step> {
     const STEP_M: f64 = 1e-6;
@@ -145,7 +143,7 @@ pub fn follow(
             gradient.set_column(k, &((next(i, &moved) - there) / STEP_M));
         }
         let change = there - x;
-        let scatter = change * change.transpose() * (noise.scatter + unsure(i));
+        let scatter = change * change.transpose() * noise.scatter;
         // The states before and after it, estimated together.
         let mut both = Both { before: p, cross: p * gradient.transpose(), after: Matrix3::zeros() };
         both.after = gradient * both.cross + Matrix3::from_diagonal(&noise.process) + scatter;

@@ -117,7 +117,7 @@ impl Learning<'_> {
         let mut sums = Sums { square: DMatrix::zeros(n, n), pull: DVector::zeros(n), own: Vec::new() };
         for (at, dough) in self.doughs.iter().enumerate() {
             let next = |i: usize, x: &Vector3<f64>| x + self.surface.change(x, &dough[i].action);
-            let steps = follow(dough, &fresh, &self.noise, 0.0, |_| 0.0, next);
+            let steps = follow(dough, &fresh, &self.noise, 0.0, next);
             let terms = |i: usize| self.surface.slopes(&steps[i].state, &dough[i].action);
             let all = sensitivity(&steps, terms, |_| 1.0, n / 3);
             let (off, shared, own) = (white(&steps), all.columns(0, n), all.columns(n, OWN));
@@ -284,7 +284,7 @@ impl CostFunction for Process<'_, '_> {
                 let level: Vector3<f64> = own.courses.iter().zip(&courses).map(|(own, c)| own * c[i]).sum();
                 x + (1.0 + own.softness) * surface.change(x, &dough[i].action) + level
             };
-            let of = surprise(&follow(dough, &fresh, &noise, 0.0, |_| 0.0, next));
+            let of = surprise(&follow(dough, &fresh, &noise, 0.0, next));
             spread += of.spread;
             square += of.square;
         }

@@ -130,14 +130,7 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
         let first: Vec<[f64; 3]> = others.iter().map(|d| d[0].state).collect();
         let fresh = Fresh::of(&first, dynamics.noise());
         let follow_one = |dough: &Vec<Roll>| {
-            follow(
-                dough,
-                &fresh,
-                dynamics.noise(),
-                0.0,
-                |_| 0.0,
-                |i, x| x + dynamics.change(x, &dough[i].action),
-            )
+            follow(dough, &fresh, dynamics.noise(), 0.0, |i, x| x + dynamics.change(x, &dough[i].action))
         };
         let steps: Vec<_> = others.iter().map(follow_one).collect();
         let answers: Vec<_> =
@@ -188,7 +181,7 @@ fn innovations_are_white() {
         let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);
         for dough in &doughs {
             let next = |i: usize, x: &nalgebra::Vector3<f64>| law((*x).into(), dough[i].action, 0.0).into();
-            for pair in follow(dough, &fresh, &noise, undone, |_| 0.0, next).windows(2) {
+            for pair in follow(dough, &fresh, &noise, undone, next).windows(2) {
                 let [after, before] = [pair[0].after.white(), pair[1].before.white()];
                 squares += after.norm_squared() + before.norm_squared();
                 tied += after.dot(&before);

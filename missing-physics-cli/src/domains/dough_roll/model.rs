@@ -125,8 +125,7 @@ impl DoughModel {
 
     fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
         let left = (1.0 - effects.volume_loss).max(0.0).cbrt();
-        let unsure = |i: usize| effects.unsure(self.force_n(&dough.steps[i]));
-        follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, unsure, |i, x| {
+        follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, |i, x| {
             let response = self.response(dough, i, effects, x[0]);
             let learned = x + self.dynamics.change(x, &dough.steps[i].roll.action);
             left * Vector3::from(answered(&(*x).into(), &learned.into(), response))

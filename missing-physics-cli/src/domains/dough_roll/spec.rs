@@ -44,15 +44,9 @@ impl Effects {
         self.factor * faded * self.grips(force_n) * law
     }
 
-    /// How probable it is that the band grips at a force: where slip sets in is not known sharper than the onset.
+    /// What of the band grips at a force.
     fn grips(&self, force_n: f64) -> f64 {
         if self.slip_n > 0.0 { 1.0 / (1.0 + (-(force_n - self.slip_n) / self.onset_n).exp()) } else { 1.0 }
-    }
-
-    /// Variance of the part of the expected response that takes place: a band grips or it does not.
-    pub(super) fn unsure(&self, force_n: f64) -> f64 {
-        let grips = self.grips(force_n).max(1e-9);
-        (1.0 - grips) / grips
     }
 }
 
