@@ -2,7 +2,8 @@
 //! tool says from a recording what has changed; the model is repaired with it, and the controller needs fewer rolls. The rolls are
 //! those of the fake, which is no polynomial; the tool sees the files alone.
 //!
-//! `cargo run --release -p examples --example 17_dough_story` (`--small`: one day, one goal; `--picture FILE.svg` draws)
+//! `cargo run --release -p examples --example 17_dough_story` (`--small`: one day, one goal; `--seed N`: other days;
+//! `--picture FILE.svg` draws)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use std::error::Error;
@@ -46,20 +47,31 @@ struct Size {
     trained: [u64; 2],
     recorded: [u64; 2],
     days: u64,
+    /// Number of the first day.
+    first: u64,
     goals: Vec<f64>,
     rollouts: u64,
     replicates: usize,
 }
 
 impl Size {
-    fn told() -> Self {
-        if examples::small() {
+    fn told() -> Outcome<Self> {
+        let first = 100 * told("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
+        Ok(if examples::small() {
             let (trained, recorded) = ([8, 16], [4, 12]);
-            Self { trained, recorded, days: 1, goals: vec![4.0], rollouts: 2, replicates: 19 }
+            Self { trained, recorded, days: 1, first, goals: vec![4.0], rollouts: 2, replicates: 19 }
         } else {
             let (trained, recorded) = ([20, 24], [5, 12]);
-            Self { trained, recorded, days: 4, goals: vec![4.0, 5.0, 6.0], rollouts: 3, replicates: 199 }
-        }
+            Self {
+                trained,
+                recorded,
+                days: 4,
+                first,
+                goals: vec![4.0, 5.0, 6.0],
+                rollouts: 3,
+                replicates: 199,
+            }
+        })
     }
 }
 
@@ -72,15 +84,21 @@ struct Day {
     bars: Vec<Done>,
 }
 
+/// What was told after a word on the command line.
+fn told(word: &str) -> Option<String> {
+    std::env::args().skip_while(|a| a != word).nth(1)
+}
+
 fn main() -> Outcome<()> {
-    let size = Size::told();
+    let size = Size::told()?;
     let band = band()?;
     let [trained, recorded] = [size.trained, size.recorded];
     println!(
         "learned from {} doughs of up to {} random rolls, each day anew; recorded: {} doughs of up to {}",
         trained[0], trained[1], recorded[0], recorded[1]
     );
-    let days: Vec<Day> = (0..size.days).map(|day| live(day, &size, band)).collect::<Outcome<_>>()?;
+    let days: Vec<Day> =
+        (0..size.days).map(|day| live(size.first + day, &size, band)).collect::<Outcome<_>>()?;
     println!(
         "\nall days, {} rollouts to each goal: rolls, and doughs that missed it",
         size.days * size.rollouts
@@ -93,7 +111,7 @@ fn main() -> Outcome<()> {
     let fewer = |bars: &[Done]| 100.0 * (1.0 - bars[2].mean() / bars[0].mean());
     let each: Vec<String> = days.iter().map(|d| format!("{:.0} %", fewer(&d.bars))).collect();
     println!("repaired: {:.0} % fewer rolls than as learned (day by day: {})", fewer(&all), each.join(", "));
-    if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
+    if let Some(file) = told("--picture") {
         let day = &days[0];
         let parts = answered(&day.recorded, &day.model, &band);
         let rows: Vec<Bars> = all.iter().map(Done::bars).collect();
@@ -109,14 +127,14 @@ fn live(day: u64, size: &Size, band: Band) -> Outcome<Day> {
     let seed = 10 * day;
     let training = doughs(USUAL, size.trained, seed + 1)?;
     let model = Ridge::learn(&rolls(&training), 2, 1e-3)?;
-    println!("day {}", day + 1);
+    println!("day {}", day - size.first + 1);
     if !examples::small() {
         let usual = doughs(USUAL, size.recorded, seed + 2)?;
-        println!("  the usual dough: {}", told(&ask(&band, &training, &usual, day, size.replicates)?));
+        println!("  the usual dough: {}", said(&ask(&band, &training, &usual, day, size.replicates)?));
     }
     let recorded = doughs(DRY, size.recorded, seed + 3)?;
     let answer = ask(&band, &training, &recorded, day, size.replicates)?;
-    println!("  a drier one:     {}", told(&answer));
+    println!("  a drier one:     {}", said(&answer));
     let response = response(&answer, band);
     let repaired = Repaired::new(model.clone(), response)?;
     // What a robot could have learned instead, had it rolled as many dry doughs.
@@ -215,7 +233,7 @@ fn ask(
     Ok(diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?)
 }
 
-fn told(answer: &Diagnosis) -> String {
+fn said(answer: &Diagnosis) -> String {
     // Writing to a string cannot fail.
     let mut text = format!("{} (p {:.3})", answer.verdict.word(), answer.p_value);
     if let (Verdict::Unexplained, Some(test)) = (answer.verdict, answer.tests.first()) {

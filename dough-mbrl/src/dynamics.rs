@@ -1,23 +1,21 @@
 //! Dynamics of a dough, learned from rolls, with the uncertainty of what was learned.
 //!
-//! A polynomial of degree 2, and a remainder of degrees 3 and 4; the size of each degree's coefficients is said by the rolls themselves.
-//! The coefficients are those that make the innovations of all doughs most likely.
+//! Relative changes are a polynomial of degree 2 of a dough's shape, its size and the action, and a remainder of degrees 3 and 4; how
+//! large the coefficients of each degree are is said by the rolls themselves. The coefficients are those that make the innovations of all
+//! doughs most likely.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
-use crate::features::Polynomial;
 use crate::filter::{Noise, Step};
 use crate::learning::{Learned, learn};
 use crate::sensitivity::{COURSES, OWN, sensitivity};
+use crate::surface::Surface;
 
 /// Length, width and height of a dough, m.
 pub type State = [f64; 3];
 /// Throw and depth of the band, m.
 pub type Action = [f64; 2];
 
-/// Degree of the polynomial, and of its remainder.
-const DEGREE: u8 = 2;
-const REMAINDER: u8 = 4;
 /// By which part a roll is held to do more or less before anything is learned.
 const SCATTER: f64 = 0.01;
 
@@ -60,87 +58,6 @@ pub struct Prediction {
     pub mean: f64,
     /// One sigma of what will be measured: noise and all that was not learned.
     pub sigma: f64,
-}
-
-/// The change of a state by a roll: a polynomial of state and action for each dimension.
-#[derive(Debug, Clone)]
-pub(crate) struct Surface {
-    features: Polynomial,
-    /// Scale of each term, so that each is of unit mean square over the rolls that were learned from.
-    weights: DVector<f64>,
-    coefficients: DMatrix<f64>,
-    /// Mean square of what the polynomial without its remainder leaves, by dimension, m^2.
-    pub(crate) left: Vector3<f64>,
-}
-
-impl Surface {
-    /// Least squares on measured states, without a remainder: where learning begins.
-    fn measured(rolls: &[&Roll]) -> Result<Self, LearnError> {
-        let rows: Vec<Vec<f64>> = rolls.iter().map(|r| inputs(&Vector3::from(r.state), &r.action)).collect();
-        let features = Polynomial::standardised(&rows, REMAINDER);
-        let free = features.up_to(DEGREE);
-        let least = 2 * free;
-        if rows.len() < least {
-            return Err(LearnError::TooFew { rolls: rows.len(), coefficients: free, least });
-        }
-        let n = rows.len();
-        let mut design =
-            DMatrix::from_row_iterator(n, features.len(), rows.iter().flat_map(|r| features.terms(r)));
-        let change = DMatrix::from_fn(n, 3, |i, k| rolls[i].next[k] - rolls[i].state[k]);
-        if design.iter().chain(change.iter()).any(|v| !v.is_finite()) {
-            return Err(Self::undetermined());
-        }
-        let weights = DVector::from_fn(features.len(), |k, _| {
-            let rms = (design.column(k).norm_squared() / n as f64).sqrt();
-            if rms > 0.0 { 1.0 / rms } else { 1.0 }
-        });
-        design.column_iter_mut().zip(weights.iter()).for_each(|(mut c, w)| c *= *w);
-        let polynomial = design.columns(0, free).into_owned();
-        let qr = polynomial.clone().qr();
-        let r = qr.r();
-        let largest = r.diagonal().amax();
-        if r.diagonal().iter().any(|d| !(d.abs() > 1e-10 * largest)) {
-            return Err(Self::undetermined());
-        }
-        let found = r.solve_upper_triangular(&qr.q().tr_mul(&change)).ok_or_else(Self::undetermined)?;
-        let rest = change - polynomial * &found;
-        let left = Vector3::from_fn(|k, _| (rest.column(k).norm_squared() / (n - free) as f64).max(1e-16));
-        let mut coefficients = DMatrix::zeros(features.len(), 3);
-        coefficients.rows_mut(0, free).copy_from(&found);
-        Ok(Self { features, weights, coefficients, left })
-    }
-
-    pub(crate) fn undetermined() -> LearnError {
-        LearnError::Undetermined { degree: DEGREE }
-    }
-
-    pub(crate) fn change(&self, state: &Vector3<f64>, action: &Action) -> Vector3<f64> {
-        let change = self.coefficients.tr_mul(&self.terms(state, action));
-        Vector3::new(change[0], change[1], change[2])
-    }
-
-    pub(crate) fn terms(&self, state: &Vector3<f64>, action: &Action) -> DVector<f64> {
-        DVector::from_vec(self.features.terms(&inputs(state, action))).component_mul(&self.weights)
-    }
-
-    /// Number of coefficients of each dimension.
-    pub(crate) fn terms_of_each(&self) -> usize {
-        self.weights.len()
-    }
-
-    /// Where the terms of each degree from 1 are.
-    pub(crate) fn degrees(&self) -> Vec<std::ops::Range<usize>> {
-        (0..REMAINDER).map(|d| self.features.up_to(d)..self.features.up_to(d + 1)).collect()
-    }
-
-    /// All coefficients, one dimension after the other.
-    pub(crate) fn flat(&self) -> DVector<f64> {
-        DVector::from_column_slice(self.coefficients.as_slice())
-    }
-
-    pub(crate) fn set(&mut self, flat: &DVector<f64>) {
-        self.coefficients.copy_from_slice(flat.as_slice());
-    }
 }
 
 /// Variances of what each dough does for itself.
@@ -207,8 +124,7 @@ impl Dynamics {
     /// `response` is what of each roll's change takes place.
     pub fn unlearned(&self, steps: &[Step], rolls: &[Roll], response: impl Fn(usize) -> f64) -> DMatrix<f64> {
         let p = self.surface.terms_of_each();
-        let terms = |i: usize| self.surface.terms(&steps[i].state, &rolls[i].action);
-        let all = sensitivity(steps, terms, response, p);
+        let all = sensitivity(steps, |i| self.surface.slopes(&steps[i].state, &rolls[i].action), response, p);
         let mut turned = all.transpose();
         self.precision.l_dirty().solve_lower_triangular_mut(&mut turned.rows_mut(0, 3 * p));
         for k in 0..OWN {
@@ -220,21 +136,18 @@ impl Dynamics {
     /// The next state, from a state that is known.
     pub fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
         let state = Vector3::from(*state);
-        let (change, terms) = (self.change(&state, action), self.surface.terms(&state, action));
+        let change = self.change(&state, action);
+        let (terms, unit_m) = self.surface.slopes(&state, action);
         let p = terms.len();
         std::array::from_fn(|k| {
             let mut told = DVector::zeros(3 * p);
-            told.rows_mut(k * p, p).copy_from(&terms);
+            told.rows_mut(k * p, p).copy_from(&(unit_m[k] * &terms));
             self.precision.l_dirty().solve_lower_triangular_mut(&mut told);
             let scatter = self.noise.scatter * change[k] * change[k];
             let variance = told.norm_squared() + self.noise.process[k] + scatter + self.noise.measured[1][k];
             Prediction { mean: state[k] + change[k], sigma: variance.sqrt() }
         })
     }
-}
-
-fn inputs(state: &Vector3<f64>, action: &Action) -> Vec<f64> {
-    state.iter().chain(action).copied().collect()
 }
 
 /// Variances of measurements, from states that were measured twice; from what the dynamics leave where none was.

@@ -44,6 +44,25 @@ impl Polynomial {
         Self { mean, scale, powers, parents }
     }
 
+    /// Gives a variable the scale of another one.
+    pub fn scale_as(&mut self, variable: usize, other: usize) {
+        if let Some(&scale) = self.scale.get(other)
+            && let Some(own) = self.scale.get_mut(variable)
+        {
+            *own = scale;
+        }
+    }
+
+    /// The value of a variable that lies one scale above its mean; NaN where there is no such variable.
+    pub fn one_off(&self, variable: usize) -> f64 {
+        self.mean.get(variable).zip(self.scale.get(variable)).map_or(f64::NAN, |(mean, scale)| mean + scale)
+    }
+
+    /// The power of a variable in a term; 0 where there is no such term or variable.
+    pub fn power(&self, term: usize, variable: usize) -> u8 {
+        self.powers.get(term).and_then(|powers| powers.get(variable)).copied().unwrap_or(0)
+    }
+
     /// Number of terms.
     pub fn len(&self) -> usize {
         self.powers.len()

@@ -60,6 +60,18 @@ pub struct Innovation {
 }
 
 impl Innovation {
+    /// What of it goes into an estimate whose errors go by `cross` with those of the expected measurement.
+    fn share(&self, cross: &Matrix3<f64>) -> Matrix3<f64> {
+        // A measurement that tells nothing of what it measures tells nothing of anything else.
+        if self.gain == Matrix3::zeros() {
+            return self.gain;
+        }
+        let mut share = cross.transpose();
+        let solved = self.factor.solve_lower_triangular_mut(&mut share)
+            && self.factor.tr_solve_lower_triangular_mut(&mut share);
+        if solved { share.transpose() } else { Matrix3::zeros() }
+    }
+
     /// Standardised: independent, of variance one.
     pub fn white(&self) -> Vector3<f64> {
         self.factor.solve_lower_triangular(&self.off).unwrap_or_default()
@@ -81,6 +93,29 @@ pub struct Step {
     pub gradient: Matrix3<f64>,
     /// Of the measurement after it.
     pub after: Innovation,
+    /// What of that goes into the estimate of the state before.
+    pub back: Matrix3<f64>,
+    /// The part of the change that is undone before the next roll.
+    pub undone: f64,
+}
+
+/// Covariances of the states before and after a roll, and between them.
+struct Both {
+    before: Matrix3<f64>,
+    cross: Matrix3<f64>,
+    after: Matrix3<f64>,
+}
+
+impl Both {
+    /// Covariance of a state that is a part of the way back from the one after to the one before, once the one after was measured.
+    fn between(&self, measured: &Innovation, back: &Matrix3<f64>, part: f64) -> Matrix3<f64> {
+        let after = self.after - measured.gain * self.after;
+        let before = self.before - back * self.cross.transpose();
+        let cross = self.cross - back * self.after;
+        let kept = 1.0 - part;
+        let p = kept * kept * after + part * part * before + part * kept * (cross + cross.transpose());
+        0.5 * (p + p.transpose())
+    }
 }
 
 /// Follows a dough through its rolls.
@@ -109,15 +144,17 @@ pub fn follow(
         }
         let change = there - x;
         let scatter = change * change.transpose() * noise.scatter;
-        p = gradient * p * gradient.transpose() + Matrix3::from_diagonal(&noise.process) + scatter;
-        x = there;
-        let after = innovation(&Vector3::from(roll.next), &x, &p, &noise.measured[1]);
-        (x, p) = updated(&x, &p, &after);
+        // The states before and after it, estimated together.
+        let mut both = Both { before: p, cross: p * gradient.transpose(), after: Matrix3::zeros() };
+        both.after = gradient * both.cross + Matrix3::from_diagonal(&noise.process) + scatter;
+        let after = innovation(&Vector3::from(roll.next), &there, &both.after, &noise.measured[1]);
+        let back = after.share(&both.cross);
+        steps.push(Step { before, state, covariance, change, gradient, after, back, undone });
+        (x, p) = updated(&there, &both.after, &after);
         if undone != 0.0 {
-            x = (1.0 - undone) * x + undone * state;
-            p *= (1.0 - undone).powi(2);
+            x = (1.0 - undone) * x + undone * (state + back * after.off);
+            p = both.between(&after, &back, undone);
         }
-        steps.push(Step { before, state, covariance, change, gradient, after });
     }
     steps
 }

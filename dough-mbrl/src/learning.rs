@@ -5,10 +5,11 @@
 use argmin::core::{CostFunction, Error, Executor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
-use crate::dynamics::{LearnError, Own, Roll, Surface};
-use crate::filter::{Fresh, Noise, Step, follow};
+use crate::dynamics::{LearnError, Own, Roll};
+use crate::filter::{Fresh, Noise, follow};
 use crate::powell::Powell;
-use crate::sensitivity::{COURSES, OWN, PER_ROLL, courses, sensitivity, white};
+use crate::sensitivity::{COURSES, OWN, PER_ROLL, courses, sensitivity, surprise, white};
+use crate::surface::Surface;
 
 /// Rounds of following the doughs, and learning again from where this leads.
 const ROUNDS: usize = 8;
@@ -43,8 +44,8 @@ struct Learning<'a> {
     found: Vec<Found>,
     /// How many numbers were learned, those that the prior holds counted in part.
     learned: f64,
-    /// Mean square change of a roll, m^2.
-    change: f64,
+    /// Mean square change of a roll, by dimension, m^2.
+    change: Vector3<f64>,
 }
 
 /// The innovations of a round and how they answer: sums over the rows.
@@ -82,13 +83,12 @@ const HELD: f64 = 6.0;
 
 /// Learns from doughs, beginning with a surface and what scatters measurements.
 pub(crate) fn learn(doughs: &[Vec<Roll>], surface: Surface, noise: Noise) -> Result<Learned, LearnError> {
-    let changes =
-        doughs.iter().flatten().map(|r| (Vector3::from(r.next) - Vector3::from(r.state)).norm_squared());
+    let square = |r: &Roll| (Vector3::from(r.next) - Vector3::from(r.state)).map(|d| d * d);
     let rolls = doughs.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-    let change = changes.sum::<f64>() / rolls;
-    let remainder = PARTS.iter().map(|part| Vector3::repeat(part * part * change)).collect();
+    let change = doughs.iter().flatten().map(square).sum::<Vector3<f64>>() / rolls;
+    let remainder = PARTS.iter().map(|part| part * part * change).collect();
     let held = if doughs.len() < DOUGHS { 0.0 } else { OWN_PART.powi(2) };
-    let own = Own { courses: Vector3::repeat(held * change), softness: held };
+    let own = Own { courses: Vector3::repeat(held * change.sum()), softness: held };
     let found = vec![Found::default(); doughs.len()];
     let mut learning = Learning { doughs, surface, noise, own, remainder, found, learned: 0.0, change };
     let mut precision = None;
@@ -116,9 +116,9 @@ impl Learning<'_> {
         let n = 3 * self.surface.terms_of_each();
         let mut sums = Sums { square: DMatrix::zeros(n, n), pull: DVector::zeros(n), own: Vec::new() };
         for (at, dough) in self.doughs.iter().enumerate() {
-            let steps =
-                follow(dough, &fresh, &self.noise, 0.0, |i, x| x + self.surface.change(x, &dough[i].action));
-            let terms = |i: usize| self.surface.terms(&steps[i].state, &dough[i].action);
+            let next = |i: usize, x: &Vector3<f64>| x + self.surface.change(x, &dough[i].action);
+            let steps = follow(dough, &fresh, &self.noise, 0.0, next);
+            let terms = |i: usize| self.surface.slopes(&steps[i].state, &dough[i].action);
             let all = sensitivity(&steps, terms, |_| 1.0, n / 3);
             let (off, shared, own) = (white(&steps), all.columns(0, n), all.columns(n, OWN));
             sums.square += shared.tr_mul(&shared);
@@ -197,7 +197,7 @@ impl Learning<'_> {
                     told += 1.0 - covariance[(at, at)] / variances[k];
                 }
                 self.learned += told.max(0.0);
-                let held = HELD * part * part * self.change;
+                let held = HELD * part * part * self.change[k];
                 variances[k] = (square + held) / (told.max(0.0) + HELD);
             }
         }
@@ -233,7 +233,7 @@ impl Learning<'_> {
         }
         if count > 0.0 {
             let held = HELD * OWN_PART.powi(2);
-            self.own.courses = sum.map(|s| (s + held * self.change) / (count + HELD));
+            self.own.courses = sum.map(|s| (s + held * self.change.sum()) / (count + HELD));
             self.own.softness = (soft + held) / (sums.own.len() as f64 + HELD);
         }
     }
@@ -284,12 +284,9 @@ impl CostFunction for Process<'_, '_> {
                 let level: Vector3<f64> = own.courses.iter().zip(&courses).map(|(own, c)| own * c[i]).sum();
                 x + (1.0 + own.softness) * surface.change(x, &dough[i].action) + level
             };
-            for Step { before, after, .. } in follow(dough, &fresh, &noise, 0.0, next) {
-                for innovation in [before, after] {
-                    spread += 2.0 * innovation.factor.diagonal().map(f64::ln).sum();
-                    square += innovation.white().norm_squared();
-                }
-            }
+            let of = surprise(&follow(dough, &fresh, &noise, 0.0, next));
+            spread += of.spread;
+            square += of.square;
         }
         // What was learned from these innovations has made them smaller.
         let rows = PER_ROLL as f64 * doughs.iter().map(Vec::len).sum::<usize>() as f64;

@@ -24,4 +24,5 @@ pub mod roll;
 pub mod rollout;
 pub mod sensitivity;
 pub mod stiffness;
+mod surface;
 pub mod tie;

@@ -1,6 +1,6 @@
 //! By how much the innovations of a dough that is followed answer what its dynamics are made of.
 
-use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, OMatrix};
+use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
 
 use crate::filter::Step;
 
@@ -17,13 +17,33 @@ pub fn white(steps: &[Step]) -> DVector<f64> {
     DVector::from_iterator(PER_ROLL * steps.len(), rolls.flat_map(|w| [w[0], w[1], w[2]]))
 }
 
+/// How unlikely the innovations of a dough are: the two parts of minus twice the logarithm of their likelihood, but for a constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surprise {
+    /// Logarithm of the determinant of their covariance.
+    pub spread: f64,
+    /// Sum of squares of [`white`].
+    pub square: f64,
+}
+
+/// How unlikely innovations are.
+pub fn surprise(steps: &[Step]) -> Surprise {
+    let mut all = Surprise { spread: 0.0, square: 0.0 };
+    for innovation in steps.iter().flat_map(|s| [&s.before, &s.after]) {
+        all.spread += 2.0 * innovation.factor.diagonal().map(f64::ln).sum();
+        all.square += innovation.white().norm_squared();
+    }
+    all
+}
+
 /// Derivatives of [`white`]: with respect to the coefficients of each dimension's change, one dimension after the other, and (the last
 /// [`OWN`] columns) to what the dough does for itself.
 ///
-/// `terms(i)` are what the coefficients of roll `i`'s change multiply, `response(i)` is what of the change takes place.
+/// `terms(i)` are what the coefficients of roll `i`'s change multiply, and what that counts for in each dimension (m); `response(i)` is
+/// what of the change takes place.
 pub fn sensitivity(
     steps: &[Step],
-    terms: impl Fn(usize) -> DVector<f64>,
+    terms: impl Fn(usize) -> (DVector<f64>, Vector3<f64>),
     response: impl Fn(usize) -> f64,
     coefficients: usize,
 ) -> DMatrix<f64> {
@@ -37,11 +57,12 @@ pub fn sensitivity(
         let row = PER_ROLL * i;
         write(&mut all, row + 3, &step.before.factor, &moved);
         moved -= step.before.gain * &moved;
+        let mut state = moved.clone();
         moved = step.gradient * &moved;
-        let (terms, response) = (terms(i), response(i));
+        let ((terms, unit_m), response) = (terms(i), response(i));
         for k in 0..3 {
             for (j, term) in terms.iter().enumerate() {
-                moved[(k, k * p + j)] += response * term;
+                moved[(k, k * p + j)] += response * unit_m[k] * term;
             }
             for (c, course) in courses.iter().enumerate() {
                 moved[(k, 3 * p + 3 * c + k)] += response * course[i];
@@ -51,7 +72,9 @@ pub fn sensitivity(
             }
         }
         write(&mut all, row, &step.after.factor, &moved);
+        state -= step.back * &moved;
         moved -= step.after.gain * &moved;
+        moved = (1.0 - step.undone) * moved + step.undone * state;
     }
     all
 }

@@ -1,4 +1,5 @@
-//! Errors of several doughs, taken apart: what was not learned of the dynamics ties them over all doughs.
+//! Errors of several doughs, taken apart: what was not learned of the dynamics ties them over all doughs, and so does a batch that is as
+//! a whole a little softer or harder than the one that was learned from.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -20,8 +21,8 @@ impl Tie {
     pub fn new(doughs: &[DMatrix<f64>]) -> Self {
         let rows = doughs.iter().map(DMatrix::nrows).sum();
         let common = doughs.first().map_or(0, |part| part.ncols().saturating_sub(OWN));
-        let columns = common + OWN * doughs.len();
-        // What is common to all doughs, then each one's own.
+        let columns = common + OWN * doughs.len() + 1;
+        // What is common to all doughs, then each one's own, then how soft they all are: two batches differ as two doughs do.
         let mut all = DMatrix::zeros(rows, columns);
         let mut first = 0;
         for (at, part) in doughs.iter().enumerate() {
@@ -29,6 +30,7 @@ impl Tie {
             all.view_mut((first, 0), (n, common)).copy_from(&part.columns(0, common));
             let own = all.view_mut((first, common + OWN * at), (n, OWN));
             { own }.copy_from(&part.columns(common, OWN));
+            all.view_mut((first, columns - 1), (n, 1)).copy_from(&part.column(common + OWN - 1));
             first += n;
         }
         let eigen = SymmetricEigen::new(all.tr_mul(&all));

@@ -7,7 +7,7 @@ use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::{Dynamics, Roll};
 use dough_mbrl::filter::{Fresh, Step as Followed, follow};
 use dough_mbrl::repair::answered;
-use dough_mbrl::sensitivity::{PER_ROLL, white};
+use dough_mbrl::sensitivity::{PER_ROLL, surprise, white};
 use dough_mbrl::tie::Tie;
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
@@ -47,8 +47,8 @@ pub(super) struct DoughModel {
     spec: Spec,
     places: Places,
     blocks: Vec<Block>,
-    /// What of the learned response the recording shows, all rolls alike: the smaller it is, the less counts what was not learned.
-    shown: Option<f64>,
+    /// What the recording shows at first sight, all rolls alike: how what was not learned ties errors is said there.
+    shown: Option<Effects>,
     /// Block and dough of each run.
     runs: HashMap<String, (usize, usize)>,
     kept: Errors,
@@ -86,36 +86,39 @@ impl DoughModel {
         }
         let fresh: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
         let fresh = Fresh::of(&fresh, self.dynamics.noise());
-        let shown = self.shown.unwrap_or_else(|| self.mean_response(&doughs, &fresh));
+        let shown = self.shown.unwrap_or_else(|| self.at_first_sight(&doughs, &fresh));
         self.shown = Some(shown);
-        let tie = self.tie(&doughs, &fresh, shown);
+        let tie = self.tie(&doughs, &fresh, &shown);
         let mut block = Block { doughs, fresh, tie, off: DVector::zeros(first) };
         block.off = self.errors(&block, &Effects::OFF);
         self.blocks.push(block);
         runs.iter().enumerate().map(|(k, (label, _))| self.shown(label, k)).collect()
     }
 
-    /// The response that makes the innovations least.
-    fn mean_response(&self, doughs: &[Dough], fresh: &Fresh) -> f64 {
-        let cost = |factor: f64| -> f64 {
-            let effects = Effects { factor, ..Effects::OFF };
-            doughs.iter().map(|d| white(&self.follow(d, fresh, &effects)).norm_squared()).sum()
+    /// The common response, springback and loss that are most likely, one after the other.
+    fn at_first_sight(&self, doughs: &[Dough], fresh: &Fresh) -> Effects {
+        let cost = |effects: &Effects| -> f64 {
+            let off = |d| surprise(&self.follow(d, fresh, effects));
+            doughs.iter().map(off).map(|s| s.spread + s.square).sum()
         };
-        // Golden sections of its logarithm.
-        const PART: f64 = 0.618_033_988_749_894_8;
-        let (mut low, mut high) = (f64::ln(0.1), f64::ln(10.0));
-        for _ in 0..20 {
-            let (a, b) = (high - PART * (high - low), low + PART * (high - low));
-            if cost(a.exp()) < cost(b.exp()) { high = b } else { low = a }
+        let mut shown = Effects::OFF;
+        for _ in 0..2 {
+            let factor = |log: f64| Effects { factor: log.exp(), ..shown };
+            shown = factor(least([f64::ln(0.1), f64::ln(10.0)], |log| cost(&factor(log))));
+            let springback = |part: f64| Effects { springback: part, ..shown };
+            shown = springback(least([0.0, 0.9], |part| cost(&springback(part))));
+            let volume_loss = |part: f64| Effects { volume_loss: part, ..shown };
+            shown = volume_loss(least([0.0, 0.2], |part| cost(&volume_loss(part))));
         }
-        (0.5 * (low + high)).exp()
+        shown
     }
 
     /// How the uncertainty of what was learned ties the errors of doughs.
-    fn tie(&self, doughs: &[Dough], fresh: &Fresh, shown: f64) -> Tie {
+    fn tie(&self, doughs: &[Dough], fresh: &Fresh, shown: &Effects) -> Tie {
         let answers = |dough: &Dough| {
-            let steps = self.follow(dough, fresh, &Effects { factor: shown, ..Effects::OFF });
-            self.dynamics.unlearned(&steps, &dough.rolls, |_| shown)
+            let steps = self.follow(dough, fresh, shown);
+            self.dynamics
+                .unlearned(&steps, &dough.rolls, |i| self.response(dough, i, shown, steps[i].state[0]))
         };
         Tie::new(&doughs.iter().map(answers).collect::<Vec<_>>())
     }
@@ -123,13 +126,20 @@ impl DoughModel {
     fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
         let left = (1.0 - effects.volume_loss).max(0.0).cbrt();
         follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, |i, x| {
-            let step = &dough.steps[i];
-            let [throw, depth] = step.roll.action;
-            let response =
-                effects.response(step.step, step.t_s, self.band.force_n(throw, depth), throw, x[0]);
-            let learned = x + self.dynamics.change(x, &step.roll.action);
+            let response = self.response(dough, i, effects, x[0]);
+            let learned = x + self.dynamics.change(x, &dough.steps[i].roll.action);
             left * Vector3::from(answered(&(*x).into(), &learned.into(), response))
         })
+    }
+
+    /// What of the learned response of a roll takes place.
+    fn response(&self, dough: &Dough, roll: usize, effects: &Effects, length_m: f64) -> f64 {
+        let step = &dough.steps[roll];
+        effects.response(step.step, step.t_s, self.force_n(step), step.roll.action[0], length_m)
+    }
+
+    fn force_n(&self, step: &Step) -> f64 {
+        self.band.force_n(step.roll.action[0], step.roll.action[1])
     }
 
     /// The errors of a block under some effects: independent, of variance one.
@@ -176,7 +186,7 @@ impl DoughModel {
             expected(2),
             of(&|s| s.roll.action[0]),
             of(&|s| s.roll.action[1]),
-            of(&|s| self.band.force_n(s.roll.action[0], s.roll.action[1])),
+            of(&|s| self.force_n(s)),
         ];
         let channel = |c: usize| {
             let of = |i| self.scale[c] * block.off[dough.first + PER_ROLL * i + c];
@@ -187,6 +197,16 @@ impl DoughModel {
         outputs[3..].iter_mut().for_each(|c| c[0] = f64::NAN);
         Run { label: label.into(), inputs, outputs, kind: 0 }
     }
+}
+
+/// Where a function of one variable is least, by golden sections (Kiefer 1953, doi:10.1090/S0002-9939-1953-0055639-3).
+fn least([mut low, mut high]: [f64; 2], cost: impl Fn(f64) -> f64) -> f64 {
+    const PART: f64 = 0.618_033_988_749_894_8;
+    for _ in 0..20 {
+        let (a, b) = (high - PART * (high - low), low + PART * (high - low));
+        if cost(a) < cost(b) { high = b } else { low = a }
+    }
+    0.5 * (low + high)
 }
 
 impl Model for DoughModel {

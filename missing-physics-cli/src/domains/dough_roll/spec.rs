@@ -39,14 +39,14 @@ impl Effects {
     /// By how much the response is larger than the learned one.
     pub(super) fn response(&self, step: f64, t_s: f64, force_n: f64, throw_m: f64, length_m: f64) -> f64 {
         let faded = (-self.drying_per_s * t_s - self.softening_per_roll * (step - 1.0)).exp();
-        let grips = if self.slip_n > 0.0 {
-            1.0 / (1.0 + (-(force_n - self.slip_n) / self.onset_n).exp())
-        } else {
-            1.0
-        };
         let even = if (step.round() as i64) % 2 == 0 { 1.0 } else { -1.0 };
         let law = 1.0 + self.parity * even + self.throw * (throw_m - 0.08) + self.length * (length_m - 0.06);
-        self.factor * faded * grips * law
+        self.factor * faded * self.grips(force_n) * law
+    }
+
+    /// What of the band grips at a force.
+    fn grips(&self, force_n: f64) -> f64 {
+        if self.slip_n > 0.0 { 1.0 / (1.0 + (-(force_n - self.slip_n) / self.onset_n).exp()) } else { 1.0 }
     }
 }
 
