@@ -67,6 +67,22 @@ pub(crate) fn cholesky(matrix: &mut DMatrix<f64>, floor: f64) -> Vec<bool> {
     kept
 }
 
+/// A run's own coefficients once the shared ones are known: `own` and the shared columns' `borders` are forward-solved with the own
+/// columns' factor.
+pub(crate) fn own_given(
+    factor: &DMatrix<f64>,
+    kept: &[bool],
+    borders: &[Vec<f64>],
+    mut own: Vec<f64>,
+    shared: &[f64],
+) -> Vec<f64> {
+    for (border, x) in borders.iter().zip(shared) {
+        own.iter_mut().zip(border).for_each(|(o, b)| *o -= x * b);
+    }
+    backward(factor, kept, &mut own);
+    own
+}
+
 /// Cholesky with pivots judged against the columns' sums of squares before elimination.
 pub(crate) fn cholesky_against(matrix: &mut DMatrix<f64>, scales: &[f64]) -> Vec<bool> {
     for (i, scale) in scales.iter().enumerate() {

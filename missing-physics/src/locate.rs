@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::diagnosis::Location;
 use crate::fit::{Fit, NoiseState, whitened_columns};
-use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, own_given};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
@@ -341,13 +341,10 @@ fn solve(grams: impl Iterator<Item = DMatrix<f64>>, n_own: usize, n_free: usize)
     total -= dot(&gradient, &right);
     let coefficients = parts
         .into_iter()
-        .map(|(factor, kept, borders, mut reduced)| {
-            for (border, x) in borders.iter().zip(&right) {
-                reduced.iter_mut().zip(border).for_each(|(r, b)| *r -= x * b);
-            }
-            backward(&factor, &kept, &mut reduced);
-            reduced.extend_from_slice(&right);
-            reduced
+        .map(|(factor, kept, borders, reduced)| {
+            let mut all = own_given(&factor, &kept, &borders, reduced, &right);
+            all.extend_from_slice(&right);
+            all
         })
         .collect();
     (total.max(0.0), coefficients)

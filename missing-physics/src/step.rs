@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::fit::OwnTold;
-use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, log_determinant};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, log_determinant, own_given};
 use crate::problem::{Problem, Selection};
 
 /// The normal equations at a point.
@@ -73,12 +73,8 @@ impl Eliminated {
 
     /// By how much the run's own parameters move with a step of the shared ones.
     fn moved(&self, shared_step: &[f64]) -> Vec<f64> {
-        let mut right = self.border[shared_step.len()].clone();
-        for (border, s) in self.border.iter().zip(shared_step) {
-            right.iter_mut().zip(border).for_each(|(r, b)| *r -= s * b);
-        }
-        backward(&self.factor, &self.kept, &mut right);
-        right
+        let right = self.border[shared_step.len()].clone();
+        own_given(&self.factor, &self.kept, &self.border, right, shared_step)
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Bank, Product, Products};
-use crate::linalg::{RANK_FLOOR, backward, cholesky, cholesky_against, dot, forward};
+use crate::linalg::{RANK_FLOOR, backward, cholesky, cholesky_against, dot, forward, own_given};
 
 impl Bank<'_> {
     pub(super) fn products(&self, data: &[Vec<Vec<f64>>]) -> Products {
@@ -89,13 +89,10 @@ impl Bank<'_> {
         backward(&information, &kept, &mut right);
         parts
             .into_iter()
-            .map(|(factor, kept, borders, mut reduced)| {
-                for (border, x) in borders.iter().zip(&right) {
-                    reduced.iter_mut().zip(border).for_each(|(r, b)| *r -= x * b);
-                }
-                backward(&factor, &kept, &mut reduced);
-                reduced.extend_from_slice(&right);
-                reduced
+            .map(|(factor, kept, borders, reduced)| {
+                let mut all = own_given(&factor, &kept, &borders, reduced, &right);
+                all.extend_from_slice(&right);
+                all
             })
             .collect()
     }
