@@ -156,7 +156,7 @@ pub enum ReadError {
 /// # Errors
 /// [`ReadError::Open`], [`ReadError::TooLarge`].
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let file = path.display().to_string();
+    let file = one_line(&path.display().to_string());
     let open = |e: std::io::Error| ReadError::Open { file: file.clone(), why: plain(&e) };
     let metadata = std::fs::metadata(path).map_err(open)?;
     if !metadata.is_file() {
@@ -173,7 +173,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 /// # Errors
 /// [`ReadError::Open`], [`ReadError::TooLarge`], [`ReadError::NotText`].
 pub fn read_text(path: &Path) -> Result<String, ReadError> {
-    let file = path.display().to_string();
+    let file = one_line(&path.display().to_string());
     let text = String::from_utf8(read_bytes(path)?)
         .map_err(|e| ReadError::NotText { file: file.clone(), at: e.utf8_error().valid_up_to() })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
