@@ -1,11 +1,14 @@
 //! Pours a shard of a campaign: `cargo run --release -p granular-infer --example campaign -- FIRST LAST FILE`.
 //!
-//! 1,000 grains of 4 mm and 1,300 kg/m3 through the funnel of the recordings. Shards of one campaign merge with `cat`.
+//! 1,000 grains of 4 mm and 1,300 kg/m3 through the funnel of the recordings. A file that is there is gone on with. Shards of one
+//! campaign merge with `cat`.
 #![allow(
     clippy::print_stdout,
     clippy::approx_constant,
     reason = "says how far it is; the angle is as recordings state it"
 )]
+
+use std::path::Path;
 
 use granular_infer::campaign::{Ranges, Rig};
 use granular_infer::shard;
@@ -24,8 +27,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         cone_half_angle_rad: 0.7854,
         tube_radius_m: 0.04,
     };
-    let mut bytes = Vec::new();
-    for pour in first..last {
+    let mut bytes = if Path::new(file).exists() { std::fs::read(file)? } else { Vec::new() };
+    let there: Vec<u32> = shard::read(&bytes, &rig)?.iter().map(|record| record.0).collect();
+    for pour in (first..last).filter(|pour| !there.contains(pour)) {
         let conditions = Ranges::default().draw(1, u64::from(pour));
         match rig.pour(&conditions, u64::from(pour)) {
             Ok(grains) => shard::append(&mut bytes, pour, &rig, &grains),

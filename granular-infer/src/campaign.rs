@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::dem::{Coefficients, DemError, Funnel, Law, Pour};
+use crate::dem::{Clump, Coefficients, DemError, Funnel, Law, Pour};
 
 /// Young's modulus of the grains in campaigns, Pa. Softer than real grains: a pour takes a fifth of the time of one with 5 MPa
 /// and its heap is the same within the spread from pour to pour.
@@ -52,6 +52,8 @@ pub struct Conditions {
     pub tilt_rad: [f64; 2],
     /// Quadratic air drag k in 1/m.
     pub drag_per_m: f64,
+    /// Length of a grain over its width: 1 for spheres, more for rods with round ends of the same volume.
+    pub aspect_ratio: f64,
 }
 
 /// Ranges of [`Conditions`]: friction and restitution within which real grains lie, and effects up to a strong one.
@@ -75,6 +77,8 @@ pub struct Ranges {
     pub tilt_rad: f64,
     /// Largest drag in 1/m.
     pub drag_per_m: f64,
+    /// Largest length over width.
+    pub aspect_ratio: f64,
 }
 
 impl Default for Ranges {
@@ -89,15 +93,34 @@ impl Default for Ranges {
             size_variation: 0.4,
             tilt_rad: 0.12,
             drag_per_m: 6.0,
+            aspect_ratio: 2.5,
         }
     }
 }
 
 /// Number of effects of [`Conditions`] that may be off.
-const EFFECTS: usize = 5;
+const EFFECTS: usize = 6;
 
 impl Ranges {
-    /// The conditions of a pour: a third of the pours has no effect on, the others have one or two.
+    /// The middle of friction, restitution and height, no effect on.
+    pub fn baseline(&self) -> Conditions {
+        let middle = |[a, b]: [f64; 2]| 0.5 * (a + b);
+        Conditions {
+            sliding_friction: middle(self.sliding_friction.map(f64::ln)).exp(),
+            rolling_friction: middle(self.rolling_friction.map(f64::ln)).exp(),
+            restitution: middle(self.restitution),
+            height_m: middle(self.height_m),
+            work_of_adhesion_j_m2: 0.0,
+            ground_ratio: 1.0,
+            size_variation: 0.0,
+            tilt_rad: [0.0; 2],
+            drag_per_m: 0.0,
+            aspect_ratio: 1.0,
+        }
+    }
+
+    /// The conditions of a pour: a third of the pours has no effect on, the others have one or two. Only pours of even number may be
+    /// of rods.
     pub fn draw(&self, seed: u64, pour: u64) -> Conditions {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(pour);
@@ -109,11 +132,7 @@ impl Ranges {
             rolling_friction: log(self.rolling_friction, unit()),
             restitution: line(self.restitution, unit()),
             height_m: line(self.height_m, unit()),
-            work_of_adhesion_j_m2: 0.0,
-            ground_ratio: 1.0,
-            size_variation: 0.0,
-            tilt_rad: [0.0; 2],
-            drag_per_m: 0.0,
+            ..self.baseline()
         };
         let first = (unit() * EFFECTS as f64 * 1.5) as usize;
         let second = (unit() * EFFECTS as f64 * 2.0) as usize;
@@ -131,6 +150,8 @@ impl Ranges {
                     conditions.tilt_rad = [self.tilt_rad * u * cosine, self.tilt_rad * u * sine];
                 }
                 4 => conditions.drag_per_m = self.drag_per_m * u,
+                // A pour of rods takes ten times as long.
+                5 if pour.is_multiple_of(2) => conditions.aspect_ratio = line([1.0, self.aspect_ratio], u),
                 _ => {}
             }
         }
@@ -193,7 +214,11 @@ impl Rig {
             rest: None,
             most_s: 3.0,
         };
-        let poured = pour.run(seed)?;
+        let poured = if c.aspect_ratio > 1.0 {
+            pour.run_with(&Clump::rod(self.diameter_m, c.aspect_ratio)?, seed)?
+        } else {
+            pour.run(seed)?
+        };
         let gone = [GONE_D * self.diameter_m, 0.0, 0.0];
         let stays = |p: [f64; 3]| if p[2] < c.height_m { p } else { gone };
         Ok(Grains {

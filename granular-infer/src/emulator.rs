@@ -1,18 +1,25 @@
 //! What the statistics of a picture are on average, and how much they differ from pour to pour, learned from a campaign.
 //!
-//! The mean of each statistic is a cubic in friction, rolling friction, restitution and height, with terms of each effect and
-//! their products with those four. Statistics that turn with the scene get terms that turn with the tilt. The variance is
-//! log-quadratic, the correlation between statistics the same everywhere.
+//! The mean of each statistic is a polynomial of the fourth degree in friction, rolling friction, restitution and height, with
+//! terms of each effect beside those four and beside another effect; its coefficients are held back as far as pours that were
+//! left out are foretold best. Statistics that turn with the scene get terms that turn with the tilt. The variance is
+//! log-quadratic, and is that of pours left out; the correlation between statistics is the same everywhere.
+
+mod features;
+mod ridge;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
+use self::features::Scaled;
+use self::ridge::Design;
 use crate::campaign::{Conditions, Ranges};
 use crate::statistics::{COUNT, STATISTICS, Symmetry};
 
 /// A picture of a campaign: how it came about, and its statistics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
-    /// How it was poured.
+    /// How it was poured; pictures of one pour follow each other.
     pub conditions: Conditions,
     /// Square of the blur's sigma in pixels.
     pub blur_px2: f64,
@@ -46,12 +53,18 @@ pub struct Emulator {
 
 /// Mean of the log of a chi-squared variable with one degree of freedom.
 const LOG_CHI2: f64 = -1.270_362_845_461_478;
-/// Weight of a coefficient's distance from zero, in samples.
+/// Weight of a variance's coefficient's distance from zero, in samples.
 const RIDGE: f64 = 1e-3;
-/// Blur variance (px^2) at which half of its effect is there.
-const HALF_BLUR: f64 = 1.0;
-/// Work of adhesion (J/m2) likewise.
-const HALF_ADHESION: f64 = 0.05;
+/// Rounds in which means and variances are found in turn.
+const ROUNDS: usize = 2;
+
+/// A statistic that stands alone, or the two parts of a pair, which share their coefficients.
+struct Learned {
+    mean: DVector<f64>,
+    spread: DVector<f64>,
+    /// Distances from what was foretold without them, in sigmas; one list a part.
+    standard: Vec<Vec<f64>>,
+}
 
 impl Emulator {
     /// Learns from the pictures of a campaign with these ranges.
@@ -61,77 +74,44 @@ impl Emulator {
     pub fn learn(ranges: &Ranges, samples: &[Sample]) -> Result<Self, EmulatorError> {
         let scaled: Vec<Scaled> =
             samples.iter().map(|s| Scaled::new(ranges, &s.conditions, s.blur_px2)).collect();
-        let expected = 3 * scaled.first().map_or(1, |s| s.scalar().len());
+        let expected = scaled.first().map_or(1, |s| s.scalar().values.len());
         if samples.len() < expected {
             return Err(EmulatorError::TooFew { received: samples.len(), expected });
         }
-        let spread_rows: Vec<DVector<f64>> = scaled.iter().map(Scaled::spread).collect();
-        let mut emulator = Self {
-            ranges: *ranges,
-            mean: Vec::new(),
-            spread: Vec::new(),
-            correlation: DMatrix::identity(COUNT, COUNT),
+        // A pair's two parts share their coefficients.
+        let seconds = |k: usize| k < COUNT && STATISTICS[k].1 == Symmetry::Second;
+        let firsts: Vec<usize> = (0..COUNT).filter(|k| !seconds(*k)).collect();
+        let learned: Vec<Learned> = firsts
+            .par_iter()
+            .map(|&k| learn(samples, &scaled, k..k + 1 + usize::from(seconds(k + 1))))
+            .collect();
+        let parts = |l: &Learned| l.standard.len();
+        let each = |of: fn(&Learned) -> &DVector<f64>| -> Vec<DVector<f64>> {
+            learned.iter().flat_map(|l| std::iter::repeat_n(of(l).clone(), parts(l))).collect()
         };
-        let mut standard = DMatrix::zeros(samples.len(), COUNT);
-        let mut k = 0;
-        while k < COUNT {
-            // A pair's two parts share their coefficients.
-            let width = if k + 1 < COUNT && STATISTICS[k + 1].1 == Symmetry::Second { 2 } else { 1 };
-            let rows: Vec<Vec<DVector<f64>>> =
-                (k..k + width).map(|s| scaled.iter().map(|p| p.features(s)).collect()).collect();
-            let values = |s: usize, i: usize| samples[i].statistics[k + s];
-            let mut weights = vec![1.0; samples.len()];
-            let (mut mean, mut spread) = (DVector::zeros(0), DVector::zeros(0));
-            for _ in 0..3 {
-                mean = least_squares((0..width).flat_map(|s| {
-                    let (rows, weights) = (&rows[s], &weights);
-                    (0..samples.len()).map(move |i| (&rows[i], values(s, i), weights[i]))
-                }));
-                let freedom = (width * samples.len()) as f64 / (width * samples.len() - mean.len()) as f64;
-                let left = |s: usize, i: usize| values(s, i) - rows[s][i].dot(&mean);
-                let floor =
-                    (0..samples.len()).map(|i| left(0, i).powi(2)).sum::<f64>() / samples.len() as f64;
-                let log = |s: usize, i: usize| {
-                    (freedom * left(s, i).powi(2) + 1e-6 * floor + 1e-300).ln() - LOG_CHI2
-                };
-                spread = least_squares((0..width).flat_map(|s| {
-                    let (rows, log) = (&spread_rows, &log);
-                    (0..samples.len()).map(move |i| (&rows[i], log(s, i), 1.0))
-                }));
-                // Logs of squares are anything but normal: the level is set by the squares themselves.
-                let ratio = (0..width)
-                    .flat_map(|s| (0..samples.len()).map(move |i| (s, i)))
-                    .map(|(s, i)| freedom * left(s, i).powi(2) / spread_rows[i].dot(&spread).exp())
-                    .sum::<f64>()
-                    / (width * samples.len()) as f64;
-                spread[0] += ratio.max(1e-12).ln();
-                for (w, row) in weights.iter_mut().zip(&spread_rows) {
-                    *w = (spread[0] - row.dot(&spread)).exp();
-                }
-            }
-            for s in 0..width {
-                for i in 0..samples.len() {
-                    let sigma = (0.5 * spread_rows[i].dot(&spread)).exp();
-                    standard[(i, k + s)] = (values(s, i) - rows[s][i].dot(&mean)) / sigma;
-                }
-                emulator.mean.push(mean.clone());
-                emulator.spread.push(spread.clone());
-            }
-            k += width;
-        }
-        emulator.correlation = correlation(&standard);
-        Ok(emulator)
+        let columns: Vec<&Vec<f64>> = learned.iter().flat_map(|l| &l.standard).collect();
+        let standard = DMatrix::from_fn(samples.len(), COUNT, |i, k| columns[k][i]);
+        Ok(Self {
+            ranges: *ranges,
+            mean: each(|l| &l.mean),
+            spread: each(|l| &l.spread),
+            correlation: correlation(&standard),
+        })
     }
 
     /// The mean statistics.
     pub fn mean(&self, conditions: &Conditions, blur_px2: f64) -> [f64; COUNT] {
         let scaled = Scaled::new(&self.ranges, conditions, blur_px2);
-        std::array::from_fn(|k| scaled.features(k).dot(&self.mean[k]))
+        let scalar = scaled.scalar().values;
+        std::array::from_fn(|k| {
+            let dot = |row: &[f64]| row.iter().zip(&self.mean[k]).map(|(a, b)| a * b).sum();
+            if STATISTICS[k].1 == Symmetry::Scalar { dot(&scalar) } else { dot(&scaled.of(k).values) }
+        })
     }
 
     /// Sigmas of the statistics from pour to pour, the emulator's own error included.
     pub fn sigma(&self, conditions: &Conditions, blur_px2: f64) -> [f64; COUNT] {
-        let row = Scaled::new(&self.ranges, conditions, blur_px2).spread();
+        let row = DVector::from_vec(Scaled::new(&self.ranges, conditions, blur_px2).spread());
         std::array::from_fn(|k| (0.5 * row.dot(&self.spread[k])).exp())
     }
 
@@ -141,100 +121,55 @@ impl Emulator {
     }
 }
 
-/// Conditions on the scale of their ranges.
-struct Scaled {
-    /// Friction, rolling friction, restitution and height, -1 to 1.
-    base: [f64; 4],
-    /// Effects, about 0 to 1 (or -1 to 1): adhesion, ground, variance of sizes, square of the tilt, drag, blur.
-    effects: [f64; 6],
-    tilt: [f64; 2],
+/// Mean and variance of the statistics `parts`, one alone or a pair.
+fn learn(samples: &[Sample], scaled: &[Scaled], parts: std::ops::Range<usize>) -> Learned {
+    let n = samples.len();
+    // Pictures of one pour are left out together.
+    let mut group = vec![0; n];
+    for i in 1..n {
+        group[i] = group[i - 1] + usize::from(samples[i].conditions != samples[i - 1].conditions);
+    }
+    let terms: Vec<_> = parts.clone().flat_map(|k| scaled.iter().map(move |s| s.of(k))).collect();
+    let width = terms.first().map_or(0, |t| t.values.len());
+    let design = Design {
+        rows: DMatrix::from_fn(terms.len(), width, |i, j| terms[i].values[j]),
+        degrees: terms.first().map_or_else(Vec::new, |t| t.degrees.clone()),
+        groups: (0..terms.len()).map(|i| group[i % n]).collect(),
+    };
+    let all = parts.clone().flat_map(|k| samples.iter().map(move |s| s.statistics[k]));
+    let values = DVector::from_iterator(terms.len(), all);
+    let rows: Vec<DVector<f64>> = scaled.iter().map(|s| DVector::from_vec(s.spread())).collect();
+    let mut weights = DVector::from_element(values.len(), 1.0);
+    let (mut mean, mut spread) = (DVector::zeros(0), DVector::zeros(0));
+    let mut left = Vec::new();
+    for _ in 0..ROUNDS {
+        let fitted = design.fit(&values, &weights);
+        (mean, left) = (fitted.coefficients, fitted.left_out);
+        let squares: Vec<f64> = left.iter().map(|l| l * l).collect();
+        let floor = 1e-6 * squares.iter().sum::<f64>() / squares.len() as f64 + 1e-300;
+        let logs = squares.iter().map(|s| (s + floor).ln() - LOG_CHI2);
+        spread = least_squares(logs.enumerate().map(|(i, log)| (&rows[i % n], log)));
+        // Logs of squares are anything but normal: the level is set by the squares themselves.
+        let ratio = squares.iter().enumerate().map(|(i, s)| s / rows[i % n].dot(&spread).exp()).sum::<f64>();
+        spread[0] += (ratio / squares.len() as f64).max(1e-12).ln();
+        weights = DVector::from_fn(values.len(), |i, _| (spread[0] - rows[i % n].dot(&spread)).exp());
+        weights /= weights.mean().max(1e-300);
+    }
+    let sigma = |i: usize| (0.5 * rows[i % n].dot(&spread)).exp();
+    let standard =
+        left.chunks(n).map(|l| l.iter().enumerate().map(|(i, l)| l / sigma(i)).collect()).collect();
+    Learned { mean, spread, standard }
 }
 
-impl Scaled {
-    fn new(ranges: &Ranges, c: &Conditions, blur_px2: f64) -> Self {
-        let line = |[a, b]: [f64; 2], v: f64| 2.0 * (v - a) / (b - a) - 1.0;
-        let log = |[a, b]: [f64; 2], v: f64| line([a.ln(), b.ln()], v.max(1e-9).ln());
-        let tilt = c.tilt_rad.map(|t| t / ranges.tilt_rad);
-        let w = c.work_of_adhesion_j_m2;
-        Self {
-            base: [
-                log(ranges.sliding_friction, c.sliding_friction),
-                log(ranges.rolling_friction, c.rolling_friction),
-                line(ranges.restitution, c.restitution),
-                log(ranges.height_m, c.height_m),
-            ],
-            effects: [
-                w / (w + HALF_ADHESION),
-                c.ground_ratio.max(1e-9).ln() / ranges.ground_ratio.ln(),
-                (c.size_variation / ranges.size_variation).powi(2),
-                tilt[0] * tilt[0] + tilt[1] * tilt[1],
-                c.drag_per_m / ranges.drag_per_m,
-                blur_px2 / (blur_px2 + HALF_BLUR),
-            ],
-            tilt,
-        }
-    }
-
-    /// 1, the four, and their products up to the third degree; effects, their squares and products with the four.
-    fn scalar(&self) -> Vec<f64> {
-        let mut row = vec![1.0];
-        for i in 0..4 {
-            row.push(self.base[i]);
-            for j in i..4 {
-                row.push(self.base[i] * self.base[j]);
-                row.extend((j..4).map(|k| self.base[i] * self.base[j] * self.base[k]));
-            }
-        }
-        for (at, e) in self.effects.iter().enumerate() {
-            row.extend([*e, e * e]);
-            row.extend(self.base.iter().map(|b| b * e));
-            // What saturates on one side, or bends the most.
-            if at == 1 || at == 5 {
-                row.push(e * e * e);
-            }
-        }
-        row
-    }
-
-    fn features(&self, statistic: usize) -> DVector<f64> {
-        let [x, y] = self.tilt;
-        let turning = |part: f64| {
-            let mut row = vec![part, part * (x * x + y * y)];
-            row.extend(self.base.iter().map(|b| b * part));
-            row.push(self.base[3] * self.base[3] * part);
-            row.push(self.base[1] * self.base[3] * part);
-            DVector::from_vec(row)
-        };
-        let kind = STATISTICS[statistic].1;
-        let first = if kind == Symmetry::Second { STATISTICS[statistic - 1].1 } else { kind };
-        match (first, kind) {
-            (Symmetry::Vector, Symmetry::Second) => turning(y),
-            (Symmetry::Vector, _) => turning(x),
-            (Symmetry::Tensor, Symmetry::Second) => turning(2.0 * x * y),
-            (Symmetry::Tensor, _) => turning(x * x - y * y),
-            _ => DVector::from_vec(self.scalar()),
-        }
-    }
-
-    /// What the log variance depends on.
-    fn spread(&self) -> DVector<f64> {
-        let mut row = vec![1.0];
-        row.extend(self.base);
-        row.extend(self.base.map(|b| b * b));
-        row.extend(self.effects);
-        DVector::from_vec(row)
-    }
-}
-
-/// Weighted least squares with a faint pull towards zero.
-fn least_squares<'a>(rows: impl Iterator<Item = (&'a DVector<f64>, f64, f64)>) -> DVector<f64> {
+/// Least squares with a faint pull towards zero.
+fn least_squares<'a>(rows: impl Iterator<Item = (&'a DVector<f64>, f64)>) -> DVector<f64> {
     let (mut normal, mut right) = (DMatrix::zeros(0, 0), DVector::zeros(0));
-    for (row, value, weight) in rows {
+    for (row, value) in rows {
         if right.is_empty() {
             (normal, right) = (DMatrix::identity(row.len(), row.len()) * RIDGE, DVector::zeros(row.len()));
         }
-        normal.ger(weight, row, row, 1.0);
-        right.axpy(weight * value, row, 1.0);
+        normal.ger(1.0, row, row, 1.0);
+        right.axpy(value, row, 1.0);
     }
     let zero = DVector::zeros(right.len());
     normal.cholesky().map_or(zero, |c| c.solve(&right))

@@ -1,7 +1,8 @@
 //! Heaps in few bytes: what a campaign keeps of its pours.
 //!
-//! A shard is a list of records, each a pour's number and its grains: centres in 32nds of the mean diameter, radii in 64ths of
-//! the mean radius. Shards of one campaign merge by putting one behind the other.
+//! A shard is a list of records, each a pour's number and its grains sphere by sphere (a rod is several, as many in every rod of a
+//! pour): centres in 32nds of the mean diameter, radii in 64ths of the mean radius. Shards of one campaign merge by putting one
+//! behind the other.
 
 use crate::campaign::{Grains, Rig};
 
@@ -9,9 +10,9 @@ use crate::campaign::{Grains, Rig};
 const STEPS: f64 = 32.0;
 /// Steps of a radius in a mean radius.
 const RADIUS_STEPS: f64 = 64.0;
-/// Bytes before the grains: the pour's number and how many grains there are.
+/// Bytes before the spheres: the pour's number and how many there are.
 const HEAD: usize = 8;
-/// Bytes of a grain.
+/// Bytes of a sphere.
 const GRAIN: usize = 7;
 
 /// A shard that does not hold what it says.
@@ -25,12 +26,12 @@ pub enum ShardError {
         /// Where the record begins.
         at: usize,
     },
-    /// A record holds another number of grains than the rig.
-    #[error("pour {pour} has {received} grains, expected {expected}")]
+    /// A record's spheres are no whole number for each of the rig's grains.
+    #[error("pour {pour} has {received} spheres, expected {expected} or a multiple of it")]
     Count {
         /// The pour.
         pour: u32,
-        /// Grains in the record.
+        /// Spheres in the record.
         received: usize,
         /// Grains of the rig.
         expected: usize,
@@ -78,7 +79,7 @@ pub fn read(shard: &[u8], rig: &Rig) -> Result<Vec<(u32, Grains)>, ShardError> {
         };
         let (Some(pour), Some(n)) = (word(at), word(at + 4)) else { return Err(short) };
         let n = n as usize;
-        if n != rig.count {
+        if n == 0 || !n.is_multiple_of(rig.count) {
             return Err(ShardError::Count { pour, received: n, expected: rig.count });
         }
         let Some(body) = shard.get(at + HEAD..at + HEAD + GRAIN * n) else { return Err(short) };

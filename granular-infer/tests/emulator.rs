@@ -14,7 +14,10 @@ fn law(c: &Conditions, k: usize) -> f64 {
     let [x, y] = c.tilt_rad;
     let turning = 3.0 + c.sliding_friction.ln();
     match STATISTICS[k].1 {
-        Symmetry::Scalar => base + c.size_variation.powi(2) * 3.0 - 0.5 * c.ground_ratio.ln(),
+        Symmetry::Scalar => {
+            let rods = 0.4 * (c.aspect_ratio - 1.0) * c.restitution;
+            base + c.size_variation.powi(2) * 3.0 - 0.5 * c.ground_ratio.ln() - rods
+        }
         Symmetry::Vector => turning * x,
         Symmetry::Tensor => turning * (x * x - y * y),
         Symmetry::Second if STATISTICS[k - 1].1 == Symmetry::Vector => turning * y,

@@ -130,3 +130,32 @@ fn cache_file(rig: &Rig, ranges: &Ranges) -> Option<PathBuf> {
         .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
     Some(folder.join("missing-physics").join(format!("pours-{hash:016x}.bin")))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use super::*;
+
+    /// The pours that come with the tool are those of its rig, its ranges and its seed: poured again they are the same heaps. (Bits
+    /// may differ between processors, and a pour amplifies them.)
+    #[test]
+    fn bundled_pours_can_be_poured_again() {
+        let campaign = Campaign::of(&BUNDLED_RIG, [0.04, 0.12]).unwrap();
+        assert_eq!(campaign.rig, BUNDLED_RIG);
+        let mean_radius = |g: &Grains| {
+            let radii: Vec<f64> =
+                g.positions_m.iter().map(|p| p[0].hypot(p[1])).filter(|r| *r < 0.1).collect();
+            (radii.len() as f64, radii.iter().sum::<f64>() / radii.len() as f64)
+        };
+        let spheres = campaign.pours.iter().filter(|(_, g)| g.radii_m.len() == BUNDLED_RIG.count);
+        for (pour, kept) in spheres.take(3) {
+            let conditions = campaign.ranges.draw(SEED, u64::from(*pour));
+            let again = BUNDLED_RIG.pour(&conditions, u64::from(*pour)).unwrap();
+            let ((n, r), (n_again, r_again)) = (mean_radius(kept), mean_radius(&again));
+            assert!((n_again / n - 1.0).abs() < 0.1, "{pour}: {n} and {n_again} grains near the axis");
+            assert!((r_again / r - 1.0).abs() < 0.1, "{pour}: {r} and {r_again} m");
+        }
+        let rods = campaign.pours.iter().filter(|(_, g)| g.radii_m.len() > BUNDLED_RIG.count);
+        assert!(rods.clone().count() > 30 && rods.clone().all(|(pour, _)| pour % 2 == 0));
+    }
+}

@@ -4,6 +4,8 @@
 //! simulated pours, each seen by the recording's own camera; the engine gets the statistics independent and of variance one.
 
 mod campaign;
+#[cfg(test)]
+mod codes;
 mod excess;
 mod model;
 mod read;
@@ -101,7 +103,7 @@ impl Domain for GrainPour {
         };
         let mut undetermined = vec![
             "each statistic is shown less what those before it say of it, in standard deviations from pour to pour".into(),
-            "grains that are not spheres are not in the model: they would be unexplained".into(),
+            "grains that are not spheres are rods in the model: cubes and flakes are told as rods of some length, or unexplained".into(),
         ];
         undetermined.extend(excess::words(&read, &model.baseline(&read, &campaign)));
         Ok(Loaded {

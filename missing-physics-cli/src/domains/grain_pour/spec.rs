@@ -21,6 +21,7 @@ pub(super) struct Places {
     pub(super) blur_px2: At,
     pub(super) depth_offset: At,
     pub(super) drag: At,
+    pub(super) aspect: At,
     /// Candidate terms of an unknown law: the heap stands aside, is oval, is rougher, is larger.
     pub(super) aside: [At; 2],
     pub(super) oval: [At; 2],
@@ -61,6 +62,18 @@ fn grains(b: &mut Builder, p: &mut Places, ranges: &Ranges) {
             "Derjaguin, Muller and Toporov 1975, doi:10.1016/0021-9797(75)90018-1",
         ],
         &["ground-friction", "size-spread"],
+    );
+    p.aspect = b.shared("aspect_ratio", "", 1.0, [1.0, ranges.aspect_ratio], 0.1);
+    b.mechanism(
+        "non-spherical-grains",
+        &[p.aspect],
+        [
+            "grains that are not spheres",
+            "Long grains interlock and do not roll: a narrower, steeper heap.",
+            "rods with round ends, aspect_ratio = length / width (1: spheres), of a sphere's volume",
+            "Borzsonyi and Stannarius 2013, doi:10.1039/C3SM50298H",
+        ],
+        &["cohesion", "ground-friction"],
     );
     let most = ranges.size_variation.powi(2);
     p.size_variance = b.shared("relative_variance", "", 0.0, [0.0, most], 0.02);

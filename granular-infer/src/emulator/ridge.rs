@@ -1,0 +1,93 @@
+//! Weighted ridge regression whose strength is chosen by what is left out.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Parts that are left out in turn.
+const FOLDS: usize = 10;
+/// How much dearer a coefficient is than one of a degree less.
+const DEARER: f64 = 2.0;
+/// Strengths that are tried, in samples.
+const STRENGTHS: [f64; 7] = [1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0, 10.0];
+
+/// A design: a row for each value, the degree of each column, and which row belongs to which group that is left out together.
+#[derive(Debug, Clone)]
+pub(super) struct Design {
+    pub(super) rows: DMatrix<f64>,
+    pub(super) degrees: Vec<u8>,
+    pub(super) groups: Vec<usize>,
+}
+
+/// Coefficients, and how far each value lies from what is foretold without its part.
+#[derive(Debug, Clone)]
+pub(super) struct Fitted {
+    pub(super) coefficients: DVector<f64>,
+    pub(super) left_out: Vec<f64>,
+}
+
+impl Design {
+    /// Coefficients of values with weights (one each on average), at the strength that foretells best what is left out.
+    pub(super) fn fit(&self, values: &DVector<f64>, weights: &DVector<f64>) -> Fitted {
+        let normal = Normal::new(&self.rows, values, weights);
+        let parts: Vec<(Vec<usize>, Normal)> = (0..FOLDS)
+            .map(|fold| {
+                let own: Vec<usize> = (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
+                let without = normal.less(&Normal::new(
+                    &self.rows.select_rows(&own),
+                    &values.select_rows(&own),
+                    &weights.select_rows(&own),
+                ));
+                (own, without)
+            })
+            .collect();
+        let left_out = |strength: f64| {
+            let mut left = vec![0.0; values.len()];
+            for (own, without) in &parts {
+                let coefficients = without.solve(&self.degrees, strength);
+                for &i in own {
+                    left[i] = values[i] - (self.rows.row(i) * &coefficients)[0];
+                }
+            }
+            left
+        };
+        let cost = |left: &[f64]| left.iter().zip(weights.iter()).map(|(l, w)| w * l * l).sum::<f64>();
+        let mut best = (f64::INFINITY, STRENGTHS[0], Vec::new());
+        for strength in STRENGTHS {
+            let left = left_out(strength);
+            let cost = cost(&left);
+            if cost < best.0 || best.2.is_empty() {
+                best = (cost, strength, left);
+            }
+        }
+        Fitted { coefficients: normal.solve(&self.degrees, best.1), left_out: best.2 }
+    }
+}
+
+/// Normal equations.
+struct Normal {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl Normal {
+    fn new(rows: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64>) -> Self {
+        let mut weighted = rows.clone();
+        for mut column in weighted.column_iter_mut() {
+            column.component_mul_assign(weights);
+        }
+        Self { matrix: weighted.tr_mul(rows), right: weighted.tr_mul(values) }
+    }
+
+    fn less(&self, part: &Self) -> Self {
+        Self { matrix: &self.matrix - &part.matrix, right: &self.right - &part.right }
+    }
+
+    /// Ridge; the level is free.
+    fn solve(&self, degrees: &[u8], strength: f64) -> DVector<f64> {
+        let mut matrix = self.matrix.clone();
+        for (k, degree) in degrees.iter().enumerate() {
+            matrix[(k, k)] +=
+                strength * if *degree == 0 { 1e-3 } else { DEARER.powi(i32::from(*degree) - 1) };
+        }
+        matrix.cholesky().map_or_else(|| DVector::zeros(degrees.len()), |c| c.solve(&self.right))
+    }
+}

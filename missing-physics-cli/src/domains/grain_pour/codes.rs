@@ -1,0 +1,98 @@
+//! How far pours of another simulator lie from the emulator, in what pours of one simulator differ by.
+//!
+//! `benches/peers/pours.py make FOLDER --kinds null --seed 21` (and 22, ...), then
+//! `POURS=FOLDER cargo test --release -p missing-physics-cli another_simulator -- --ignored --nocapture`.
+
+use std::path::{Path, PathBuf};
+
+use granular_infer::campaign::Conditions;
+use granular_infer::statistics::{COUNT, STATISTICS};
+
+use super::campaign::Campaign;
+use super::model::PourModel;
+use super::read::read;
+use crate::recording::Header;
+
+/// A recording's statistics less the emulator's, in sigmas: mean and scatter over its pours at the truth, mean at the likeliest
+/// baseline.
+struct Distance {
+    at_truth: [f64; COUNT],
+    scatter: [f64; COUNT],
+    at_best: [f64; COUNT],
+    pours: f64,
+}
+
+/// What the key says was poured; the azimuth of a tilt is that of the heap's centroid.
+fn truth(key: &serde_json::Value, campaign: &Campaign, aside: [f64; 2]) -> Option<(Conditions, f64)> {
+    let truth = |name: &str| key["truth"][name].as_f64();
+    let mut c = Conditions {
+        sliding_friction: truth("friction")?,
+        rolling_friction: truth("rolling")?,
+        restitution: truth("restitution")?,
+        height_m: 0.0,
+        ..campaign.ranges.baseline()
+    };
+    let mut blur = 0.0;
+    for mechanism in key["mechanisms"].as_array()? {
+        let value = mechanism["parameters"].as_object()?.values().next()?.as_f64()?;
+        match mechanism["id"].as_str()? {
+            "cohesion" => c.work_of_adhesion_j_m2 = value,
+            "ground-friction" => c.ground_ratio = value / c.sliding_friction,
+            "size-spread" => c.size_variation = value,
+            "air-drag" => c.drag_per_m = value,
+            "non-spherical-grains" => c.aspect_ratio = value,
+            "funnel-offset" => c.height_m = value,
+            "depth-blur" => blur = value * value,
+            "tilted-ground" => c.tilt_rad = aside.map(|a| value * a / aside[0].hypot(aside[1])),
+            _ => {}
+        }
+    }
+    Some((c, blur))
+}
+
+fn distance(folder: &Path) -> Result<Distance, Box<dyn std::error::Error>> {
+    let key: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("key.json"))?)?;
+    let read = read(&Header::read(folder)?)?;
+    let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m).collect();
+    let range = [heights.iter().copied().fold(1.0, f64::min), heights.iter().copied().fold(0.0, f64::max)];
+    let campaign = Campaign::of(&read.rig, range)?;
+    let model = PourModel::new(&campaign, &read)?;
+    let aside = model.aside(&read);
+    let (conditions, blur_px2) = truth(&key, &campaign, aside).ok_or("a key without a truth")?;
+    let (at_truth, scatter) = model.distance(&read, &conditions, blur_px2);
+    let best = Conditions { height_m: 0.0, ..model.nearest_baseline(&read, &campaign) };
+    let at_best = model.distance(&read, &best, 0.0).0;
+    println!("{} truth {conditions:?}\n   best {best:?}", folder.display());
+    Ok(Distance { at_truth, scatter, at_best, pours: heights.len() as f64 })
+}
+
+#[test]
+#[ignore = "needs recordings of another simulator"]
+#[allow(clippy::print_stdout, clippy::unwrap_used, reason = "a table for a person")]
+fn another_simulator() {
+    let folder =
+        PathBuf::from(std::env::var_os("POURS").expect("POURS=FOLDER of recordings with nothing hidden"));
+    let mut worlds: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    worlds.sort();
+    let found: Vec<Distance> = worlds.iter().map(|w| distance(w).unwrap()).collect();
+    assert!(!found.is_empty());
+    println!(
+        "root mean square over {} recordings, in sigmas from pour to pour (means: beyond what chance leaves)",
+        found.len()
+    );
+    println!("{:24} {:>9} {:>9} {:>9}   each at truth", "statistic", "at truth", "scatter", "at best");
+    for (k, (name, _)) in STATISTICS.iter().enumerate() {
+        let mean = |of: &dyn Fn(&Distance) -> f64| {
+            let square = found.iter().map(of).sum::<f64>() / found.len() as f64;
+            square.signum() * square.abs().sqrt()
+        };
+        let each: Vec<String> = found.iter().map(|d| format!("{:5.1}", d.at_truth[k])).collect();
+        println!(
+            "{name:24} {:9.2} {:9.2} {:9.2}   {}",
+            mean(&|d| d.at_truth[k].powi(2) - d.scatter[k].powi(2) / d.pours),
+            mean(&|d| d.scatter[k].powi(2)),
+            mean(&|d| d.at_best[k].powi(2) - d.scatter[k].powi(2) / d.pours),
+            each.join(" ")
+        );
+    }
+}
