@@ -3,6 +3,7 @@
 //! The short test tries a few mutants of each, and every one in `mutilated.seeds` that was ever caught. The long one tries new ones
 //! for a minute for each kind, writes what it catches into that file, and fails:
 //! `cargo test --release -p missing-physics-cli --test mutilated -- --ignored`
+//! Both try all kinds, or those that `MUTILATED=png,stl` names.
 //! Readers alone are fuzzed by their coverage as well, by `.ci/fuzz`; what that found stands in `fuzz/seeds`.
 #![allow(
     clippy::unwrap_used,
@@ -123,6 +124,14 @@ fn answered(kind: &Kind, folder: &Path) -> Option<String> {
     }
 }
 
+/// The kinds that `MUTILATED` names, separated by commas; all of them without it.
+fn wanted() -> impl Iterator<Item = Kind> {
+    let asked = std::env::var("MUTILATED").ok();
+    let named =
+        move |kind: &Kind| asked.as_ref().is_none_or(|names| names.split(',').any(|n| n == kind.name));
+    kinds().into_iter().filter(named)
+}
+
 fn kept() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutilated.seeds")
 }
@@ -142,7 +151,7 @@ fn sound_recordings_are_read() {
 #[test]
 fn mutants_are_read_or_refused() {
     let seeds = std::fs::read_to_string(kept()).unwrap();
-    for kind in kinds() {
+    for kind in wanted() {
         let known = seeds.lines().filter_map(|line| line.strip_prefix(kind.name)?.trim().parse().ok());
         for seed in (0..24).chain(known) {
             assert_eq!(caught(&kind, seed), None, "{} {seed}", kind.name);
@@ -166,7 +175,7 @@ fn mutants_for_a_minute_each() {
     use std::io::Write as _;
     let mut file = std::fs::OpenOptions::new().append(true).open(kept()).unwrap();
     let mut all = Vec::new();
-    for kind in kinds() {
+    for kind in wanted() {
         let begin = Instant::now();
         let mut tried = 0;
         // Seeds of the day: every long run tries others.

@@ -48,7 +48,7 @@ pub struct Key {
     pub hidden: Hidden,
     /// Identifiers of the listed mechanisms at work, in alphabetical order.
     pub mechanisms: Vec<String>,
-    /// Identifiers that may stand beside them or be left out (the drag through which a wind acts).
+    /// Identifiers that may be named beside them or not, which is the same model (the drag through which a wind acts).
     pub beside: Vec<String>,
     /// Their parameters, by the names of the recordings' format.
     pub parameters: Vec<HiddenParameter>,
@@ -141,6 +141,12 @@ impl Key {
             name: name.into(),
             value,
         }));
+    }
+
+    /// Takes a mechanism and its parameters out again.
+    pub(crate) fn without(&mut self, mechanism: &str) {
+        self.mechanisms.retain(|m| m != mechanism);
+        self.parameters.retain(|p| p.mechanism != mechanism);
     }
 }
 
