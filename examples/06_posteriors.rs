@@ -7,7 +7,7 @@
 //! cargo run --release -p examples --example 06_posteriors -- slcp autoregressive 100000 --observations=3 --points=3000
 //! ```
 //! Tasks, densities and numbers of simulations among the arguments keep to those named; `--coverage=0` leaves coverage out, which takes
-//! long where the prior's box has five dimensions or more.
+//! long where the prior's box has five dimensions or more; `--seed=2` and so on draw and train anew.
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 #![allow(clippy::unwrap_used, reason = "what the tests share stops where data are damaged")]
 
@@ -39,12 +39,18 @@ const PUBLISHED: [(&str, [f64; 3]); 10] = [
     ("lotka_volterra", [0.9994, 0.9968, 0.9808]),
 ];
 
-fn train(name: &str, task: &Task, count: usize) -> Result<Box<dyn ConditionalDensity>, Box<dyn Error>> {
-    let data = task.simulations(count, 42);
+/// Simulations and training with seeds of their own; the first are those of `bayes-sim/tests/posteriors.rs`.
+fn train(
+    name: &str,
+    task: &Task,
+    count: usize,
+    seed: u64,
+) -> Result<Box<dyn ConditionalDensity>, Box<dyn Error>> {
+    let data = task.simulations(count, 41 + seed);
     Ok(match name {
-        "mdn" => Box::new(Mdn::train(&task.prior, &data, &MdnSettings::default(), 1)?),
-        "mdrff" => Box::new(Mdrff::train(&task.prior, &data, &MdrffSettings::default(), 1)?),
-        _ => Box::new(Autoregressive::train(&task.prior, &data, &AutoregressiveSettings::default(), 1)?),
+        "mdn" => Box::new(Mdn::train(&task.prior, &data, &MdnSettings::default(), seed)?),
+        "mdrff" => Box::new(Mdrff::train(&task.prior, &data, &MdrffSettings::default(), seed)?),
+        _ => Box::new(Autoregressive::train(&task.prior, &data, &AutoregressiveSettings::default(), seed)?),
     })
 }
 
@@ -88,6 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let observations = number(&arguments, "--observations=", if small { 1 } else { 10 })?.clamp(1, 10);
     let points = number(&arguments, "--points=", if small { 1_000 } else { 10_000 })?.clamp(50, 10_000);
+    let seed = number(&arguments, "--seed=", 1)?;
     let tests = number(&arguments, "--coverage=", if small { 500 } else { 1_000 })?;
     println!(
         "C2ST: 0.5 for a posterior that cannot be told from the reference. Coverage: mean of coverage less level."
@@ -102,7 +109,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let npe = published[i];
             for name in densities.iter().filter(|d| !any_density || named(d)) {
                 let start = Instant::now();
-                let density = train(name, task, count)?;
+                let density = train(name, task, count, seed as u64)?;
                 let seconds = start.elapsed().as_secs_f64();
                 let mut sum = 0.0;
                 for i in 1..=observations {

@@ -3,11 +3,12 @@
 //! ```text
 //! cargo run --release -p examples --example 14_tracking -- --small              4 throws a ball
 //! cargo run --release -p examples --example 14_tracking -- --picture FILE.svg   30 throws a ball, and the same with phase correlation
+//! cargo run --release -p examples --example 14_tracking -- --harsh              30 throws a ball in a worse room, by peak times
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 
 use bounce_audio::drop::each;
-use bounce_audio::fake::{Court, CourtSettings, FakeBall, Toss, Verdict};
+use bounce_audio::fake::{Court, CourtSettings, FakeBall, Room, Toss, Verdict};
 use bounce_audio::hear::HearSettings;
 use bounce_audio::listen::{Delays, Listener};
 use bounce_audio::track::{
@@ -41,6 +42,34 @@ const BALLS: [Ball; 3] = [
     Ball { name: "moon", restitution: 0.85, log10_kappa: 2.2, speed_m_s: 0.6, ahead: 2 },
 ];
 
+/// Where the table stands.
+struct Place {
+    name: &'static str,
+    size_m: [f64; 3],
+    /// The table's origin in the room, m.
+    table_m: [f64; 3],
+    rt60_s: f64,
+}
+
+const LIVING_ROOM: Place = Place {
+    name: "a living room, echo of 0.3 s",
+    size_m: [4.0, 5.0, 2.7],
+    table_m: [1.7, 2.2, 0.75],
+    rt60_s: 0.3,
+};
+
+/// A worse one: two walls 30 cm from the table, which echo for longer.
+const CORNER: Place =
+    Place { name: "in a corner, echo of 0.5 s", table_m: [0.3, 0.3, 0.75], rt60_s: 0.5, ..LIVING_ROOM };
+
+impl Place {
+    fn room(&self) -> Result<Room, Failure> {
+        let home = Court::living_room(0.3)?;
+        let (c, rate_hz) = (home.speed_m_s(), home.rate_hz());
+        Ok(Room::new(self.size_m, self.table_m, self.rt60_s, c, home.microphones_m(), rate_hz)?)
+    }
+}
+
 /// One throw with one algorithm.
 struct Outcome {
     verdict: Verdict,
@@ -64,14 +93,16 @@ struct Bar {
 fn main() -> Result<(), Failure> {
     let small = examples::small();
     let throws = if small { 4 } else { 30 };
-    let listeners: &[(&str, Delays)] = if small {
+    let harsh = std::env::args().any(|a| a == "--harsh");
+    let place = if harsh { &CORNER } else { &LIVING_ROOM };
+    let listeners: &[(&str, Delays)] = if small || harsh {
         &[("peak times, as in the thesis", Delays::Peaks)]
     } else {
         &[("peak times, as in the thesis", Delays::Peaks), ("phase correlation", Delays::Phase)]
     };
     let mut bars = Vec::new();
-    for &(name, delays) in listeners {
-        bars.push(compare(name, delays, throws, small)?);
+    for &listener in listeners {
+        bars.push(compare(place, listener, throws, small)?);
     }
     if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
         std::fs::write(&file, picture(&bars[0])?)?;
@@ -80,9 +111,15 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-fn compare(name: &str, delays: Delays, throws: usize, small: bool) -> Result<Vec<Bar>, Failure> {
+fn compare(
+    place: &Place,
+    (name, delays): (&str, Delays),
+    throws: usize,
+    small: bool,
+) -> Result<Vec<Bar>, Failure> {
     println!(
-        "\nfigure 4.7, {name}: {throws} throws a ball in a room with an echo of 0.3 s, the same throws for both algorithms"
+        "\nfigure 4.7, {name}: {throws} throws a ball, {}, the same throws for both algorithms",
+        place.name
     );
     println!(
         "{:10} {:28} {:>8} {:>18} {:>8} {:>5} {:>16} {:>12}",
@@ -99,9 +136,9 @@ fn compare(name: &str, delays: Delays, throws: usize, small: bool) -> Result<Vec
     for ball in &BALLS {
         let next = learned(ball, small)?;
         let outcomes: Result<Vec<[Outcome; 3]>, Failure> = each(throws, 15, |i, _| {
-            let with = |touch_m| throw(ball, Some((&next, touch_m)), delays, i as u64);
+            let with = |touch_m| throw(place, ball, Some((&next, touch_m)), delays, i as u64);
             // A ball is touched within the paddle's radius and its own.
-            Ok([throw(ball, None, delays, i as u64)?, with(0.0)?, with(0.07)?])
+            Ok([throw(place, ball, None, delays, i as u64)?, with(0.0)?, with(0.07)?])
         })
         .into_iter()
         .collect();
@@ -174,12 +211,13 @@ fn learned(ball: &Ball, small: bool) -> Result<NextBounce, Failure> {
 }
 
 fn throw(
+    place: &Place,
     ball: &Ball,
     next: Option<(&NextBounce, f64)>,
     delays: Delays,
     seed: u64,
 ) -> Result<Outcome, Failure> {
-    let room = Court::living_room(0.3)?;
+    let room = place.room()?;
     let microphones = room.microphones_m().to_vec();
     let (rate_hz, speed) = (room.rate_hz(), room.speed_m_s());
     let real = FakeBall::new(ball.restitution + 0.01, 10f64.powf(ball.log10_kappa));

@@ -51,20 +51,23 @@ pub(crate) fn split(n: usize, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>)
     (rest, order)
 }
 
-/// Random features of each input of `dim` numbers, with the input itself behind.
-fn widened(features: &RandomFeatures, inputs: &[f64], dim: usize) -> Vec<f64> {
+/// Random features of each input of `dim` numbers, times `unit`, with the input itself behind.
+fn widened(features: &RandomFeatures, unit: f64, inputs: &[f64], dim: usize) -> Vec<f64> {
     let wide_dim = features.len() + dim;
     let mut wide = vec![0.0; wide_dim * (inputs.len() / dim)];
     for (out, x) in wide.chunks_exact_mut(wide_dim).zip(inputs.chunks_exact(dim)) {
         let (head, tail) = out.split_at_mut(features.len());
         features.write(x, head);
+        head.iter_mut().for_each(|f| *f *= unit);
         tail.copy_from_slice(x);
     }
     wide
 }
 
-fn expanded(features: &RandomFeatures, pairs: &Pairs) -> Pairs {
-    let inputs = widened(features, &pairs.inputs, pairs.input_dim);
+/// The same of pairs. What trains has [`RandomFeatures::unit`]: a step of Adam is as long for every weight, and at a unit of one the
+/// steps of hundreds of features add up to jumps as long as a component is wide.
+fn expanded(features: &RandomFeatures, unit: f64, pairs: &Pairs) -> Pairs {
+    let inputs = widened(features, unit, &pairs.inputs, pairs.input_dim);
     let input_dim = features.len() + pairs.input_dim;
     Pairs { input_dim, inputs, target_dim: pairs.target_dim, targets: pairs.targets.clone() }
 }
@@ -75,7 +78,7 @@ impl Member {
         match &self.features {
             None => self.network.forward(inputs, batch, scratch),
             Some(features) => {
-                self.network.forward(&widened(features, inputs, inputs.len() / batch), batch, scratch);
+                self.network.forward(&widened(features, 1.0, inputs, inputs.len() / batch), batch, scratch);
             }
         }
         &scratch.outputs[..self.head.outputs() * batch]
@@ -85,7 +88,7 @@ impl Member {
     fn ln_densities(&self, pairs: &Pairs) -> Vec<f64> {
         match &self.features {
             None => ln_densities(&self.network, &self.head, pairs),
-            Some(features) => ln_densities(&self.network, &self.head, &expanded(features, pairs)),
+            Some(features) => ln_densities(&self.network, &self.head, &expanded(features, 1.0, pairs)),
         }
     }
 
@@ -107,7 +110,7 @@ impl Member {
         let wide = match plan {
             Plan::Features { kernel, count, draw, .. } => {
                 let (chosen, wide) = choose_features(kernel, *count, *draw, pairs, held_out, rng)?;
-                let tests = expanded(&chosen, held_out);
+                let tests = expanded(&chosen, chosen.unit(), held_out);
                 features = Some(chosen);
                 Some((wide, tests))
             }
@@ -118,6 +121,9 @@ impl Member {
         let body = !matches!(plan, Plan::Linear);
         let mut network = start(&head, hidden, body, pairs.input_dim, &regression, rng);
         let report = train(&mut network, &head, pairs, held_out, settings, rng);
+        if let Some(features) = &features {
+            network.scale_inputs(features.len(), features.unit());
+        }
         Ok((Self { features, network, head }, report))
     }
 }
@@ -141,8 +147,8 @@ fn choose_features(
     for factor in [0.25, 0.5, 1.0, 2.0, 4.0] {
         let scaled = Kernel { length_scale: kernel.length_scale * factor, ..*kernel };
         let features = RandomFeatures::draw(&scaled, pairs.input_dim, count, draw, rng)?;
-        let wide = expanded(&features, pairs);
-        let tests = expanded(&features, held_out);
+        let wide = expanded(&features, features.unit(), pairs);
+        let tests = expanded(&features, features.unit(), held_out);
         let Some(regression) = best_ridge(&wide, &tests) else { continue };
         let error = regression.ln_error(&tests);
         if best.as_ref().is_none_or(|b| error < b.0) {

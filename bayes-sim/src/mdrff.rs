@@ -45,7 +45,7 @@ impl Default for MdrffSettings {
             length_scale: None,
             frequencies: 150,
             components: 8,
-            members: 2,
+            members: 3,
             training: TrainingSettings { learning_rate: 3e-3, ..TrainingSettings::default() },
         }
     }

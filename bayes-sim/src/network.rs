@@ -156,6 +156,13 @@ impl Network {
         }
     }
 
+    /// Takes a factor on each of the first `count` inputs into their weights; there must be no hidden layer.
+    pub(crate) fn scale_inputs(&mut self, count: usize, factor: f64) {
+        let output = self.shape.blocks().1;
+        let weights = &mut self.params[output.range()];
+        weights.iter_mut().take(count * output.rows).for_each(|w| *w *= factor);
+    }
+
     /// Outputs of `batch` inputs, column after column, into `scratch.outputs`.
     pub(crate) fn forward(&self, inputs: &[f64], batch: usize, scratch: &mut Scratch) {
         let (layers, output, linear) = self.shape.blocks();

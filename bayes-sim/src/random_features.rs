@@ -68,6 +68,11 @@ impl RandomFeatures {
         self.frequencies.is_empty()
     }
 
+    /// The factor on features that makes the product of two points' the kernel.
+    pub(crate) fn unit(&self) -> f64 {
+        (0.5 * self.len() as f64).sqrt().recip()
+    }
+
     /// Writes the features of `x`; the product of two points' features, divided by their number over 2, is about the kernel.
     pub fn write(&self, x: &[f64], out: &mut [f64]) {
         for (w, pair) in self.frequencies.chunks_exact(self.dim).zip(out.chunks_exact_mut(2)) {

@@ -21,7 +21,7 @@ impl InputScaling {
         let mut out = Self { centre: Vec::new(), scale: Vec::new(), heavy: Vec::new() };
         for j in 0..x.dim() {
             let mut column = x.column(j);
-            let (mean, sd) = mean_sd(&column);
+            let (mean, sd) = centre_scale(&column);
             let kurtosis =
                 column.iter().map(|v| ((v - mean) / sd).powi(4)).sum::<f64>() / column.len() as f64;
             let heavy = kurtosis > 8.0;
@@ -35,7 +35,7 @@ impl InputScaling {
                 }
             }
             out.centre.push(centre);
-            out.scale.push(if scale > 0.0 { scale } else { 1.0 });
+            out.scale.push(scale);
             out.heavy.push(heavy);
         }
         out
@@ -63,8 +63,7 @@ pub(crate) struct OutputScaling {
 
 impl OutputScaling {
     pub(crate) fn fit(u: &Points) -> Self {
-        let columns = (0..u.dim()).map(|j| mean_sd(&u.column(j)));
-        let (centre, scale) = columns.map(|(m, s)| (m, if s > 0.0 { s } else { 1.0 })).unzip();
+        let (centre, scale) = (0..u.dim()).map(|j| centre_scale(&u.column(j))).unzip();
         Self { centre, scale }
     }
 
@@ -77,9 +76,35 @@ impl OutputScaling {
     }
 }
 
+/// Mean and standard deviation; for a column that never changes that value and 1, since the rounding of its mean is no scale.
+fn centre_scale(values: &[f64]) -> (f64, f64) {
+    let (mean, sd) = mean_sd(values);
+    match values.first() {
+        Some(first) if values.iter().all(|v| v == first) => (*first, 1.0),
+        _ => (mean, if sd > 0.0 { sd } else { 1.0 }),
+    }
+}
+
 pub(crate) fn mean_sd(values: &[f64]) -> (f64, f64) {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
     (mean, variance.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 0.1 a thousand times has a mean that is not 0.1, but no spread: what is a little off is no 10 standard deviations off.
+    #[test]
+    fn a_column_that_never_changes_has_no_scale() {
+        let column = vec![0.1; 1000];
+        assert!(mean_sd(&column).1 > 0.0);
+        let x = Points::from_values(1, column).unwrap_or_else(|e| panic!("{e}"));
+        let mut z = Vec::new();
+        InputScaling::fit(&x).apply(&[0.1 + 1e-9], &mut z);
+        assert!(z[0].abs() < 1e-8, "{z:?}");
+        assert_eq!(OutputScaling::fit(&x).apply(&[0.1]), [0.0]);
+    }
 }
