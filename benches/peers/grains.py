@@ -19,6 +19,8 @@ import shutil
 import subprocess
 
 OUTLET, TUBE = 0.014, 0.04
+# Height in m over which rods are strewn: from higher up they would rain onto the heap.
+FILL = 0.08
 # An empty box of +-1 m makes the neighbour grids of both six times slower.
 BOX = "-0.25 0.25 -0.25 0.25 -0.01 0.5"
 # LIGGGHTS takes primes as seeds.
@@ -105,7 +107,7 @@ def clumps(scene, seed):
     bottom = scene.height + TUBE - OUTLET
     return f"""fix shape all particletemplate/multisphere 15485863 atom_type 1 density constant {scene.density} nspheres {len(scene.clump[1])} ntry 200000 spheres file {scene.clump[0]} scale 1.0 type 1
 fix shapes all particledistribution/discrete 32452843 1 shape 1.0
-region tube cylinder z 0 0 {TUBE} {bottom} 0.48 units box
+region tube cylinder z 0 0 {TUBE} {bottom} {bottom + FILL} units box
 fix fill all insert/pack seed {PRIMES[seed % len(PRIMES)]} distributiontemplate shapes insert_every once overlapcheck yes all_in yes orientation random particles_in_region {scene.count} region tube
 fix move all multisphere"""
 
