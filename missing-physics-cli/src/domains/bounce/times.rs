@@ -24,8 +24,10 @@ pub(super) struct TimesModel {
     height_m: Option<f64>,
 }
 
-/// Impacts over which errors may hang together where there is one drop.
-const LONGEST_IN_ONE: f64 = 3.0;
+/// Impacts over which errors may hang together where there is one drop: heard ones by their fading loudness ...
+const LONGEST_HEARD: f64 = 3.0;
+/// ... and those that were marked one by one: neighbours alike by a third (exp(-1)).
+const LONGEST_MARKED: f64 = 1.0;
 
 /// Inputs of a row: the impact's number, and how many impacts went unheard before it in its run: known ones, all.
 const KNOWN: usize = 1;
@@ -129,7 +131,11 @@ impl Model for TimesModel {
 
     /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
     fn longest_noise(&self) -> f64 {
-        if self.setup.unheard[1] > 1 { f64::INFINITY } else { LONGEST_IN_ONE }
+        match self.setup.unheard[1] {
+            2.. => f64::INFINITY,
+            _ if self.setup.listened => LONGEST_HEARD,
+            _ => LONGEST_MARKED,
+        }
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
