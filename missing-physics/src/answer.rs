@@ -152,11 +152,16 @@ impl Answer<'_> {
     }
 
     /// Why the closest explanation is none.
-    pub(crate) fn closest(&self, closest: &Candidate, best: &Best, fails: bool) -> String {
+    pub(crate) fn closest(&self, ranking: &Ranking, best: &Best, fails: bool) -> String {
+        let closest = ranking.at(best.at);
         let but = if fails {
             format!("it leaves a misfit of its own (p = {:.3}; {})", best.p_value, best.failing)
         } else {
-            "it predicts data that it has not seen no better than the baseline".to_owned()
+            let noise = match ranking.gain(&closest.set) {
+                Some(gain) if gain > 0.0 => " with correlated noise",
+                _ => "",
+            };
+            format!("it predicts data that it has not seen no better than the baseline{noise}")
         };
         format!("the closest explanation is {}, but {but}", self.names(&closest.set))
     }
@@ -177,7 +182,8 @@ impl Answer<'_> {
             .filter(|c| c.set.contains(&m))
             .or_else(|| ranking.physical().map(|p| p.0).find(|c| c.set.contains(&m)))
             .or(alone)?;
-        let score = ranking.score_of(&holder.set).or_else(|| ranking.score_of(&[m]));
+        let scored = if ranking.score_of(&holder.set).is_some() { &holder.set[..] } else { &[m] };
+        let score = ranking.score_of(scored);
         let profile = best.is_some_and(|b| b.set == holder.set).then_some(self.rule);
         let holding = ranking.physical().filter(|(c, _)| c.set.contains(&m));
         let channels = &self.problem.recording.channels;
@@ -188,7 +194,7 @@ impl Answer<'_> {
             reference: mechanism.reference.clone(),
             probability: holding.map(|(_, p)| p).sum::<f64>().min(1.0),
             parameters: of_mechanism(self.problem, holder, mechanism, profile),
-            heldout_log_score_gain: score.map_or(f64::NAN, |s| s.log_score - ranking.base().log_score),
+            heldout_log_score_gain: ranking.gain(scored).unwrap_or(f64::NAN),
             heldout_rmse: score.map_or(Vec::new(), |s| {
                 channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()
             }),
@@ -202,7 +208,7 @@ impl Answer<'_> {
             ids: self.ids(&c.set),
             probability,
             p_value: best.filter(|b| ranking.at(b.at).set == c.set).map(|b| b.p_value),
-            heldout_log_score_gain: ranking.score_of(&c.set).map(|s| s.log_score - ranking.base().log_score),
+            heldout_log_score_gain: ranking.gain(&c.set),
             ruled_out: None,
         };
         ranking.physical().take(LISTED_SETS).map(set).collect()

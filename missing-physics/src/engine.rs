@@ -218,7 +218,7 @@ impl Course<'_> {
             self.explained(&mut diagnosis, &answer, &ranking, chosen.at)?;
         } else {
             if let Some(closest) = &best {
-                diagnosis.remarks.push(answer.closest(ranking.at(closest.at), closest, fails(closest)));
+                diagnosis.remarks.push(answer.closest(&ranking, closest, fails(closest)));
             }
             self.unexplained(&mut diagnosis, &answer, ranking.base())?;
         }
@@ -240,10 +240,8 @@ impl Course<'_> {
         let among = candidate(problem, &competing, &[], &[], &baseline.fit, &[])?;
         let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
         let progress = |done| self.observer.progress(Progress { stage: STAGE, done });
-        // By the same rule: a baseline that may take its own misfit for colour, where its rivals pay for theirs, is no measure.
-        let base = held_out(problem, &among)?;
         let all = search(problem, &competing, among, &everything, &progress).ok_or(DiagnoseError::Stopped)?;
-        Ok(Ranking::new(all, base))
+        Ok(Ranking::new(all, held_out(problem, baseline)?))
     }
 
     /// A set explains the data: does another as well, and what would tell them apart?

@@ -20,7 +20,7 @@ pub(crate) struct Ranking {
     all: Vec<Candidate>,
     /// The physical ones by falling evidence: where they stand, and how probable each is.
     physical: Vec<(usize, f64)>,
-    /// How the baseline predicts what it has not seen.
+    /// How the baseline predicts what it has not seen, where correlated noise costs it nothing.
     base: HeldOut,
     scores: Vec<Option<HeldOut>>,
 }
@@ -113,9 +113,19 @@ impl Ranking {
             .collect();
     }
 
-    /// Does it predict what it has not seen better than the baseline?
+    /// By how much it predicts what it has not seen better than the baseline by the same rule of noise, as a log score.
+    pub(crate) fn gain(&self, set: &[usize]) -> Option<f64> {
+        let baseline = self.score_of(&[]).unwrap_or(&self.base);
+        self.score_of(set).map(|s| s.log_score - baseline.log_score)
+    }
+
+    /// Does it predict what it has not seen better than the baseline? One that may take its own misfit for correlated noise, which costs
+    /// those that compete, is the harder measure; what is likelier by [`EARNED`] is spared it.
     pub(crate) fn gains(&self, at: usize) -> bool {
-        self.score_of(&self.all[at].set).is_some_and(|s| s.log_score > self.base.log_score)
+        let set = &self.all[at].set;
+        let likelier = self.of(&[]).is_none_or(|none| self.all[at].evidence > none.evidence + EARNED);
+        self.score_of(set).is_some_and(|s| s.log_score > self.base.log_score)
+            || likelier && self.gain(set).is_some_and(|gain| gain > 0.0)
     }
 
     /// The chosen set and those that explain as well and are no more, and no less, of the same.
