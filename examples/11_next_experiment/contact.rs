@@ -17,8 +17,8 @@ const BALL_M: f64 = 0.01;
 const MODULUS_PA: f64 = 2e4;
 /// One sigma of the load cell, N.
 const SIGMA_N: f64 = 1e-3;
-/// The arm goes no deeper, and its fastest and slowest press, in s.
-const DEEPEST_M: f64 = 4e-3;
+/// The arm's reach: shallowest and deepest press, fastest and slowest, in s.
+const DEPTH_M: [f64; 2] = [1e-4, 4e-3];
 const DURATION_S: [f64; 2] = [0.1, 100.0];
 const ROWS: usize = 40;
 const REPEATS: usize = 3;
@@ -77,31 +77,25 @@ impl Rig for Contact {
     }
 
     fn random(rng: &mut ChaCha8Rng) -> Press {
-        let [fastest, slowest] = DURATION_S.map(f64::ln);
-        let held = rng.random::<bool>();
-        Press {
-            depth_m: rng.random_range(0.1..1.0) * DEEPEST_M,
-            duration_s: rng.random_range(fastest..slowest).exp(),
-            hold_s: if held { rng.random_range(fastest..slowest).exp() } else { 0.0 },
-        }
+        let [depth_m, duration_s, hold_s] =
+            [DEPTH_M, DURATION_S, DURATION_S].map(|reach| on_log_scale(rng, reach));
+        Press { depth_m, duration_s, hold_s: if rng.random() { hold_s } else { 0.0 } }
     }
 
     fn grid() -> Vec<Press> {
-        let press = |share: f64, duration_s| Press { depth_m: share * DEEPEST_M, duration_s, hold_s: 0.0 };
+        let press = |share: f64, duration_s| Press { depth_m: share * DEPTH_M[1], duration_s, hold_s: 0.0 };
         [0.25, 0.5, 0.75, 1.0].iter().flat_map(|share| [0.1, 1.0, 10.0].map(|s| press(*share, s))).collect()
     }
 
-    fn proposed(before: Press, value: &dyn Fn(&str) -> Option<f64>) -> Option<Press> {
-        let first = Self::first();
-        if let Some(depth_m) = value("delta_m") {
-            return Some(Press { depth_m: depth_m.min(DEEPEST_M), ..first });
-        }
-        if let Some(duration_s) = value("duration_s") {
-            let duration_s = duration_s.clamp(DURATION_S[0], DURATION_S[1]);
-            return Some(Press { depth_m: before.depth_m, duration_s, hold_s: 0.0 });
-        }
-        let hold_s = value("hold_s")?.min(DURATION_S[1]);
-        Some(Press { depth_m: before.depth_m, duration_s: 0.1 * hold_s, hold_s })
+    fn proposed(value: &dyn Fn(&str) -> Option<f64>) -> Option<Press> {
+        let press = Press {
+            depth_m: value("delta_m")?,
+            duration_s: value("duration_s")?,
+            hold_s: value("hold_s").unwrap_or(0.0),
+        };
+        let within = |v: f64, [least, most]: [f64; 2]| v >= 0.999 * least && v <= 1.001 * most;
+        let held = press.hold_s == 0.0 || within(press.hold_s, DURATION_S);
+        (within(press.depth_m, DEPTH_M) && within(press.duration_s, DURATION_S) && held).then_some(press)
     }
 
     fn act(press: Press, hidden: Hidden, label: usize, seed: u64) -> Outcome<String> {
@@ -123,6 +117,11 @@ struct Reading {
     force_n: f64,
     t_s: f64,
     segment: &'static str,
+}
+
+/// A number of which each factor between the limits is equally likely.
+fn on_log_scale(rng: &mut ChaCha8Rng, [least, most]: [f64; 2]) -> f64 {
+    rng.random_range(least.ln()..most.ln()).exp()
 }
 
 /// Presses and reads, on any arm that carries a load cell: down in steps, and held.
@@ -202,7 +201,7 @@ impl Arm for Ball {
     /// The arm is where it was told to be as soon as somebody has waited.
     fn move_to(&mut self, tool_in_base: Pose, deadline_s: f64) -> Result<(), ErrorKind> {
         let depth_m = -tool_in_base.position_m[2];
-        if !(depth_m <= 1.001 * DEEPEST_M && deadline_s > 0.0) {
+        if !(depth_m <= 1.001 * DEPTH_M[1] && deadline_s > 0.0) {
             return Err(ErrorKind::OutOfRange);
         }
         self.depth_m = depth_m;

@@ -78,11 +78,13 @@ impl Rig for Liquid {
         Tilt { from_rad: 0.0, to_rad: 0.25 * PI, volume_m3: 0.25 * capacity_m3() }
     }
 
-    /// An eighth of a turn at least.
     fn random(rng: &mut ChaCha8Rng) -> Tilt {
-        let span = rng.random_range(0.25 * PI..PI);
-        let from_rad = rng.random_range(0.0..PI - span);
-        Tilt { from_rad, to_rad: from_rad + span, volume_m3: rng.random_range(0.0..0.95) * capacity_m3() }
+        let [one, other] = [0, 1].map(|_| rng.random_range(0.0..PI));
+        Tilt {
+            from_rad: f64::min(one, other),
+            to_rad: f64::max(one, other),
+            volume_m3: rng.random_range(0.0..0.95) * capacity_m3(),
+        }
     }
 
     fn grid() -> Vec<Tilt> {
@@ -92,7 +94,7 @@ impl Rig for Liquid {
         [0.1, 0.5, 0.9].iter().flat_map(|share| (0..4).map(move |k| tilt(*share, quarter(k)))).collect()
     }
 
-    fn proposed(_before: Tilt, value: &dyn Fn(&str) -> Option<f64>) -> Option<Tilt> {
+    fn proposed(value: &dyn Fn(&str) -> Option<f64>) -> Option<Tilt> {
         Some(Tilt {
             from_rad: value("from_rad").unwrap_or(0.0),
             to_rad: value("theta_rad").unwrap_or(PI),

@@ -46,8 +46,8 @@ trait Rig {
     fn random(rng: &mut ChaCha8Rng) -> Self::Action;
     /// An even grid of what the rig can do.
     fn grid() -> Vec<Self::Action>;
-    /// A proposal's values as an action of this rig.
-    fn proposed(before: Self::Action, value: &dyn Fn(&str) -> Option<f64>) -> Option<Self::Action>;
+    /// A proposal's values as an action of this rig, if it can do that.
+    fn proposed(value: &dyn Fn(&str) -> Option<f64>) -> Option<Self::Action>;
     /// Rows of the recording of one action, done through the rig's traits.
     fn act(action: Self::Action, hidden: Self::Hidden, label: usize, seed: u64) -> Outcome<String>;
 }
@@ -68,16 +68,21 @@ fn ask<R: Rig>(rows: &str, seed: u64) -> Outcome<Diagnosis> {
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("recording.toml"), R::header())?;
     std::fs::write(folder.path().join("data.csv"), format!("{}\n{rows}", R::COLUMNS))?;
-    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    let (_, mut loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    loaded.experiments.retain(|e| proposed::<R>(&e.action).is_some());
     let options = Options { seed, replicates: 199, ..Options::default() };
     Ok(diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?)
+}
+
+/// A proposed action as one of the rig's, if it can do it.
+fn proposed<R: Rig>(action: &[(String, f64)]) -> Option<R::Action> {
+    R::proposed(&|name| action.iter().find(|(n, _)| n == name).map(|(_, v)| *v))
 }
 
 /// One rig with something hidden about it, and what it has recorded.
 struct World<R: Rig> {
     hidden: R::Hidden,
     seed: u64,
-    last: R::Action,
     rows: String,
     done: usize,
     answer: Diagnosis,
@@ -86,10 +91,9 @@ struct World<R: Rig> {
 impl<R: Rig> World<R> {
     fn new(seed: u64) -> Outcome<Self> {
         let hidden = R::draw(&mut ChaCha8Rng::seed_from_u64(seed));
-        let last = R::first();
-        let rows = R::act(last, hidden, 1, seed)?;
+        let rows = R::act(R::first(), hidden, 1, seed)?;
         let answer = ask::<R>(&rows, seed)?;
-        Ok(Self { hidden, seed, last, rows, done: 0, answer })
+        Ok(Self { hidden, seed, rows, done: 0, answer })
     }
 
     /// How probable the tool thinks that what is hidden is at work.
@@ -102,15 +106,13 @@ impl<R: Rig> World<R> {
         self.done += 1;
         let noise = self.seed ^ (self.done as u64) << 32;
         self.rows += &R::act(action, self.hidden, self.done + 1, noise)?;
-        self.last = action;
         self.answer = ask::<R>(&self.rows, self.seed)?;
         Ok(())
     }
 
     /// The action that the tool proposes, if it does.
     fn proposed(&self) -> Option<R::Action> {
-        let next = self.answer.next_experiment.as_ref()?;
-        R::proposed(self.last, &|name| next.action.iter().find(|(n, _)| n == name).map(|(_, v)| *v))
+        proposed::<R>(&self.answer.next_experiment.as_ref()?.action)
     }
 
     /// Experiments until the tool is sure of the truth ([`patience`] where it never was).

@@ -10,7 +10,7 @@ const ROWS: usize = 40;
 /// Repeats of a proposed curve.
 const REPEATS: usize = 3;
 
-/// The same curve deeper and shallower, slower, and held.
+/// The same curve shallower, again and deeper, each slower and faster too, and held.
 pub(super) fn experiments(model: &IndentationModel, recording: &Recording) -> Vec<Experiment> {
     let deepest = model.deepest_m();
     let own = vec![0.0; model.spec().count(Scope::PerRun)];
@@ -46,17 +46,21 @@ pub(super) fn experiments(model: &IndentationModel, recording: &Recording) -> Ve
             own: vec![own.clone(); REPEATS],
         });
     };
-    for factor in [0.3, 1.5, 2.0] {
-        let words = format!("press {:.3} mm deep", 1e3 * factor * deepest);
-        add(vec![("delta_m", factor * deepest)], words, curve(factor * deepest, duration, 0.0));
-    }
-    if model.setup().timed {
-        for factor in [0.1, 10.0] {
-            let words = format!("press at {} times the speed", 1.0 / factor);
-            add(vec![("duration_s", factor * duration)], words, curve(deepest, factor * duration, 0.0));
+    for depth in [0.3, 1.0, 1.5, 2.0].map(|factor| factor * deepest) {
+        let words = format!("press {:.3} mm deep", 1e3 * depth);
+        if !model.setup().timed {
+            add(vec![("delta_m", depth)], words, curve(depth, duration, 0.0));
+            continue;
         }
-        let words = format!("press and hold for {:.3} s", 3.0 * duration);
-        add(vec![("hold_s", 3.0 * duration)], words, curve(deepest, 0.3 * duration, 3.0 * duration));
+        for (factor, how) in [(0.1, " at 10 times the speed"), (1.0, ""), (10.0, " at a tenth of the speed")]
+        {
+            let lasts = factor * duration;
+            let action = vec![("delta_m", depth), ("duration_s", lasts)];
+            add(action, format!("{words}{how}"), curve(depth, lasts, 0.0));
+        }
+        let (down, hold) = (0.3 * duration, 3.0 * duration);
+        let action = vec![("delta_m", depth), ("duration_s", down), ("hold_s", hold)];
+        add(action, format!("{words} in {down:.3} s and hold for {hold:.3} s"), curve(depth, down, hold));
     }
     list
 }
