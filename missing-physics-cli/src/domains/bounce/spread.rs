@@ -48,34 +48,40 @@ type Change = fn(&mut Effects, f64);
 /// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
 /// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
 /// take for a smaller slope.
-const NUISANCES: [Change; 9] = [
+const NUISANCES: [Change; 6] = [
     |e, d| e.restitution += d,
     |e, d| e.slope_s_m += d,
     |e, d| e.drag_per_m += d,
     |e, d| e.table[0] += d,
     |e, d| e.table[1] += d,
     |e, d| e.walk_s += d,
-    |e, d| e.heads[0] += d,
-    |e, d| e.heads[1] += d,
-    |e, d| e.outwards_per_m += d,
 ];
-/// Of the nuisances, those of the hand come last.
-const OF_THE_HAND: usize = 3;
+const OF_THE_HAND: [Change; 3] =
+    [|e, d| e.heads[0] += d, |e, d| e.heads[1] += d, |e, d| e.outwards_per_m += d];
 
 /// Whether there are drops enough to say how a hand lets go of balls.
 pub(super) const fn released(drops: usize) -> bool {
     drops >= 5
 }
 
-fn nuisances(drops: usize) -> &'static [Change] {
-    let known = if released(drops) { 0 } else { OF_THE_HAND };
-    &NUISANCES[..NUISANCES.len() - known]
+fn nuisances(drops: &[Drop]) -> Vec<Change> {
+    let mut all = NUISANCES.to_vec();
+    // Where the height says how fast a ball comes, times that are all too long would be taken for balls that come aslant.
+    if drops.iter().any(|d| d.height_m.is_some()) {
+        all.push(|e, d| e.clock_rate += d);
+    }
+    if released(drops.len()) {
+        all.extend(OF_THE_HAND);
+    }
+    all
 }
 
 /// Restricted likelihood (Patterson and Thompson 1971, doi:10.1093/biomet/58.3.545) of the sigmas that are not known.
 #[derive(Clone, Copy)]
 struct Likelihood<'a> {
     drops: &'a [(Linear, DVector<f64>, DMatrix<f64>)],
+    /// How many nuisances there are.
+    columns: usize,
     known: Known,
     start: Spread,
 }
@@ -149,7 +155,7 @@ impl Likelihood<'_> {
 
     /// Minus twice the logarithm, up to a constant, and the nuisances' best values.
     fn value(&self, spread: &Spread) -> Option<(f64, DVector<f64>)> {
-        let columns = nuisances(self.drops.len()).len();
+        let columns = self.columns;
         let (mut total, mut squares) = (0.0, 0.0);
         let mut normal = DMatrix::identity(columns, columns) * 1e-9;
         let mut pull = DVector::zeros(columns);
@@ -215,14 +221,15 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<J
     let mut plausible = vec![spread; PLAUSIBLE];
     let mut begin = *effects;
     let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::about_straight(d, effects)).collect();
+    let nuisances = nuisances(drops);
     for _ in 0..ROUNDS {
-        let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, drops.len())).collect();
-        let likelihood = Likelihood { drops: &parts, known, start: spread };
+        let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, &nuisances)).collect();
+        let likelihood = Likelihood { drops: &parts, columns: nuisances.len(), known, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);
         let (_, moved) = likelihood.value(&spread)?;
         plausible = Likelihood { start: spread, ..likelihood }.plausible();
         let mut likely = begin;
-        nuisances(drops.len()).iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
+        nuisances.iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
         likely.friction = 0.0;
         likely.drag_per_m = likely.drag_per_m.max(0.0);
         (begin.heads, begin.outwards_per_m) = (likely.heads, likely.outwards_per_m);
@@ -233,10 +240,14 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<J
 }
 
 /// A drop with its errors and what the nuisances make of them.
-fn with_design(linear: &Linear, effects: &Effects, drops: usize) -> (Linear, DVector<f64>, DMatrix<f64>) {
+fn with_design(
+    linear: &Linear,
+    effects: &Effects,
+    nuisances: &[Change],
+) -> (Linear, DVector<f64>, DMatrix<f64>) {
     const STEP: f64 = 1e-4;
     let errors = linear.errors(effects);
-    let columns: Vec<DVector<f64>> = nuisances(drops)
+    let columns: Vec<DVector<f64>> = nuisances
         .iter()
         .map(|change| {
             let mut moved = *effects;
