@@ -128,7 +128,7 @@ pub struct MechanismReport {
     pub probability: f64,
     /// Its parameters, from the best set that holds it (alone, where it is in none of the leading sets).
     pub parameters: Vec<Estimate>,
-    /// Gain in log score on runs that the fit has not seen, over the baseline.
+    /// Gain in log score on runs that the fit has not seen, over the baseline by the same rule of noise.
     pub heldout_log_score_gain: f64,
     /// Root mean square error on such runs, by channel.
     pub heldout_rmse: Vec<(String, f64)>,
@@ -145,7 +145,7 @@ pub struct SetReport {
     pub probability: f64,
     /// p-value of the adequacy bank, where it was run.
     pub p_value: Option<f64>,
-    /// Gain in log score on unseen runs, over the baseline.
+    /// Gain in log score on unseen runs, over the baseline by the same rule of noise.
     pub heldout_log_score_gain: Option<f64>,
     /// Why it is no explanation, where it is none.
     pub ruled_out: Option<String>,
