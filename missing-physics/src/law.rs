@@ -45,8 +45,9 @@ pub(crate) fn find(
         }
     };
     consider(sparse(problem, rule, baseline, seen)?);
-    let periodic = Extended::periodic(problem, &baseline.fit)?;
-    consider(extended(problem, rule, baseline, seen, &periodic)?);
+    if let Some(periodic) = Extended::periodic(problem, &baseline.fit)? {
+        consider(extended(problem, rule, baseline, seen, &periodic)?);
+    }
     for channel in 0..problem.channels() {
         for variable in 0..problem.recording.variables.len() {
             if let Some(smooth) = Extended::smooth(problem, channel, variable) {
@@ -180,8 +181,9 @@ impl<'a> Extended<'a> {
         }
     }
 
-    /// An oscillation; its frequency starts where the residual's power is largest.
-    fn periodic(problem: &Problem<'a>, fit: &Fit) -> Result<Self, PredictError> {
+    /// An oscillation; its frequency starts where the residual's power is largest. None where runs are so short that none would
+    /// turn one and a half times.
+    fn periodic(problem: &Problem<'a>, fit: &Fit) -> Result<Option<Self>, PredictError> {
         let residual = crate::adequacy::residuals(problem, fit)?;
         let span = problem
             .rows
@@ -209,6 +211,9 @@ impl<'a> Extended<'a> {
         };
         let lowest = std::f64::consts::TAU * 1.5 / span.max(f64::MIN_POSITIVE);
         let highest = std::f64::consts::PI / problem.step;
+        if highest <= lowest {
+            return Ok(None);
+        }
         let steps = (((highest - lowest) * span).max(0.0) as usize).clamp(8, 4000);
         let omegas: Vec<f64> =
             (0..=steps).map(|k| lowest + (highest - lowest) * k as f64 / steps as f64).collect();
@@ -238,7 +243,7 @@ impl<'a> Extended<'a> {
                 });
             }
         }
-        Ok(Self::new(problem, parameters, Added::Periodic))
+        Ok(Some(Self::new(problem, parameters, Added::Periodic)))
     }
 
     fn smooth(problem: &Problem<'a>, channel: usize, variable: usize) -> Option<Self> {
