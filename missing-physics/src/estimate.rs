@@ -74,12 +74,14 @@ pub(crate) fn estimates(
             (quantity.value)(shared)
         });
         let half = Z95 * quadratic(&by_shared, &covariance).max(0.0).sqrt();
-        estimates.push(Estimate {
-            name: quantity.name.clone(),
-            unit: quantity.unit.clone(),
-            value,
-            ci95: [value - half, value + half],
-        });
+        let (name, unit) = (quantity.name.clone(), quantity.unit.clone());
+        let estimate = Estimate { name, unit, value, ci95: [value - half, value + half] };
+        match estimates.iter_mut().find(|e| e.name == estimate.name) {
+            // The parameter itself has the better interval.
+            Some(same) if same.value == value => {}
+            Some(other) => *other = estimate,
+            None => estimates.push(estimate),
+        }
     }
     estimates
 }

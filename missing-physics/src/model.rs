@@ -49,7 +49,8 @@ pub struct Parameter {
 /// A function of the shared parameters.
 pub type OfParameters = std::sync::Arc<dyn Fn(&[f64]) -> f64 + Send + Sync>;
 
-/// A quantity that is computed from a mechanism's parameters and reported beside them.
+/// A quantity that is computed from a mechanism's parameters and reported beside them, or in place of the parameter of its name where it
+/// has another value.
 #[derive(Clone)]
 pub struct Derived {
     /// Name with its unit as a suffix.

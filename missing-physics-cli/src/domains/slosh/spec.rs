@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use liquid_haptics::slosh::{Decay, Effects, UprightCylinder};
-use missing_physics::model::{DerivedPerRun, Over, Spec};
+use missing_physics::model::{Derived, DerivedPerRun, Over, Spec};
 
 use super::model::Setup;
 use crate::domains::builder::{ANY, At, Builder};
@@ -153,7 +153,26 @@ pub(super) fn build(
     );
     mechanism.companions = vec![p.transient.index];
     mechanism.shapes = vec![p.lag.index];
+    unlagged(&mut b, &p, omega, (unit, suffix));
     (b.spec, p)
+}
+
+/// What a reading is of the wave itself: a sensor that lags, where it does, shows less of it.
+fn unlagged(b: &mut Builder, p: &Places, omega: f64, (unit, suffix): (&str, &str)) {
+    let off = b.spec.parameters[p.lag.index].start;
+    for (id, name, unit, at, power) in [
+        ("contact-line-friction", format!("friction_{suffix}"), unit.to_owned(), p.friction, 1),
+        ("quadratic-damping", format!("coefficient_per_{suffix}"), format!("1/({unit})"), p.quadratic, -1),
+    ] {
+        let (at, lag) = (at.slot, p.lag.slot);
+        let value = move |shared: &[f64]| {
+            let lags = if shared[lag] == off { 0.0 } else { omega * shared[lag] };
+            shared[at] * lags.hypot(1.0).powi(power)
+        };
+        if let Some(mechanism) = b.spec.mechanisms.iter_mut().find(|m| m.id == id) {
+            mechanism.derived.push(Derived { name, unit, value: Arc::new(value) });
+        }
+    }
 }
 
 fn modes(
@@ -215,5 +234,43 @@ fn amplitude_of(p: &Places, [omega, cos, sin]: [At; 3], suffix: &str, unit: &str
             let lags = if own[transient] == 0.0 { 0.0 } else { shared[omega] * shared[lag] };
             own[cos].hypot(own[sin]) * lags.hypot(1.0)
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use missing_physics::model::Scope;
+
+    use super::super::model::Channel;
+    use super::*;
+
+    /// A first-order lag shows a wave of omega at 1 / sqrt(1 + (omega tau)^2) of its height, and the reading at which it sticks likewise.
+    #[test]
+    fn friction_and_eddies_are_those_of_the_wave_and_not_of_a_reading_that_lags() {
+        let setup = Setup {
+            radius_m: 0.035,
+            length_m: None,
+            volume_m3: 2e-4,
+            density_kg_m3: 997.0,
+            gravity_m_s2: 9.81,
+            channel: Channel::Torque,
+        };
+        let cylinder = UprightCylinder::new(0.035, 0.05, 9.81).unwrap();
+        let (spec, p) = build(&setup, &cylinder, 1e-3, 1e-6);
+        let mut shared: Vec<f64> =
+            spec.parameters.iter().filter(|q| q.scope == Scope::Shared).map(|q| q.start).collect();
+        (shared[p.friction.slot], shared[p.quadratic.slot]) = (2e-5, 30.0);
+        let said = |shared: &[f64], id: &str| {
+            let mechanism = spec.mechanisms.iter().find(|m| m.id == id).unwrap();
+            let [derived] = mechanism.derived.as_slice() else { unreachable!("one quantity") };
+            assert_eq!(derived.name, spec.parameters[mechanism.parameters[0]].name);
+            (derived.value)(shared)
+        };
+        assert_eq!(said(&shared, "contact-line-friction"), 2e-5);
+        assert_eq!(said(&shared, "quadratic-damping"), 30.0);
+        shared[p.lag.slot] = 3f64.sqrt() / cylinder.angular_frequency_rad_s(0, 0.0);
+        approx::assert_relative_eq!(said(&shared, "contact-line-friction"), 4e-5, max_relative = 1e-12);
+        approx::assert_relative_eq!(said(&shared, "quadratic-damping"), 15.0, max_relative = 1e-12);
     }
 }
