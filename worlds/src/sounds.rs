@@ -43,7 +43,11 @@ impl Maker for Sounds {
             world.ball.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
-        let (files, unheard) = world.files(&mut rng);
+        let (mut files, mut unheard) = world.files(&mut rng);
+        // Drops in which all was heard hide no unheard impact.
+        while unheard == 0 && world.ball.effects.unheard > 0.0 {
+            (files, unheard) = world.files(&mut rng);
+        }
         // The format asks for the share of these very runs.
         let share = unheard as f64 / world.ball.runs as f64;
         key.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact").for_each(|p| p.value = share);
