@@ -88,20 +88,3 @@ pub(crate) fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: 
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// An impact that is said to go unheard in some of the drops does so in one at least.
-    #[test]
-    fn what_is_hidden_is_there() {
-        let keys = (0..300).map(|seed| Bounces.conceal(Hidden::One, seed).key);
-        let shares: Vec<f64> = keys
-            .flat_map(|key| key.parameters)
-            .filter(|p| p.mechanism == "missed-impact")
-            .map(|p| p.value)
-            .collect();
-        assert!(shares.len() > 20 && shares.iter().all(|share| *share > 0.0), "{shares:?}");
-    }
-}
