@@ -39,7 +39,8 @@ impl Maker for Bounces {
             world.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
-        let (mut seed, mut made) = (seed ^ 0x5eed, world.files_and_unheard(seed ^ 0x5eed));
+        let mut seed = seed ^ 0x5eed;
+        let mut made = world.files_and_unheard(seed);
         // Drops in which all was heard hide no unheard impact.
         while made.1 == 0 && world.effects.unheard > 0.0 {
             seed = seed.wrapping_add(1);

@@ -148,7 +148,7 @@ const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
 
 /// Times alone.
 fn timed(heard: &[Heard], rig: &Rig, setup: Setup, restitution: f64, known: Known) -> Loaded {
-    let model = TimesModel::new(setup, restitution, rig.drop_height_m);
+    let model = TimesModel::new(setup, restitution, rig.drop_height_m, known.time_s.is_some());
     let times: Vec<f64> = heard.iter().flat_map(|h| h.drop.times_s.iter().copied()).collect();
     // Directions scatter the times beyond the clock's noise, so that a calibrated clock is the least there is.
     let least = known.time_s.map_or(0.0, |sigma| sigma * 12f64.sqrt());

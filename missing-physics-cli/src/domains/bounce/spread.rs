@@ -44,10 +44,6 @@ type Change = fn(&mut Effects, f64);
 
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
 /// only about the likely drop.
-///
-/// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
-/// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
-/// take for a smaller slope.
 const NUISANCES: [Change; 6] = [
     |e, d| e.restitution += d,
     |e, d| e.slope_s_m += d,
@@ -56,6 +52,9 @@ const NUISANCES: [Change; 6] = [
     |e, d| e.table[1] += d,
     |e, d| e.walk_s += d,
 ];
+/// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
+/// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
+/// take for a smaller slope.
 const OF_THE_HAND: [Change; 3] =
     [|e, d| e.heads[0] += d, |e, d| e.heads[1] += d, |e, d| e.outwards_per_m += d];
 

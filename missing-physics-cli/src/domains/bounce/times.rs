@@ -22,11 +22,13 @@ pub(super) struct TimesModel {
     begins: At,
     leaves: Option<At>,
     height_m: Option<f64>,
+    longest_noise: f64,
 }
 
-/// Impacts over which errors may hang together where there is one drop: heard ones by their fading loudness ...
-const LONGEST_HEARD: f64 = 3.0;
-/// ... and those that were marked one by one: neighbours alike by a third (exp(-1)).
+/// Impacts over which errors may hang together where there is one drop: heard ones, by their fading loudness, and any whose size is
+/// stated ...
+const LONGEST_IN_ONE: f64 = 3.0;
+/// ... and those that were marked one by one, of a size that is not known: neighbours alike by a third (exp(-1)).
 const LONGEST_MARKED: f64 = 1.0;
 
 /// Inputs of a row: the impact's number, and how many impacts went unheard before it in its run: known ones, all.
@@ -34,9 +36,15 @@ const KNOWN: usize = 1;
 const FOUND: usize = 2;
 
 impl TimesModel {
-    pub(super) fn new(setup: Setup, restitution: f64, height_m: Option<f64>) -> Self {
+    /// `stated`: whether the clock's sigma is.
+    pub(super) fn new(setup: Setup, restitution: f64, height_m: Option<f64>, stated: bool) -> Self {
         let (spec, places, begins, leaves) = build_times(&setup, restitution);
-        Self { setup, spec, places, begins, leaves, height_m }
+        let longest_noise = match setup.unheard[1] {
+            2.. => f64::INFINITY,
+            _ if setup.listened || stated => LONGEST_IN_ONE,
+            _ => LONGEST_MARKED,
+        };
+        Self { setup, spec, places, begins, leaves, height_m, longest_noise }
     }
 
     /// The run of a drop.
@@ -131,11 +139,7 @@ impl Model for TimesModel {
 
     /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
     fn longest_noise(&self) -> f64 {
-        match self.setup.unheard[1] {
-            2.. => f64::INFINITY,
-            _ if self.setup.listened => LONGEST_HEARD,
-            _ => LONGEST_MARKED,
-        }
+        self.longest_noise
     }
 
     fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
