@@ -151,6 +151,24 @@ impl Answer<'_> {
             .collect()
     }
 
+    /// Whole numbers (which sensor, which row) that the data do not tell from the likeliest.
+    pub(crate) fn open_numbers(&self, chosen: &Candidate) -> Vec<String> {
+        let name = |slot: usize| &self.problem.spec().parameters[self.problem.shared.index[slot]].name;
+        let open = |slot: usize| {
+            let best = chosen.fit.shared[slot];
+            let mut others: Vec<f64> =
+                chosen.elsewhere.iter().map(|e| e.shared[slot]).filter(|v| *v != best).collect();
+            others.sort_by(f64::total_cmp);
+            others.dedup();
+            let others: Vec<String> = others.iter().map(f64::to_string).collect();
+            let text = || {
+                format!("{}: {best} is the likeliest, {} is possible too", name(slot), others.join(" or "))
+            };
+            (!others.is_empty()).then(text)
+        };
+        self.problem.places(&chosen.set).into_iter().filter_map(open).collect()
+    }
+
     /// Why the closest explanation is none.
     pub(crate) fn closest(&self, ranking: &Ranking, best: &Best, fails: bool) -> String {
         let closest = ranking.at(best.at);

@@ -20,6 +20,8 @@ pub(crate) struct Candidate {
     pub(crate) set: Vec<usize>,
     pub(crate) selection: Selection,
     pub(crate) fit: Fit,
+    /// Fits with other whole numbers (which row, which sensor) that the data leave open, likeliest first.
+    pub(crate) elsewhere: Vec<Fit>,
     /// Log marginal likelihood plus log prior odds of the set.
     pub(crate) evidence: f64,
     /// Why it is no explanation.
@@ -34,6 +36,8 @@ pub(crate) const LOG_RANGE: f64 = 9.21;
 const BEAM: usize = 3;
 /// Standard deviation of a shared parameter's prior where unseen data are predicted, in units of its scale.
 const WIDE: f64 = 10.0;
+/// Whole numbers that are less likely than the best by more than this logarithm (1 in 20) are ruled out.
+const OPEN: f64 = 3.0;
 /// Sets within this log evidence of the best may become it once their best top is found.
 const POLISHED: f64 = 6.0;
 /// The largest set tried.
@@ -82,25 +86,63 @@ pub(crate) fn candidate(
             }
         }
     }
-    // Sigmas of the baseline's fit are too large where it misses; a smaller one only sharpens the same surface.
-    let mut best: Option<Fit> = None;
+    // Sigmas of the baseline's fit are too large where it misses; a smaller one only sharpens the same surface. Between whole numbers
+    // there is no surface: the best start with each of them is fitted with a noise of its own.
+    let mut tops: Vec<(Vec<f64>, Fit)> = Vec::new();
     let mut failure = None;
     for start in &starts {
+        let numbers: Vec<f64> = places.iter().map(|&slot| start[slot]).collect();
         match solve(problem, &selection, &near.noise, start, &near.own) {
-            Ok(fit) if best.as_ref().is_none_or(|b| fit.chi2 < b.chi2 - 1e-9) => best = Some(fit),
-            Ok(_) => {}
+            Ok(fit) => match tops.iter_mut().find(|(n, _)| *n == numbers) {
+                Some((_, best)) if fit.chi2 < best.chi2 - 1e-9 => *best = fit,
+                Some(_) => {}
+                None => tops.push((numbers, fit)),
+            },
             Err(error) => failure = Some(error),
         }
     }
-    let Some(first) = best else {
+    let mut fits = tops
+        .into_iter()
+        .map(|(_, top)| fit(problem, &selection, rule, (&top.shared, &top.own), Some(&top.noise)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let likelihood = |fit: &Fit| likelihood(problem, rule, fit);
+    fits.sort_by(|a, b| likelihood(b).total_cmp(&likelihood(a)));
+    if fits.is_empty() {
         return Err(
             failure.unwrap_or(PredictError { run: "(all)".into(), reason: "no start was possible".into() })
         );
-    };
-    let fit = fit(problem, &selection, rule, (&first.shared, &first.own), Some(&first.noise))?;
+    }
+    let mut elsewhere = fits.split_off(1);
+    let fit = fits.remove(0);
+    elsewhere.retain(|other| likelihood(other) > likelihood(&fit) - OPEN);
     let (mut evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
-    evidence += fit.noise.shape.iter().map(|&shape| rule.log_prior(problem, shape)).sum::<f64>();
-    Ok(Candidate { set: set.to_vec(), selection, fit, evidence, ruled_out })
+    evidence += log_prior(problem, rule, &fit);
+    Ok(Candidate { set: set.to_vec(), selection, fit, elsewhere, evidence, ruled_out })
+}
+
+impl Candidate {
+    /// The same set better fitted from another start: whole numbers that were open stay so where they are likely still.
+    fn in_place_of(mut self, worse: Self, problem: &Problem<'_>, rule: &NoiseRule) -> Self {
+        let places = problem.places(&self.set);
+        let same = |a: &Fit, b: &Fit| places.iter().all(|&slot| a.shared[slot] == b.shared[slot]);
+        for other in std::iter::once(worse.fit).chain(worse.elsewhere) {
+            let known = same(&other, &self.fit) || self.elsewhere.iter().any(|e| same(&other, e));
+            if !known && likelihood(problem, rule, &other) > likelihood(problem, rule, &self.fit) - OPEN {
+                self.elsewhere.push(other);
+            }
+        }
+        self
+    }
+}
+
+/// Log likelihood with the prior weight of the noise.
+fn likelihood(problem: &Problem<'_>, rule: &NoiseRule, fit: &Fit) -> f64 {
+    fit.log_likelihood + log_prior(problem, rule, fit)
+}
+
+/// Log prior weight of a fit's noise.
+fn log_prior(problem: &Problem<'_>, rule: &NoiseRule, fit: &Fit) -> f64 {
+    fit.noise.shape.iter().map(|&shape| rule.log_prior(problem, shape)).sum()
 }
 
 /// Laplace's approximation of the marginal likelihood, and whether the fit is physical.
@@ -235,7 +277,10 @@ pub(crate) fn search(
                     && let Ok(other) = candidate(problem, rule, set, &[], &parent.fit, &[hints])
                     && found.as_ref().is_none_or(|f| other.fit.log_likelihood > f.fit.log_likelihood + 1e-6)
                 {
-                    found = Some(other);
+                    found = Some(match found {
+                        Some(worse) => other.in_place_of(worse, problem, rule),
+                        None => other,
+                    });
                 }
                 found
             })
@@ -270,7 +315,9 @@ fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
         for _ in 0..BEAM {
             let Some(top) = better_top(problem, c) else { break };
             match candidate(problem, rule, &c.set, &[], &top, &[vec![]]) {
-                Ok(better) if better.evidence > c.evidence => **c = better,
+                Ok(better) if better.evidence > c.evidence => {
+                    **c = better.in_place_of(c.clone(), problem, rule);
+                }
                 _ => break,
             }
         }
@@ -281,9 +328,9 @@ fn best_evidence(all: &[Candidate]) -> f64 {
     all.iter().filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Where the model says to begin the mechanism that a set has and its parent has not.
+/// Where the model says to begin the mechanism that a set has and its parent has not, with all whole numbers that it knows for those
+/// of the others: what was the best of them alone need not be so in company.
 fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Vec<(usize, f64)>> {
-    let Some(&new) = set.iter().find(|m| !parent.set.contains(m)) else { return Vec::new() };
     let Ok(left) = residuals(problem, &parent.fit) else { return Vec::new() };
     let whole: Vec<Vec<Vec<f64>>> = left
         .into_iter()
@@ -298,12 +345,29 @@ fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Vec<
             channels.into_iter().zip(&rows.valid).map(spread).collect()
         })
         .collect();
-    let starts = problem.model.starts(new, &problem.recording.runs, &whole);
     let shared = |p: usize| problem.shared.index.iter().position(|&i| i == p);
-    starts
-        .into_iter()
-        .map(|start| start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value))).collect())
-        .collect()
+    let mut all: Vec<Vec<(usize, f64)>> = Vec::new();
+    for &mechanism in set {
+        let places = problem.places(&[mechanism]);
+        let new = !parent.set.contains(&mechanism);
+        if !new && places.is_empty() {
+            continue;
+        }
+        let mut starts: Vec<Vec<(usize, f64)>> = Vec::new();
+        for start in problem.model.starts(mechanism, &problem.recording.runs, &whole) {
+            let of_it = start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value)));
+            let start: Vec<_> = of_it.filter(|(slot, _)| new || places.contains(slot)).collect();
+            if !start.is_empty() && !starts.contains(&start) {
+                starts.push(start);
+            }
+        }
+        if all.is_empty() {
+            all = starts;
+        } else if !starts.is_empty() {
+            all = all.iter().flat_map(|a| starts.iter().map(|b| [&a[..], b].concat())).collect();
+        }
+    }
+    all
 }
 
 /// Values of a set's parameters from the fits of its members alone.

@@ -260,6 +260,7 @@ impl Course<'_> {
             diagnosis.after = answer.errors_of(&after, score);
         }
         draw(diagnosis, &after);
+        diagnosis.undetermined.extend(answer.open_numbers(chosen));
         self.tell("telling the rivals apart", 0.0)?;
         let rivals = ranking.rivals(chosen);
         if rivals.len() == 1 {

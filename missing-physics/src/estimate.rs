@@ -23,8 +23,24 @@ pub(crate) fn of_mechanism(
     profile: Option<&NoiseRule>,
 ) -> Vec<Estimate> {
     let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, profile);
+    for other in &candidate.elsewhere {
+        let other = Candidate { fit: other.clone(), elsewhere: Vec::new(), ..candidate.clone() };
+        let there = estimates(problem, &other, &mechanism.parameters, &mechanism.derived, profile);
+        all.iter_mut().zip(&there).for_each(|(estimate, there)| estimate.reach(there));
+    }
     all.extend(mechanism.derived_per_run.iter().map(|quantity| over_runs(candidate, quantity)));
     all
+}
+
+impl Estimate {
+    /// Widens the interval to what is likely with another whole number as well. A whole number itself has an interval only so.
+    fn reach(&mut self, there: &Self) {
+        let ends = |e: &Self| if e.ci95[0].is_nan() { [e.value; 2] } else { e.ci95 };
+        let (mine, other) = (ends(self), ends(there));
+        if self.ci95[0].is_finite() || self.value != there.value {
+            self.ci95 = [mine[0].min(other[0]), mine[1].max(other[1])];
+        }
+    }
 }
 
 /// Estimates of the given parameters (indices into the model's list) and of what is derived from them.

@@ -184,8 +184,8 @@ impl SoundWorld {
             if Some(number) != silent {
                 let burst = voice.struck(speed, self.room.rate_hz, rng);
                 loudness = burst.loudness();
-                let z = self.ball.effects.table[0] * x + self.ball.effects.table[1] * y;
-                self.room.play(&burst, [*x, *y, z], *t, rng, &mut channels);
+                // The microphones stand on the table, and tilt with it.
+                self.room.play(&burst, [*x, *y, 0.0], *t, rng, &mut channels);
             }
         }
         if rng.random::<f64>() < self.clicks {

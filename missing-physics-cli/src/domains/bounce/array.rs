@@ -25,15 +25,18 @@ impl Microphones {
         self.places_m.len().saturating_sub(3)
     }
 
+    /// Where a microphone truly stands, along x and y.
+    fn stands(&self, k: usize, wrong: &Wrong) -> [f64; 2] {
+        let [x, y, _] = self.places_m[k];
+        let [by_x, by_y] = if wrong.microphone == Some(k) { wrong.offset_m } else { [0.0; 2] };
+        [x + by_x, y + by_y]
+    }
+
     fn distances(&self, place: [f64; 2], wrong: &Wrong) -> DVector<f64> {
-        DVector::from_iterator(
-            self.places_m.len(),
-            self.places_m.iter().enumerate().map(|(k, m)| {
-                let [x, y] = if wrong.microphone == Some(k) { wrong.offset_m } else { [0.0; 2] };
-                let (dx, dy) = (place[0] - m[0] - x, place[1] - m[1] - y);
-                (dx * dx + dy * dy + m[2] * m[2]).sqrt()
-            }),
-        )
+        DVector::from_fn(self.places_m.len(), |k, _| {
+            let [x, y] = self.stands(k, wrong);
+            (place[0] - x).hypot(place[1] - y).hypot(self.places_m[k][2])
+        })
     }
 
     /// Combinations of arrivals, one a column, that do not change with place and time of an impact near a place.
@@ -58,25 +61,26 @@ impl Microphones {
         DMatrix::from_columns(&columns)
     }
 
-    /// By how much time (s) and place (x and y, m) of an impact change if the stated speed of sound is too large by `scale`: heard again
-    /// with the right one, less heard again with the stated one.
-    pub(super) fn moved(&self, place: [f64; 2], arrivals_s: &[f64], scale: f64) -> Option<[f64; 3]> {
-        let [right, stated] = [scale, 0.0].map(|scale| self.located(place, arrivals_s, scale));
+    /// By how much time (s) and place (x and y, m) of an impact change if the array is wrong: heard again with the right one, less heard
+    /// again with the stated one.
+    pub(super) fn moved(&self, place: [f64; 2], arrivals_s: &[f64], wrong: &Wrong) -> Option<[f64; 3]> {
+        let [right, stated] = [wrong, &Wrong::default()].map(|array| self.located(place, arrivals_s, array));
         let moved = right? - stated?;
         Some([moved[0] / self.speed_of_sound_m_s, moved[1], moved[2]])
     }
 
     /// Range (time times the stated speed of sound, since the first arrival, m) and place of an impact by least squares over its
     /// arrivals, by Newton's steps from a place near it; `None` where they do not lead anywhere.
-    fn located(&self, near: [f64; 2], arrivals_s: &[f64], scale: f64) -> Option<Vector3<f64>> {
+    fn located(&self, near: [f64; 2], arrivals_s: &[f64], wrong: &Wrong) -> Option<Vector3<f64>> {
         const STEPS: usize = 6;
         let first = *arrivals_s.first()?;
-        let slower = 1.0 + scale;
+        let slower = 1.0 + wrong.scale;
         let mut at = Vector3::new(0.0, near[0], near[1]);
         for _ in 0..STEPS {
-            let distances = self.distances([at[1], at[2]], &Wrong::default());
+            let distances = self.distances([at[1], at[2]], wrong);
             let (mut normal, mut pull) = (Matrix3::zeros(), Vector3::zeros());
-            for ((arrival, d), [x, y, _]) in arrivals_s.iter().zip(distances.iter()).zip(&self.places_m) {
+            for (k, (arrival, d)) in arrivals_s.iter().zip(distances.iter()).enumerate() {
+                let [x, y] = self.stands(k, wrong);
                 let row = Vector3::new(1.0, slower * (at[1] - x) / d, slower * (at[2] - y) / d);
                 let off = (arrival - first) * self.speed_of_sound_m_s - at[0] - slower * d;
                 normal += row * row.transpose();
@@ -122,21 +126,23 @@ mod tests {
         assert!(microphones.misfit(place, &moved, &wrong)[0].abs() < 1e-15);
     }
 
+    /// A wrong speed of sound, and a microphone that stands three centimetres aside.
     #[test]
-    fn heard_again_with_the_right_speed_an_impact_is_where_and_when_it_was() {
+    fn heard_again_with_the_right_array_an_impact_is_where_and_when_it_was() {
         let microphones = Microphones {
             places_m: vec![[0.0, 0.0, 0.07], [0.55, 0.0, 0.07], [0.55, 0.55, 0.07], [0.0, 0.55, 0.07]],
             speed_of_sound_m_s: 340.0,
         };
-        let wrong = Wrong { scale: -0.07, ..Wrong::default() };
-        for place in [[0.2, 0.3], [0.4, 0.12]] {
+        let slow = Wrong { scale: -0.07, ..Wrong::default() };
+        let aside = Wrong { microphone: Some(2), offset_m: [-0.02, 0.022], scale: 0.0 };
+        for (wrong, place) in [slow, aside].into_iter().flat_map(|w| [(w, [0.2, 0.3]), (w, [0.4, 0.12])]) {
             let distances = microphones.distances(place, &wrong);
             let arrivals: Vec<f64> =
                 distances.iter().map(|d| 0.3 + d * (1.0 + wrong.scale) / 340.0).collect();
-            let heard = microphones.located([0.27, 0.2], &arrivals, 0.0).unwrap();
+            let heard = microphones.located([0.27, 0.2], &arrivals, &Wrong::default()).unwrap();
             let t_s = arrivals[0] + heard[0] / 340.0;
-            let [dt, dx, dy] = microphones.moved([heard[1], heard[2]], &arrivals, wrong.scale).unwrap();
-            assert!(dx.hypot(dy) > 1e-3 && dt.abs() > 1e-5);
+            let [dt, dx, dy] = microphones.moved([heard[1], heard[2]], &arrivals, &wrong).unwrap();
+            assert!(dx.hypot(dy) > 1e-3 && dt.abs() > 1e-6);
             assert!((heard[1] + dx - place[0]).abs() < 1e-9 && (heard[2] + dy - place[1]).abs() < 1e-9);
             assert!((t_s + dt - 0.3).abs() < 1e-12, "{}", t_s + dt);
             assert!(microphones.misfit(place, &arrivals, &wrong)[0].abs() < 1e-14);

@@ -172,14 +172,13 @@ impl BounceModel {
         Wrong { microphone, offset_m: [shared[x.slot], shared[y.slot]], scale }
     }
 
-    /// By how much each impact of a drop moves in time and place if the speed of sound is another; nothing where no array heard it. What a
-    /// microphone that stands elsewhere does to them is left out: it shows in the arrivals.
-    fn moved(&self, known: &Known, scale: f64) -> Vec<[f64; 3]> {
-        if scale == 0.0 || known.heard.len() < known.weights.linear.drop.times_s.len() {
+    /// By how much each impact of a drop moves in time and place if the array is wrong; nothing where no array heard it.
+    fn moved(&self, known: &Known, array: &Wrong) -> Vec<[f64; 3]> {
+        if *array == Wrong::default() || known.heard.len() < known.weights.linear.drop.times_s.len() {
             return Vec::new();
         }
         let moved =
-            known.heard.iter().map(|(place, arrivals)| self.microphones.moved(*place, arrivals, scale));
+            known.heard.iter().map(|(place, arrivals)| self.microphones.moved(*place, arrivals, array));
         moved.collect::<Option<_>>().unwrap_or_default()
     }
 
@@ -236,7 +235,7 @@ impl Model for BounceModel {
         let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
         let known = self.drops.get(&run.label).ok_or_else(|| wrong("no such drop"))?;
         let array = self.wrong(shared);
-        let moved = self.moved(known, array.scale);
+        let moved = self.moved(known, &array);
         let mut effects = self.effects(shared);
         if !moved.is_empty() {
             effects.heard_scale = std::mem::take(&mut effects.position_scale);
