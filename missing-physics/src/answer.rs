@@ -59,7 +59,7 @@ impl Answer<'_> {
             channels: pairs(&recording.channels),
             variables: pairs(&recording.variables),
             baseline: self.problem.spec().baseline.clone(),
-            baseline_parameters: estimates(self.problem, self.baseline, &free, &[], None),
+            baseline_parameters: estimates(self.problem, self.baseline, &free, &[], self.rule, false),
             noise: self.noise(&model.fit),
             location: Vec::new(),
             mechanisms: Vec::new(),
@@ -202,7 +202,7 @@ impl Answer<'_> {
             .or(alone)?;
         let scored = if ranking.score_of(&holder.set).is_some() { &holder.set[..] } else { &[m] };
         let score = ranking.score_of(scored);
-        let profile = best.is_some_and(|b| b.set == holder.set).then_some(self.rule);
+        let profile = best.is_some_and(|b| b.set == holder.set);
         let holding = ranking.physical().filter(|(c, _)| c.set.contains(&m));
         let channels = &self.problem.recording.channels;
         Some(MechanismReport {
@@ -211,7 +211,7 @@ impl Answer<'_> {
             equation: mechanism.equation.clone(),
             reference: mechanism.reference.clone(),
             probability: holding.map(|(_, p)| p).sum::<f64>().min(1.0),
-            parameters: of_mechanism(self.problem, holder, mechanism, profile),
+            parameters: of_mechanism(self.problem, holder, mechanism, self.rule, profile),
             heldout_log_score_gain: ranking.gain(scored).unwrap_or(f64::NAN),
             heldout_rmse: score.map_or(Vec::new(), |s| {
                 channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::compare::Candidate;
 use crate::diagnosis::Estimate;
@@ -10,25 +11,46 @@ use crate::fit::{Fit, NoiseRule, covariance, solve};
 use crate::model::{Derived, DerivedPerRun, Mechanism, Over, Scope};
 use crate::problem::{Problem, Selection};
 
-/// Two-sided 95 % quantile of the normal law.
+/// The quantile at which two-sided 95 % intervals end.
+const END: f64 = 0.975;
+/// That of the normal law.
 const Z95: f64 = 1.959_963_984_540_054;
-/// Its square: the 95 % quantile of chi-square with one degree of freedom.
-const CHI95: f64 = Z95 * Z95;
+
+/// How many standard errors an interval reaches to either side: Student's law where the noise is sized by the residuals themselves.
+fn reach(problem: &Problem<'_>, selection: &Selection, rule: &NoiseRule) -> f64 {
+    let of = |sized: bool| -> usize {
+        let mine = (0..problem.channels()).filter(|&c| rule.fixed_sigma[c].is_none() == sized);
+        mine.map(|c| problem.count(c)).sum()
+    };
+    let (sized, fixed) = (of(true) as f64, of(false) as f64);
+    if sized == 0.0 {
+        return Z95;
+    }
+    let unknowns = (selection.shared.len() + selection.own.len() * problem.rows.len()) as f64;
+    student(sized - unknowns * sized / (sized + fixed))
+}
+
+/// The same for so many degrees of freedom.
+fn student(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(Z95, |law| law.inverse_cdf(END))
+}
 
 /// Estimates of a mechanism's parameters and of what is derived from them.
 pub(crate) fn of_mechanism(
     problem: &Problem<'_>,
     candidate: &Candidate,
     mechanism: &Mechanism,
-    profile: Option<&NoiseRule>,
+    rule: &NoiseRule,
+    profile: bool,
 ) -> Vec<Estimate> {
-    let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, profile);
+    let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, rule, profile);
     for other in &candidate.elsewhere {
         let other = Candidate { fit: other.clone(), elsewhere: Vec::new(), ..candidate.clone() };
-        let there = estimates(problem, &other, &mechanism.parameters, &mechanism.derived, profile);
+        let there = estimates(problem, &other, &mechanism.parameters, &mechanism.derived, rule, profile);
         all.iter_mut().zip(&there).for_each(|(estimate, there)| estimate.reach(there));
     }
-    all.extend(mechanism.derived_per_run.iter().map(|quantity| over_runs(candidate, quantity)));
+    let reach = reach(problem, &candidate.selection, rule);
+    all.extend(mechanism.derived_per_run.iter().map(|quantity| over_runs(candidate, quantity, reach)));
     all
 }
 
@@ -51,10 +73,12 @@ pub(crate) fn estimates(
     candidate: &Candidate,
     parameters: &[usize],
     derived: &[Derived],
-    profile: Option<&NoiseRule>,
+    rule: &NoiseRule,
+    profile: bool,
 ) -> Vec<Estimate> {
     let spec = problem.spec();
     let selection = &candidate.selection;
+    let reach = reach(problem, selection, rule);
     let covariance = covariance(&candidate.fit.information);
     let place = |slot: usize| selection.shared.iter().position(|&s| s == slot);
     let mut estimates: Vec<Estimate> = parameters
@@ -69,15 +93,15 @@ pub(crate) fn estimates(
                     over: Over::Mean,
                     value: Arc::new(move |_, own: &[f64]| own[slot]),
                 };
-                return over_runs(candidate, &own);
+                return over_runs(candidate, &own, reach);
             }
             let value = candidate.fit.shared[slot];
             let mut ci95 = [f64::NAN; 2];
             if let Some(i) = place(slot).filter(|&i| covariance[(i, i)].is_finite()) {
-                let half = Z95 * covariance[(i, i)].max(0.0).sqrt();
+                let half = reach * covariance[(i, i)].max(0.0).sqrt();
                 ci95 = [value - half, value + half];
-                if profile.is_some() {
-                    ci95 = Profile::new(problem, candidate, i).interval(half, ci95);
+                if profile {
+                    ci95 = Profile::new(problem, candidate, i).interval(half, reach);
                 }
                 ci95 = [ci95[0].max(info.lower), ci95[1].min(info.upper)];
             }
@@ -89,7 +113,7 @@ pub(crate) fn estimates(
         let by_shared = slopes(&selection.shared, &candidate.fit.shared, &errors(&covariance), &|shared| {
             (quantity.value)(shared)
         });
-        let half = Z95 * quadratic(&by_shared, &covariance).max(0.0).sqrt();
+        let half = reach * quadratic(&by_shared, &covariance).max(0.0).sqrt();
         let (name, unit) = (quantity.name.clone(), quantity.unit.clone());
         let estimate = Estimate { name, unit, value, ci95: [value - half, value + half] };
         match estimates.iter_mut().find(|e| e.name == estimate.name) {
@@ -141,7 +165,7 @@ fn quadratic(weights: &[f64], covariance: &DMatrix<f64>) -> f64 {
 
 /// A value that each run has of its own, over the runs, with what the errors of the runs' own and of the shared parameters make of it,
 /// and with what the runs differ beyond those (DerSimonian and Laird 1986, doi:10.1016/0197-2456(86)90046-2).
-fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun) -> Estimate {
+fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun, reach: f64) -> Estimate {
     let (fit, selection) = (&candidate.fit, &candidate.selection);
     let covariance = covariance(&fit.information);
     let shared_errors = errors(&covariance);
@@ -160,7 +184,7 @@ fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun) -> Estimate {
         own_variances.push(told.map(|(s, e)| (s * e).powi(2)).sum::<f64>());
         by_shared.push(along);
     }
-    let (value, variance) = match quantity.over {
+    let (value, half) = match quantity.over {
         Over::Mean => {
             let n = values.len().max(1) as f64;
             let mean = values.iter().sum::<f64>() / n;
@@ -168,17 +192,18 @@ fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun) -> Estimate {
                 .map(|k| by_shared.iter().map(|run| run[k]).sum::<f64>() / n)
                 .collect();
             let differ = between(&values, &own_variances);
-            let own = own_variances.iter().map(|v| v + differ).sum::<f64>();
-            (mean, own / (n * n) + quadratic(&along, &covariance))
+            let told = own_variances.iter().sum::<f64>() / (n * n) + quadratic(&along, &covariance);
+            // What the runs differ by is known from the runs alone (Hartung and Knapp 2001, doi:10.1002/sim.791).
+            (mean, (reach * reach * told.max(0.0) + student(n - 1.0).powi(2) * differ / n).sqrt())
         }
         Over::Largest => {
             let largest = (0..values.len()).max_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs()));
             largest.map_or((f64::NAN, f64::NAN), |run| {
-                (values[run], own_variances[run] + quadratic(&by_shared[run], &covariance))
+                let told = own_variances[run] + quadratic(&by_shared[run], &covariance);
+                (values[run], reach * told.max(0.0).sqrt())
             })
         }
     };
-    let half = Z95 * variance.max(0.0).sqrt();
     let name = quantity.name.clone();
     Estimate { name, unit: quantity.unit.clone(), value, ci95: [value - half, value + half] }
 }
@@ -251,8 +276,11 @@ impl<'a> Profile<'a> {
         values.into_iter().filter(move |value| (value - bound) * side < 0.0)
     }
 
-    /// The 95 % interval, where the quadratic one of this half width misleads.
-    fn interval(&self, half: f64, quadratic: [f64; 2]) -> [f64; 2] {
+    /// The 95 % interval, where the quadratic one of this half width, so many standard errors, misleads.
+    fn interval(&self, half: f64, reach: f64) -> [f64; 2] {
+        let most = reach * reach;
+        let value = self.fit.shared[self.slot];
+        let quadratic = [value - half, value + half];
         let mut interval = quadratic;
         for (side, end) in [(-1.0, 0), (1.0, 1)] {
             let bound = self.bound(side);
@@ -265,19 +293,20 @@ impl<'a> Profile<'a> {
                 }
                 let Some(risen) = self.rise(value).filter(|r| *r > 0.0) else { break };
                 interval[end] = value;
-                if (risen - CHI95).abs() < 0.05 * CHI95 {
+                if (risen - most).abs() < 0.05 * most {
                     break;
                 }
                 // Along a profile that is nearly a parabola the distance goes with the square root of the rise.
-                distance *= (CHI95 / risen).sqrt().clamp(0.5, 2.0);
+                distance *= (most / risen).sqrt().clamp(0.5, 2.0);
             }
             // Another top beyond the first fall may be as likely as the interval's own end.
-            for value in self.looks(side, half / Z95).filter(|value| (value - quadratic[end]) * side > 0.0) {
+            for value in self.looks(side, half / reach).filter(|value| (value - quadratic[end]) * side > 0.0)
+            {
                 let top = self
                     .top_from(value, f64::INFINITY)
                     .map(|f| (f.shared[self.slot], f.chi2 - self.fit.chi2));
-                if let Some((top, risen)) = top.filter(|(_, risen)| *risen < CHI95) {
-                    let reach = top + side * half * (1.0 - risen / CHI95).min(1.0).sqrt();
+                if let Some((top, risen)) = top.filter(|(_, risen)| *risen < most) {
+                    let reach = top + side * half * (1.0 - risen / most).min(1.0).sqrt();
                     let reach = if (reach - bound) * side < 0.0 { reach } else { bound };
                     if (reach - interval[end]) * side > 0.0 {
                         interval[end] = reach;
@@ -303,10 +332,23 @@ pub(crate) fn better_top(problem: &Problem<'_>, candidate: &Candidate) -> Option
         let profile = Profile::new(problem, candidate, i);
         for value in [-1.0, 1.0].into_iter().flat_map(|side| profile.looks(side, error)) {
             let least = best.as_ref().map_or(candidate.fit.chi2, |b| b.chi2) - BETTER;
-            if let Some(top) = profile.top_from(value, least + CHI95).filter(|f| f.chi2 < least) {
+            if let Some(top) = profile.top_from(value, least + Z95 * Z95).filter(|f| f.chi2 < least) {
                 best = Some(top);
             }
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles of a table; and few runs that differ know their mean less well than many.
+    #[test]
+    fn few_degrees_of_freedom_reach_further() {
+        approx::assert_abs_diff_eq!(student(2.0), 4.3027, epsilon = 1e-3);
+        approx::assert_abs_diff_eq!(student(10.0), 2.2281, epsilon = 1e-3);
+        approx::assert_abs_diff_eq!(student(1e6), Z95, epsilon = 1e-3);
+    }
 }

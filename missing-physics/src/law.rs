@@ -99,7 +99,7 @@ fn sparse(
     let Some((fitted, score)) = current.filter(|(_, score)| improves(seen, score)) else { return Ok(None) };
     let terms: Vec<&Term> = chosen.iter().map(|&t| &spec.terms[t]).collect();
     let coefficients =
-        estimates(problem, &fitted, &terms.iter().map(|t| t.parameter).collect::<Vec<_>>(), &[], None);
+        estimates(problem, &fitted, &terms.iter().map(|t| t.parameter).collect::<Vec<_>>(), &[], rule, false);
     let adds_to = terms[0].adds_to.clone();
     let sum: Vec<String> = terms
         .iter()
@@ -353,7 +353,7 @@ fn extended(
     }
     let added: Vec<usize> =
         (0..wide.shared.index.len()).skip(model.inner_shared).map(|slot| wide.shared.index[slot]).collect();
-    let coefficients: Vec<Estimate> = estimates(&wide, &fitted, &added, &[], None);
+    let coefficients: Vec<Estimate> = estimates(&wide, &fitted, &added, &[], rule, false);
     let along = match model.noise_along {
         Some(v) => (problem.recording.variables[v].name.clone(), problem.recording.variables[v].unit.clone()),
         None => ("row".into(), String::new()),
