@@ -112,11 +112,17 @@ impl SetUp for Table {
         match listed {
             0 => {
                 let logs = self.answers(Effects { response: e.response, ..Effects::default() });
-                key.add("stiffness-change", &[("factor", slope(logs.map(|m| (1.0, m.log))).exp())]);
+                key.add(
+                    "stiffness-change",
+                    &[("factor", slope(logs.map(|m| (m.usual, m.usual * m.log.exp()))))],
+                );
             }
             DRYING => {
                 let logs = self.answers(Effects { drying_per_s: e.drying_per_s, ..Effects::default() });
-                key.add("drying", &[("rate_per_s", -slope(logs.map(|m| (m.t_s, m.log))))]);
+                key.add(
+                    "drying",
+                    &[("rate_per_s", -slope(logs.map(|m| (m.usual * m.t_s, m.usual * m.log))))],
+                );
             }
             2 => key.add("slip", &[("force_n", e.slip_n)]),
             3 => key.add("springback", &[("fraction", e.springback)]),
@@ -124,7 +130,10 @@ impl SetUp for Table {
             _ => {
                 let softer = Effects { softening_per_roll: e.softening_per_roll, ..Effects::default() };
                 let logs = self.answers(softer);
-                key.add("band-softening", &[("rate_per_roll", -slope(logs.map(|m| (m.step, m.log))))]);
+                key.add(
+                    "band-softening",
+                    &[("rate_per_roll", -slope(logs.map(|m| (m.usual * m.step, m.usual * m.log))))],
+                );
             }
         }
     }
@@ -182,10 +191,11 @@ impl SetUp for Table {
     }
 }
 
-/// One roll: the logarithm of its strain over the usual one.
+/// One roll: its usual strain, and the logarithm of its strain over that.
 struct Answered {
     step: f64,
     t_s: f64,
+    usual: f64,
     log: f64,
 }
 
@@ -197,14 +207,14 @@ fn slope(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
 
 impl Table {
     /// What the doughs answer to their rolls: effects act on the rate of flow, and the answer is what a roll does in the end, which
-    /// is a little nearer to the usual one, since a dough that flows less is pressed more.
+    /// is a little nearer to the usual one, since a dough that flows less is pressed more. Large answers count for more.
     fn answers(&self, effects: Effects) -> impl Iterator<Item = Answered> {
         let rolled = DoughWorld { effects, ..self.world.clone() }.rolled();
         rolled.into_iter().flat_map(|rolls| {
             rolls.into_iter().enumerate().filter_map(|(step, m)| {
                 let [now, usual] = [m.after, m.usual].map(|then| (then[0] / m.before[0]).ln());
                 let log = (now / usual).ln();
-                log.is_finite().then_some(Answered { step: step as f64, t_s: m.t_s, log })
+                log.is_finite().then_some(Answered { step: step as f64, t_s: m.t_s, usual, log })
             })
         })
     }
