@@ -7,7 +7,8 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::compare::Candidate;
 use crate::diagnosis::Estimate;
-use crate::fit::{Fit, NoiseRule, covariance, solve};
+use crate::fit::{Fit, NoiseRule, NoiseState, covariance, open_shapes, solve};
+use crate::model::PredictError;
 use crate::model::{Derived, DerivedPerRun, Mechanism, Over, Scope};
 use crate::problem::{Problem, Selection};
 
@@ -43,6 +44,8 @@ pub(crate) fn of_mechanism(
     rule: &NoiseRule,
     profile: bool,
 ) -> Vec<Estimate> {
+    let open = profile.then(|| with_open_noise(problem, rule, candidate)).flatten();
+    let candidate = open.as_ref().unwrap_or(candidate);
     let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, rule, profile);
     for other in &candidate.elsewhere {
         let other = Candidate { fit: other.clone(), elsewhere: Vec::new(), ..candidate.clone() };
@@ -52,6 +55,32 @@ pub(crate) fn of_mechanism(
     let reach = reach(problem, &candidate.selection, rule);
     all.extend(mechanism.derived_per_run.iter().map(|quantity| over_runs(candidate, quantity, reach)));
     all
+}
+
+/// A candidate with the information that is left once the shape of the noise is as open as the residuals leave it: the variance of
+/// the parameters is its mean over the shapes, and what they move by with the shape (Hoeting et al. 1999,
+/// doi:10.1214/ss/1009212519). `None` where that has no inverse.
+fn with_open_noise(problem: &Problem<'_>, rule: &NoiseRule, candidate: &Candidate) -> Option<Candidate> {
+    let Candidate { selection, fit, .. } = candidate;
+    let n = selection.shared.len();
+    let chosen = covariance(&fit.information);
+    let mut total = chosen.clone();
+    let over = |noise: &NoiseState| -> Result<DMatrix<f64>, PredictError> {
+        let there = solve(problem, selection, noise, &fit.shared, &fit.own)?;
+        let moved = |i: usize| there.shared[selection.shared[i]] - fit.shared[selection.shared[i]];
+        let by = DMatrix::from_fn(n, n, |i, j| moved(i) * moved(j));
+        Ok(covariance(&there.information) + by)
+    };
+    for (channel, shapes) in open_shapes(problem, selection, rule, fit).ok()?.iter().enumerate() {
+        for open in shapes {
+            let mut noise = fit.noise.clone();
+            (noise.shape[channel], noise.sigma[channel]) = (open.shape, open.sigma);
+            total += (over(&noise).ok()? - &chosen) * open.weight;
+        }
+    }
+    let information = total.cholesky()?.inverse();
+    let sound = information.iter().all(|v| v.is_finite());
+    sound.then(|| Candidate { fit: Fit { information, ..fit.clone() }, ..candidate.clone() })
 }
 
 impl Estimate {
@@ -252,6 +281,14 @@ impl<'a> Profile<'a> {
         solve(self.problem, &self.others, &self.fit.noise, &shared, &self.fit.own).ok()
     }
 
+    /// By how much a standard error is wider than that of the fit's own noise.
+    fn wider(&self, error: f64) -> f64 {
+        let at = self.all.shared.iter().position(|&slot| slot == self.slot);
+        let there = solve(self.problem, self.all, &self.fit.noise, &self.fit.shared, &self.fit.own).ok();
+        let own = at.zip(there).map_or(f64::NAN, |(i, fit)| covariance(&fit.information)[(i, i)].sqrt());
+        if own > 0.0 && own.is_finite() { error / own } else { 1.0 }
+    }
+
     /// By how much the sum of squares is higher at a value than at the estimate.
     fn rise(&self, value: f64) -> Option<f64> {
         self.at(value).map(|f| f.chi2 - self.fit.chi2)
@@ -278,8 +315,8 @@ impl<'a> Profile<'a> {
 
     /// The 95 % interval, where the quadratic one of this half width, so many standard errors, misleads.
     fn interval(&self, half: f64, reach: f64) -> [f64; 2] {
-        let most = reach * reach;
         let value = self.fit.shared[self.slot];
+        let most = (reach * self.wider(half / reach)).powi(2);
         let quadratic = [value - half, value + half];
         let mut interval = quadratic;
         for (side, end) in [(-1.0, 0), (1.0, 1)] {

@@ -141,6 +141,15 @@ impl Family {
         self.shapes[number]
     }
 
+    /// Prior weights of shapes for somebody who prefers no kind of noise, and among those of a kind none.
+    pub(crate) fn indifferent(&self, numbers: &[usize]) -> Vec<f64> {
+        let kind = |n: usize| Kind::of(&self.shapes[n]);
+        numbers
+            .iter()
+            .map(|&n| 1.0 / numbers.iter().filter(|&&other| kind(other) == kind(n)).count() as f64)
+            .collect()
+    }
+
     /// The lattice's points `stride` steps from a shape along each of its axes, the nearest point itself first; none of white noise.
     pub(crate) fn around(&self, number: usize, stride: usize) -> Vec<usize> {
         let shape = &self.shapes[number];

@@ -297,17 +297,10 @@ pub(crate) fn estimate_noise(
     own: &[Vec<f64>],
 ) -> Result<NoiseState, PredictError> {
     let channels = problem.channels();
-    let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
-    let mut state = white.clone();
-    let raw = own
-        .iter()
-        .enumerate()
-        .map(|(run, values)| whitened_columns(problem, selection, &white, run, shared, values))
-        .collect::<Result<Vec<_>, _>>()?;
-    let own_columns: Vec<Vec<Vec<usize>>> =
-        (0..own.len()).map(|run| channel_columns(problem, run, &raw[run][..selection.own.len()])).collect();
+    let all = Leftovers::new(problem, selection, shared, own)?;
+    let mut state = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
     for channel in 0..channels {
-        let left = Left { problem, rule, raw: &raw, own_columns: &own_columns, channel, selection };
+        let left = all.of(problem, rule, channel, selection);
         let higher = |a: &(f64, f64), b: &(f64, f64)| a.0 > b.0;
         let mut best = (0, (f64::NEG_INFINITY, 1.0));
         for &shape in &rule.allowed {
@@ -322,6 +315,81 @@ pub(crate) fn estimate_noise(
         state.sigma[channel] = sigma;
     }
     Ok(state)
+}
+
+/// A shape that the noise of a channel may have, its sigma then, and how probable that is.
+pub(crate) struct OpenShape {
+    pub(crate) shape: usize,
+    pub(crate) sigma: f64,
+    pub(crate) weight: f64,
+}
+
+/// Of each channel the shapes of noise that a fit's residuals leave open, for somebody who prefers no kind.
+pub(crate) fn open_shapes(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    rule: &NoiseRule,
+    fit: &Fit,
+) -> Result<Vec<Vec<OpenShape>>, PredictError> {
+    /// Shapes that are less likely than the best by more than this factor are left out.
+    const LEAST: f64 = 0.05;
+    let all = Leftovers::new(problem, selection, &fit.shared, &fit.own)?;
+    let prior = problem.family.indifferent(&rule.allowed);
+    let open = |channel: usize| {
+        let left = all.of(problem, rule, channel, selection);
+        let scored: Vec<(usize, f64, f64)> = rule
+            .allowed
+            .iter()
+            .zip(&prior)
+            .map(|(&shape, weight)| {
+                let (score, sigma) = left.under(shape);
+                (shape, sigma, score - rule.log_prior(problem, shape) + weight.ln())
+            })
+            .collect();
+        let best = scored.iter().map(|s| s.2).fold(f64::NEG_INFINITY, f64::max);
+        let weighed = scored.into_iter().map(|(shape, sigma, log)| (shape, sigma, (log - best).exp()));
+        let kept: Vec<_> = weighed.filter(|k| k.2 >= LEAST).collect();
+        let total: f64 = kept.iter().map(|k| k.2).sum();
+        kept.into_iter().map(|(shape, sigma, w)| OpenShape { shape, sigma, weight: w / total }).collect()
+    };
+    Ok((0..problem.channels()).map(open).collect())
+}
+
+/// What a fit leaves in all channels, not yet whitened.
+struct Leftovers {
+    raw: Vec<Vec<Vec<f64>>>,
+    own_columns: Vec<Vec<Vec<usize>>>,
+}
+
+impl Leftovers {
+    fn new(
+        problem: &Problem<'_>,
+        selection: &Selection,
+        shared: &[f64],
+        own: &[Vec<f64>],
+    ) -> Result<Self, PredictError> {
+        let channels = problem.channels();
+        let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
+        let raw = own
+            .iter()
+            .enumerate()
+            .map(|(run, values)| whitened_columns(problem, selection, &white, run, shared, values))
+            .collect::<Result<Vec<_>, _>>()?;
+        let own_columns = (0..own.len())
+            .map(|run| channel_columns(problem, run, &raw[run][..selection.own.len()]))
+            .collect();
+        Ok(Self { raw, own_columns })
+    }
+
+    fn of<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        rule: &'a NoiseRule,
+        channel: usize,
+        selection: &'a Selection,
+    ) -> Left<'a> {
+        Left { problem, rule, raw: &self.raw, own_columns: &self.own_columns, channel, selection }
+    }
 }
 
 /// What a fit leaves in one channel: residuals and own parameters' columns, not yet whitened.
