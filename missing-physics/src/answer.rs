@@ -7,7 +7,7 @@ use crate::diagnosis::{
     ChannelFit, ChannelNoise, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
 };
 use crate::engine::size;
-use crate::estimate::{estimates, of_mechanism};
+use crate::estimate::{estimates, of_mechanism, with_open_noise};
 use crate::fit::{Fit, NoiseRule};
 use crate::law;
 use crate::model::PredictError;
@@ -51,6 +51,7 @@ impl Answer<'_> {
             |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
         let free: Vec<usize> =
             self.baseline.selection.shared.iter().map(|&slot| self.problem.shared.index[slot]).collect();
+        let open = with_open_noise(self.problem, self.rule, model);
         Ok(Diagnosis {
             verdict,
             p_value: adequacy.p_value,
@@ -75,7 +76,7 @@ impl Answer<'_> {
             undetermined: Vec::new(),
             outliers: self.outliers.to_vec(),
             remarks: self.remarks(),
-            repaired: Repaired::of(self.problem, model),
+            repaired: Repaired::of(self.problem, open.as_ref().unwrap_or(model)),
             curves: self.curves()?,
         })
     }

@@ -60,7 +60,11 @@ pub(crate) fn of_mechanism(
 /// A candidate with the information that is left once the shape of the noise is as open as the residuals leave it: the variance of
 /// the parameters is its mean over the shapes, and what they move by with the shape (Hoeting et al. 1999,
 /// doi:10.1214/ss/1009212519). `None` where that has no inverse.
-fn with_open_noise(problem: &Problem<'_>, rule: &NoiseRule, candidate: &Candidate) -> Option<Candidate> {
+pub(crate) fn with_open_noise(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    candidate: &Candidate,
+) -> Option<Candidate> {
     let Candidate { selection, fit, .. } = candidate;
     let n = selection.shared.len();
     let chosen = covariance(&fit.information);

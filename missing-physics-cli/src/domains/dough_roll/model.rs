@@ -60,6 +60,9 @@ pub(super) struct DoughModel {
 pub(super) const CHANNELS: [&str; 6] =
     ["next_length_m", "next_width_m", "next_height_m", "length_m", "width_m", "height_m"];
 
+/// The force among a run's inputs.
+const FORCE: usize = 7;
+
 impl DoughModel {
     pub(super) fn new(band: Band, dynamics: Dynamics, timed: bool, steps: &[Step]) -> Self {
         let strongest =
@@ -227,6 +230,20 @@ impl Model for DoughModel {
             *value = self.scale[channel] * (block.off[row] - errors[row]);
         }
         Ok(())
+    }
+
+    /// Forces below which the band may slip, evenly through those of the rolls: between two of them there is no slope to follow.
+    fn starts(&self, mechanism: usize, runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
+        const STARTS: usize = 12;
+        let slip = self.places.slip().index;
+        if self.spec.mechanisms[mechanism].parameters != [slip] {
+            return Vec::new();
+        }
+        let mut forces: Vec<f64> = runs.iter().flat_map(|run| run.inputs[FORCE].clone()).collect();
+        forces.sort_by(f64::total_cmp);
+        forces.dedup();
+        let last = forces.len().saturating_sub(1);
+        (1..=STARTS).filter_map(|k| Some(vec![(slip, *forces.get(k * last / (STARTS + 1))?)])).collect()
     }
 
     fn prediction_is_clean(&self) -> bool {

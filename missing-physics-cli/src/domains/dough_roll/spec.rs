@@ -66,6 +66,11 @@ pub(super) struct Places {
 }
 
 impl Places {
+    /// The force below which the band slips.
+    pub(super) fn slip(&self) -> At {
+        self.slip
+    }
+
     pub(super) fn effects(&self, shared: &[f64]) -> Effects {
         Effects {
             factor: shared[self.factor.slot],
