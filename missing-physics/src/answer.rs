@@ -187,8 +187,10 @@ impl Answer<'_> {
 
     /// Every mechanism that the data can speak of, likeliest first.
     pub(crate) fn mechanisms(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<MechanismReport> {
+        let best = best.map(|b| ranking.at(b.at));
+        let open = best.and_then(|b| with_open_noise(self.problem, self.rule, b));
         let mut reports: Vec<MechanismReport> = (0..self.problem.spec().mechanisms.len())
-            .filter_map(|m| self.mechanism(m, ranking, best.map(|b| ranking.at(b.at))))
+            .filter_map(|m| self.mechanism(m, ranking, open.as_ref().or(best)))
             .collect();
         reports.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         reports

@@ -101,10 +101,13 @@ pub(crate) fn candidate(
             Err(error) => failure = Some(error),
         }
     }
-    let mut fits = tops
-        .into_iter()
-        .map(|(_, top)| fit(problem, &selection, rule, (&top.shared, &top.own), Some(&top.noise)))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut fits = Vec::new();
+    for (_, top) in tops {
+        match fit(problem, &selection, rule, (&top.shared, &top.own), Some(&top.noise)) {
+            Ok(fit) => fits.push(fit),
+            Err(error) => failure = Some(error),
+        }
+    }
     let likelihood = |fit: &Fit| likelihood(problem, rule, fit);
     fits.sort_by(|a, b| likelihood(b).total_cmp(&likelihood(a)));
     if fits.is_empty() {

@@ -8,8 +8,7 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 use crate::compare::Candidate;
 use crate::diagnosis::Estimate;
 use crate::fit::{Fit, NoiseRule, NoiseState, covariance, open_shapes, solve};
-use crate::model::PredictError;
-use crate::model::{Derived, DerivedPerRun, Mechanism, Over, Scope};
+use crate::model::{Derived, DerivedPerRun, Mechanism, Over, PredictError, Scope};
 use crate::problem::{Problem, Selection};
 
 /// The quantile at which two-sided 95 % intervals end.
@@ -44,8 +43,6 @@ pub(crate) fn of_mechanism(
     rule: &NoiseRule,
     profile: bool,
 ) -> Vec<Estimate> {
-    let open = profile.then(|| with_open_noise(problem, rule, candidate)).flatten();
-    let candidate = open.as_ref().unwrap_or(candidate);
     let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, rule, profile);
     for other in &candidate.elsewhere {
         let other = Candidate { fit: other.clone(), elsewhere: Vec::new(), ..candidate.clone() };

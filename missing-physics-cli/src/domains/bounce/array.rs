@@ -135,14 +135,15 @@ mod tests {
         };
         let slow = Wrong { scale: -0.07, ..Wrong::default() };
         let aside = Wrong { microphone: Some(2), offset_m: [-0.02, 0.022], scale: 0.0 };
-        for (wrong, place) in [slow, aside].into_iter().flat_map(|w| [(w, [0.2, 0.3]), (w, [0.4, 0.12])]) {
+        let both = [(slow, 1e-5), (aside, 1e-6)];
+        for ((wrong, late), place) in both.into_iter().flat_map(|w| [(w, [0.2, 0.3]), (w, [0.4, 0.12])]) {
             let distances = microphones.distances(place, &wrong);
             let arrivals: Vec<f64> =
                 distances.iter().map(|d| 0.3 + d * (1.0 + wrong.scale) / 340.0).collect();
             let heard = microphones.located([0.27, 0.2], &arrivals, &Wrong::default()).unwrap();
             let t_s = arrivals[0] + heard[0] / 340.0;
             let [dt, dx, dy] = microphones.moved([heard[1], heard[2]], &arrivals, &wrong).unwrap();
-            assert!(dx.hypot(dy) > 1e-3 && dt.abs() > 1e-6);
+            assert!(dx.hypot(dy) > 1e-3 && dt.abs() > late);
             assert!((heard[1] + dx - place[0]).abs() < 1e-9 && (heard[2] + dy - place[1]).abs() < 1e-9);
             assert!((t_s + dt - 0.3).abs() < 1e-12, "{}", t_s + dt);
             assert!(microphones.misfit(place, &arrivals, &wrong)[0].abs() < 1e-14);

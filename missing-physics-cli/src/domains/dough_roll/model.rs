@@ -235,7 +235,7 @@ impl Model for DoughModel {
     /// Forces below which the band may slip, evenly through those of the rolls: between two of them there is no slope to follow.
     fn starts(&self, mechanism: usize, runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         const STARTS: usize = 12;
-        let slip = self.places.slip().index;
+        let slip = self.places.slip.index;
         if self.spec.mechanisms[mechanism].parameters != [slip] {
             return Vec::new();
         }

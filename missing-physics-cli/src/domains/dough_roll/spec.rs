@@ -55,7 +55,8 @@ impl Effects {
 pub(super) struct Places {
     factor: At,
     drying: Option<At>,
-    slip: At,
+    /// The force below which the band slips.
+    pub(super) slip: At,
     onset_n: f64,
     springback: At,
     loss: At,
@@ -66,11 +67,6 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// The force below which the band slips.
-    pub(super) fn slip(&self) -> At {
-        self.slip
-    }
-
     pub(super) fn effects(&self, shared: &[f64]) -> Effects {
         Effects {
             factor: shared[self.factor.slot],
