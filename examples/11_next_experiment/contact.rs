@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 use worlds::press::{Effects, Indenter, PressWorld, Step};
 
-use super::{Outcome, Rig};
+use super::{Outcome, Rig, on_log_scale};
 
 const BALL_M: f64 = 0.01;
 const MODULUS_PA: f64 = 2e4;
@@ -30,9 +30,10 @@ pub(super) struct Hidden {
     effects: Effects,
 }
 
-/// A press to a depth in a time, and how long the depth is held.
+/// A press from the contact or above it (below zero) to a depth in a time, and how long the depth is held.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Press {
+    from_m: f64,
     depth_m: f64,
     duration_s: f64,
     hold_s: f64,
@@ -55,15 +56,22 @@ impl Rig for Contact {
     }
 
     fn draw(rng: &mut ChaCha8Rng) -> Hidden {
-        let size: f64 = rng.random_range(0.6..1.6);
+        let size = on_log_scale(rng, [0.3, 3.0]);
+        let signed = if rng.random::<bool>() { size } else { -size };
         let none = Effects::default();
-        let (id, effects) = match rng.random_range(0..6) {
+        let (id, effects) = match rng.random_range(0..10) {
             0 => ("adhesion", Effects { adhesion_j_m2: 0.15 * size, ..none }),
             1 => ("finite-thickness", Effects { thickness_m: 0.02 / size, ..none }),
             2 => ("strain-stiffening", Effects { stiffening: 0.6 * size, ..none }),
             3 => ("membrane-tension", Effects { tension_n_m: 15.0 * size, ..none }),
-            4 => ("viscoelasticity", Effects { relaxed_fraction: 0.15 * size, tau_s: 1.0, ..none }),
-            _ => ("load-cell-compliance", Effects { compliance_m_n: 3e-4 * size, ..none }),
+            4 => {
+                ("viscoelasticity", Effects { relaxed_fraction: (0.15 * size).min(0.9), tau_s: 1.0, ..none })
+            }
+            5 => ("load-cell-compliance", Effects { compliance_m_n: 3e-4 * size, ..none }),
+            6 => ("membrane-stretching", Effects { stretching_n_m3: 1e7 * size, ..none }),
+            7 => ("rim-contact", Effects { rim: [rng.random_range(3e-4..3e-3), 50.0 * size], ..none }),
+            8 => ("contact-offset", Effects { contact_offset_m: 3e-5 * signed, ..none }),
+            _ => ("force-offset", Effects { force_offset_n: 3e-3 * signed, ..none }),
         };
         Hidden { id, effects }
     }
@@ -73,22 +81,29 @@ impl Rig for Contact {
     }
 
     fn first() -> Press {
-        Press { depth_m: 1e-3, duration_s: 1.0, hold_s: 0.0 }
+        Press { from_m: 0.0, depth_m: 1e-3, duration_s: 1.0, hold_s: 0.0 }
     }
 
     fn random(rng: &mut ChaCha8Rng) -> Press {
-        let [depth_m, duration_s, hold_s] =
-            [DEPTH_M, DURATION_S, DURATION_S].map(|reach| on_log_scale(rng, reach));
-        Press { depth_m, duration_s, hold_s: if rng.random() { hold_s } else { 0.0 } }
+        let [above_m, depth_m, duration_s, hold_s] =
+            [DEPTH_M, DEPTH_M, DURATION_S, DURATION_S].map(|reach| on_log_scale(rng, reach));
+        let mut or_none = |value: f64| if rng.random() { value } else { 0.0 };
+        Press { from_m: -or_none(above_m), depth_m, duration_s, hold_s: or_none(hold_s) }
     }
 
     fn grid() -> Vec<Press> {
-        let press = |share: f64, duration_s| Press { depth_m: share * DEPTH_M[1], duration_s, hold_s: 0.0 };
+        let press = |share: f64, duration_s| Press {
+            from_m: 0.0,
+            depth_m: share * DEPTH_M[1],
+            duration_s,
+            hold_s: 0.0,
+        };
         [0.25, 0.5, 0.75, 1.0].iter().flat_map(|share| [0.1, 1.0, 10.0].map(|s| press(*share, s))).collect()
     }
 
     fn proposed(value: &dyn Fn(&str) -> Option<f64>) -> Option<Press> {
         let press = Press {
+            from_m: value("from_m").unwrap_or(0.0),
             depth_m: value("delta_m")?,
             duration_s: value("duration_s")?,
             hold_s: value("hold_s").unwrap_or(0.0),
@@ -119,11 +134,6 @@ struct Reading {
     segment: &'static str,
 }
 
-/// A number of which each factor between the limits is equally likely.
-fn on_log_scale(rng: &mut ChaCha8Rng, [least, most]: [f64; 2]) -> f64 {
-    rng.random_range(least.ln()..most.ln()).exp()
-}
-
 /// Presses and reads, on any arm that carries a load cell: down in steps, and held.
 fn curve<R>(rig: &mut R, press: Press) -> Outcome<Vec<Reading>>
 where
@@ -132,13 +142,15 @@ where
     let told = |e: R::Error| format!("{e:?}");
     let mut readings = Vec::new();
     let zero = rig.now_s().map_err(told)?;
+    rig.move_to(at(press.from_m), 1.0).map_err(told)?;
     let holds = if press.hold_s > 0.0 { ROWS } else { 0 };
     for row in 0..ROWS + holds {
         if row > 0 {
             let share = (row.min(ROWS - 1)) as f64 / (ROWS - 1) as f64;
             let lasts =
                 if row < ROWS { press.duration_s / (ROWS - 1) as f64 } else { press.hold_s / ROWS as f64 };
-            rig.move_to(at(share * press.depth_m), lasts).map_err(told)?;
+            let depth_m = press.from_m + share * (press.depth_m - press.from_m);
+            rig.move_to(at(depth_m), lasts).map_err(told)?;
             rig.sleep_s(lasts).map_err(told)?;
         }
         let pose = rig.pose().map_err(told)?;

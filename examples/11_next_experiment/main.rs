@@ -12,7 +12,7 @@ use std::error::Error;
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use rand::SeedableRng;
+use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
@@ -59,6 +59,8 @@ enum Policy {
     Grid,
 }
 
+const POLICIES: [Policy; 3] = [Policy::Proposed, Policy::Random, Policy::Grid];
+
 /// Experiments after which a rig gives up.
 fn patience() -> usize {
     if examples::small() { 2 } else { 8 }
@@ -72,6 +74,11 @@ fn ask<R: Rig>(rows: &str, seed: u64) -> Outcome<Diagnosis> {
     loaded.experiments.retain(|e| proposed::<R>(&e.action).is_some());
     let options = Options { seed, replicates: 199, ..Options::default() };
     Ok(diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?)
+}
+
+/// A number of which each factor between the limits is equally likely.
+fn on_log_scale(rng: &mut ChaCha8Rng, [least, most]: [f64; 2]) -> f64 {
+    rng.random_range(least.ln()..most.ln()).exp()
 }
 
 /// A proposed action as one of the rig's, if it can do it.
@@ -156,8 +163,8 @@ impl<R: Rig> World<R> {
     }
 }
 
-/// The table of one rig.
-fn race<R: Rig>(worlds: u64) -> Outcome<()> {
+/// The table of one rig: experiments that each policy took, world by world.
+fn race<R: Rig>(worlds: u64) -> Outcome<[Vec<usize>; 3]> {
     println!("{}: one world, step by step", R::NAME);
     if let (Some(world), _) = World::<R>::ambiguous(1 << 20)? {
         world.until_sure(Policy::Proposed, true)?;
@@ -173,26 +180,45 @@ fn race<R: Rig>(worlds: u64) -> Outcome<()> {
     let seeds: Vec<u64> = started.iter().filter(|s| s.2).map(|s| s.0).collect();
     let drawn: u64 = started.iter().map(|s| s.1).sum();
     println!("  {} worlds whose first answer is ambiguous, of {drawn} drawn", seeds.len());
-    println!("  {:10} {:>6} {:>8} {:>6} {:>6}", "policy", "mean", "median", "most", "never");
-    for policy in [Policy::Proposed, Policy::Random, Policy::Grid] {
-        let mut counts: Vec<usize> = seeds
+    let mut table = [const { Vec::new() }; 3];
+    for (row, policy) in table.iter_mut().zip(POLICIES) {
+        *row = seeds
             .par_iter()
             .map(|seed| World::<R>::new(*seed)?.until_sure(policy, false))
             .collect::<Outcome<_>>()?;
-        counts.sort_unstable();
-        let mean = counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
-        let never = counts.iter().filter(|n| **n == patience()).count();
-        let middle = counts.get(counts.len() / 2).copied().unwrap_or(0);
-        let most = counts.last().copied().unwrap_or(0);
-        println!("  {:10} {mean:6.2} {middle:8} {most:6} {never:6}", format!("{policy:?}").to_lowercase());
     }
-    Ok(())
+    show(&table);
+    Ok(table)
+}
+
+/// Mean, median, most, and how many were never sure, of each policy; its mean over that of random actions.
+fn show(table: &[Vec<usize>; 3]) {
+    let mean = |counts: &[usize]| counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
+    println!(
+        "  {:10} {:>6} {:>8} {:>6} {:>6} {:>16}",
+        "policy", "mean", "median", "most", "never", "over random's"
+    );
+    for (counts, policy) in table.iter().zip(POLICIES) {
+        let mut sorted = counts.clone();
+        sorted.sort_unstable();
+        let never = sorted.iter().filter(|n| **n == patience()).count();
+        let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0);
+        let most = sorted.last().copied().unwrap_or(0);
+        let (name, share) = (format!("{policy:?}").to_lowercase(), mean(counts) / mean(&table[1]));
+        println!("  {name:10} {:6.2} {middle:8} {most:6} {never:6} {share:16.2}", mean(counts));
+    }
 }
 
 fn main() -> Outcome<()> {
     let worlds = if examples::small() { 1 } else { 50 };
     println!("Experiments beyond the first until P(what is hidden) >= {SURE}\n");
-    race::<liquid::Liquid>(worlds)?;
+    let mut both = race::<liquid::Liquid>(worlds)?;
     println!();
-    race::<contact::Contact>(worlds)
+    let contact = race::<contact::Contact>(worlds)?;
+    for (all, one) in both.iter_mut().zip(contact) {
+        all.extend(one);
+    }
+    println!("\nboth");
+    show(&both);
+    Ok(())
 }

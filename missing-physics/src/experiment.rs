@@ -96,7 +96,7 @@ fn expected(
     for (run, own) in recording.runs.iter_mut().zip(&experiment.own) {
         let n = run.len();
         let mut out = vec![0.0; n * channels];
-        problem.model.predict(run, &truth.fit.shared, own, &mut out)?;
+        problem.model.predict(run, &truth.fit.shared, &own_of_next(truth, own), &mut out)?;
         run.outputs = (0..channels).map(|c| out[c * n..(c + 1) * n].to_vec()).collect();
     }
     let future = problem.with(recording);
@@ -108,8 +108,14 @@ fn expected(
     let mut right = vec![0.0; n_shared];
     let mut total = 0.0;
     for run in 0..future.rows.len() {
-        let columns =
-            whitened_columns(&future, selection, &noise, run, &other.fit.shared, &experiment.own[run])?;
+        let columns = whitened_columns(
+            &future,
+            selection,
+            &noise,
+            run,
+            &other.fit.shared,
+            &own_of_next(other, &experiment.own[run]),
+        )?;
         let residual = &columns[n_own + n_shared];
         total += dot(residual, residual);
         let mut factor = DMatrix::from_fn(n_own, n_own, |i, j| dot(&columns[i], &columns[j]));
@@ -134,4 +140,15 @@ fn expected(
     forward(&information, &kept, &mut right);
     backward(&information, &kept, &mut right);
     Ok(0.5 * (total - dot(&gradient, &right)).max(0.0))
+}
+
+/// A further run's own parameters: those that a mechanism added have the mean of the runs so far.
+fn own_of_next(candidate: &Candidate, stated: &[f64]) -> Vec<f64> {
+    let Selection { own: slots, added_own: added, .. } = &candidate.selection;
+    let mut own = stated.to_vec();
+    for (&slot, _) in slots.iter().zip(added).filter(|(_, added)| **added) {
+        let runs = &candidate.fit.own;
+        own[slot] = runs.iter().map(|run| run[slot]).sum::<f64>() / runs.len().max(1) as f64;
+    }
+    own
 }

@@ -1,9 +1,11 @@
 //! Intervals hold the truth as often as they say, also where noise is so faintly coloured that no test shows it.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test stops where it fails")]
 
+mod common;
+
+use common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{Options, diagnose};
-use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec};
 use missing_physics::observer::Silent;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -12,36 +14,6 @@ use rand_distr::{Distribution, StandardNormal};
 const SLOPE: f64 = 1.0;
 const ROWS: usize = 30;
 const RUNS: usize = 2;
-
-/// `y = slope t`, and nothing without the mechanism.
-struct Line(Spec);
-
-impl Line {
-    fn new() -> Self {
-        let slope = Parameter {
-            name: "slope".into(),
-            unit: String::new(),
-            scope: Scope::Shared,
-            start: 0.0,
-            lower: -10.0,
-            upper: 10.0,
-            scale: 1.0,
-        };
-        let mechanism = Mechanism { id: "slope".into(), parameters: vec![0], ..Mechanism::default() };
-        Self(Spec { parameters: vec![slope], mechanisms: vec![mechanism], ..Spec::default() })
-    }
-}
-
-impl Model for Line {
-    fn spec(&self) -> &Spec {
-        &self.0
-    }
-
-    fn predict(&self, run: &Run, shared: &[f64], _: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        out.iter_mut().zip(&run.inputs[0]).for_each(|(y, t)| *y = shared[0] * t);
-        Ok(())
-    }
-}
 
 /// Runs whose noise is an autoregression.
 fn draw(correlation: f64, seed: u64) -> Recording {
@@ -58,19 +30,13 @@ fn draw(correlation: f64, seed: u64) -> Recording {
             Run { label: run.to_string(), outputs: vec![readings.collect()], inputs: vec![times], kind: 0 }
         })
         .collect();
-    Recording {
-        channels: vec![Quantity::new("y", "")],
-        variables: vec![Quantity::new("t", "s")],
-        runs,
-        noise_along: Some(0),
-        calibration: vec![None],
-        resolution: vec![0.0],
-    }
+    recording("t_s", runs, None)
 }
 
 /// How many of the worlds whose slope is found have it inside its interval, and how many these are.
 fn held(correlation: f64, worlds: u64) -> [usize; 2] {
-    let model = Line::new();
+    let slope = parameter("slope", 0.0, [-10.0, 10.0]);
+    let model = Curve::new(vec![slope], vec![mechanism("slope", vec![0])], |s, _, t| s[0] * t);
     let options = Options { replicates: 99, ..Options::default() };
     let (mut held, mut found) = (0, 0);
     for seed in 0..worlds {

@@ -5,11 +5,14 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
+mod common;
+
+use common::{mechanism, parameter};
 use missing_physics::data::Run;
 use missing_physics::diagnosis::Verdict;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::likelihood::{Likelihood, Scores};
-use missing_physics::model::{Mechanism, Parameter, PredictError, Quantity, Scope, Spec};
+use missing_physics::model::{Parameter, PredictError, Quantity, Spec};
 use missing_physics::observer::Silent;
 use missing_physics::synthetic::{Simulator, Synthetic, SyntheticError};
 use rand::{Rng, SeedableRng};
@@ -25,27 +28,13 @@ const G: f64 = 9.80665;
 
 impl Bounces {
     fn new() -> Self {
-        let parameter = |name: &str, start, lower, upper, scale| Parameter {
-            name: name.into(),
-            unit: String::new(),
-            scope: Scope::Shared,
-            start,
-            lower,
-            upper,
-            scale,
-        };
         let spec = Spec {
             baseline: "one restitution for every bounce".into(),
             parameters: vec![
-                parameter("e", 0.8, 0.3, 0.99, 0.05),
-                parameter("slope_s_m", 0.0, -0.2, 0.2, 0.02),
+                Parameter { scale: 0.05, ..parameter("e", 0.8, [0.3, 0.99]) },
+                Parameter { scale: 0.02, ..parameter("slope_s_m", 0.0, [-0.2, 0.2]) },
             ],
-            mechanisms: vec![Mechanism {
-                id: "velocity-dependent-restitution".into(),
-                name: "restitution that depends on speed".into(),
-                parameters: vec![1],
-                ..Mechanism::default()
-            }],
+            mechanisms: vec![mechanism("velocity-dependent-restitution", vec![1])],
             terms: vec![],
         };
         Self(spec, ["early", "late", "first"].map(|n| Quantity::new(n, "")).to_vec())

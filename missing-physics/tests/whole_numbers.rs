@@ -1,9 +1,12 @@
 //! Which row, which sensor: each whole number gets a fit of its own, and those that the data do not tell apart stay open.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+mod common;
+
+use common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{Options, diagnose};
-use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec};
+use missing_physics::model::Mechanism;
 use missing_physics::observer::Silent;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -12,41 +15,12 @@ use rand_distr::{Distribution, Normal};
 const ROWS: usize = 30;
 
 /// A step of a size from a row on.
-struct Step(Spec);
-
-impl Step {
-    fn new() -> Self {
-        let parameter = |name: &str, start: f64, [lower, upper]: [f64; 2]| Parameter {
-            name: name.into(),
-            unit: String::new(),
-            scope: Scope::Shared,
-            start,
-            lower,
-            upper,
-            scale: 1.0,
-        };
-        let parameters =
-            vec![parameter("size", 0.0, [-10.0, 10.0]), parameter("row", -1.0, [-1.0, ROWS as f64])];
-        let mechanism =
-            Mechanism { id: "step".into(), parameters: vec![0, 1], places: vec![1], ..Mechanism::default() };
-        Self(Spec { parameters, mechanisms: vec![mechanism], ..Spec::default() })
-    }
-}
-
-impl Model for Step {
-    fn spec(&self) -> &Spec {
-        &self.0
-    }
-
-    fn predict(&self, run: &Run, shared: &[f64], _: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        let on = |row: f64| shared[1] >= 0.0 && row >= shared[1];
-        out.iter_mut().zip(&run.inputs[0]).for_each(|(y, row)| *y = if on(*row) { shared[0] } else { 0.0 });
-        Ok(())
-    }
-
-    fn starts(&self, _: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        (1..ROWS).map(|row| vec![(1, row as f64)]).collect()
-    }
+fn step() -> Curve {
+    let size = parameter("size", 0.0, [-10.0, 10.0]);
+    let row = parameter("row", -1.0, [-1.0, ROWS as f64]);
+    let step = Mechanism { places: vec![1], ..mechanism("step", vec![0, 1]) };
+    Curve::new(vec![size, row], vec![step], |s, _, row| if s[1] >= 0.0 && row >= s[1] { s[0] } else { 0.0 })
+        .from(|_| (1..ROWS).map(|row| vec![(1, row as f64)]).collect())
 }
 
 /// A step of one at row 10; a row may be missing.
@@ -63,19 +37,12 @@ fn draw(missing: Option<usize>) -> Recording {
         inputs: vec![(0..ROWS).map(|row| row as f64).collect()],
         kind: 0,
     };
-    Recording {
-        channels: vec![Quantity::new("y", "")],
-        variables: vec![Quantity::new("row", "")],
-        runs: vec![run],
-        noise_along: Some(0),
-        calibration: vec![Some(0.1)],
-        resolution: vec![0.0],
-    }
+    recording("row", vec![run], Some(0.1))
 }
 
 #[test]
 fn rows_that_nothing_tells_apart_stay_open() {
-    let model = Step::new();
+    let model = step();
     let options = Options { replicates: 99, ..Options::default() };
     let sure = diagnose(&model, &draw(None), &[], &options, &Silent).unwrap();
     assert_eq!(sure.chosen, ["step"]);

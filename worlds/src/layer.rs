@@ -19,11 +19,10 @@ pub(crate) struct Layer {
 }
 
 impl Layer {
-    /// Tabulates the factor for a Poisson's ratio, up to a contact as wide as the layer is thick.
+    /// Tabulates the factor for a Poisson's ratio, up to a contact whose radius is 1.6 of the thickness.
     pub(crate) fn new(poisson_ratio: f64) -> Self {
-        let count = 40;
         let first = [0.0, 1.0];
-        let solved = (1..=count).map(|i| solve(f64::from(i) / f64::from(count), poisson_ratio));
+        let solved = (1..=64).map(|i| solve(f64::from(i) / 40.0, poisson_ratio));
         Self { table: std::iter::once(first).chain(solved).collect() }
     }
 
@@ -130,9 +129,9 @@ mod tests {
     #[test]
     fn the_table_has_converged_and_rises() {
         let layer = Layer::new(0.45);
-        for x in [0.013, 0.21, 0.52] {
+        for x in [0.013, 0.21, 0.52, 1.1] {
             let direct = {
-                let (mut low, mut high) = (1e-3, 1.0);
+                let (mut low, mut high) = (1e-3, 1.6);
                 for _ in 0..40 {
                     let middle = 0.5 * (low + high);
                     if solve(middle, 0.45)[0] < x { low = middle } else { high = middle }

@@ -26,4 +26,4 @@ pub mod wave;
 pub mod waves;
 
 /// Standard gravity in m/s^2.
-pub(crate) const GRAVITY_M_S2: f64 = 9.80665;
+pub const GRAVITY_M_S2: f64 = 9.80665;

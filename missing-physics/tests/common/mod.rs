@@ -8,6 +8,78 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
+/// A parameter that all runs share, of a scale of one.
+pub(crate) fn parameter(name: &str, start: f64, [lower, upper]: [f64; 2]) -> Parameter {
+    Parameter {
+        name: name.into(),
+        unit: String::new(),
+        scope: Scope::Shared,
+        start,
+        lower,
+        upper,
+        scale: 1.0,
+    }
+}
+
+/// A mechanism with its parameters.
+pub(crate) fn mechanism(id: &str, parameters: Vec<usize>) -> Mechanism {
+    Mechanism { id: id.into(), name: id.replace('-', " "), parameters, ..Mechanism::default() }
+}
+
+/// Runs of one channel over one variable.
+pub(crate) fn recording(variable: &str, runs: Vec<Run>, sigma: Option<f64>) -> Recording {
+    Recording {
+        channels: vec![Quantity::new("y", "")],
+        variables: vec![Quantity::new(variable, "")],
+        runs,
+        noise_along: Some(0),
+        calibration: vec![sigma],
+        resolution: vec![0.0],
+    }
+}
+
+/// Where further fits begin.
+pub(crate) type Starts = fn(&[Run]) -> Vec<Vec<(usize, f64)>>;
+
+/// A curve over one variable.
+pub(crate) struct Curve {
+    spec: Spec,
+    law: fn(shared: &[f64], own: &[f64], x: f64) -> f64,
+    starts: Starts,
+}
+
+impl Curve {
+    /// A law with its parameters and mechanisms, and no start but the parameters' own.
+    pub(crate) fn new(
+        parameters: Vec<Parameter>,
+        mechanisms: Vec<Mechanism>,
+        law: fn(&[f64], &[f64], f64) -> f64,
+    ) -> Self {
+        let spec = Spec { parameters, mechanisms, ..Spec::default() };
+        Self { spec, law, starts: |_| Vec::new() }
+    }
+
+    /// With further starts.
+    pub(crate) fn from(self, starts: Starts) -> Self {
+        Self { starts, ..self }
+    }
+}
+
+impl Model for Curve {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        out.iter_mut().zip(&run.inputs[0]).for_each(|(y, x)| *y = (self.law)(shared, own, *x));
+        Ok(())
+    }
+
+    fn starts(&self, _: usize, runs: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
+        (self.starts)(runs)
+    }
+}
+
 /// Height of a ball with linear drag (closed form), another gravity and a camera of another scale.
 ///
 /// `unit` is the length of one unit of height, in m: 0.001 where heights are in mm.
@@ -33,34 +105,24 @@ impl Ball {
     }
 
     pub(crate) fn in_unit(unit_m: f64) -> Self {
-        let parameter = |name: &str, scope, lower: f64, upper: f64, scale| Parameter {
-            name: name.into(),
-            unit: String::new(),
-            scope,
-            start: 0.0,
-            lower,
-            upper,
-            scale,
+        let own = |name: &str| {
+            let free = parameter(name, 0.0, [f64::NEG_INFINITY, f64::INFINITY]);
+            Parameter { scope: Scope::PerRun, scale: 1.0 / unit_m, ..free }
         };
-        let mechanism = |id: &str, parameter: usize| Mechanism {
-            id: id.into(),
-            name: id.replace('-', " "),
-            parameters: vec![parameter],
-            ..Default::default()
-        };
+        let shared = |name: &str, limits, scale| Parameter { scale, ..parameter(name, 0.0, limits) };
         let spec = Spec {
             baseline: "ballistic flight".into(),
             parameters: vec![
-                parameter("rate_per_s", Scope::Shared, 0.0, 20.0, 0.1),
-                parameter("acceleration", Scope::Shared, -0.5 / unit_m, 0.5 / unit_m, 0.2 / unit_m),
-                parameter("scale", Scope::Shared, -0.5, 0.5, 0.01),
-                parameter("z0", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0 / unit_m),
-                parameter("vz0", Scope::PerRun, f64::NEG_INFINITY, f64::INFINITY, 1.0 / unit_m),
+                shared("rate_per_s", [0.0, 20.0], 0.1),
+                shared("acceleration", [-0.5 / unit_m, 0.5 / unit_m], 0.2 / unit_m),
+                shared("scale", [-0.5, 0.5], 0.01),
+                own("z0"),
+                own("vz0"),
             ],
             mechanisms: vec![
-                mechanism("linear-drag", 0),
-                mechanism("buoyancy", 1),
-                mechanism("camera-scale", 2),
+                mechanism("linear-drag", vec![0]),
+                mechanism("buoyancy", vec![1]),
+                mechanism("camera-scale", vec![2]),
             ],
             terms: vec![],
         };

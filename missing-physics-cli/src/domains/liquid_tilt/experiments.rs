@@ -1,10 +1,15 @@
 //! What could be tilted next.
 
+use std::f64::consts::PI;
+
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::Experiment;
 
 use super::model::LiquidTiltModel;
 
+/// Ranges of proposed sweeps, in half turns.
+const RANGES: [(f64, f64); 7] =
+    [(0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (0.0, 0.25), (0.25, 0.5), (0.5, 0.75), (0.75, 1.0)];
 /// Poses of a proposed sweep.
 const POSES: usize = 19;
 
@@ -24,7 +29,6 @@ pub(super) fn experiments(model: &LiquidTiltModel, recording: &Recording) -> Vec
         }
         Run { label: "next".into(), inputs, outputs: vec![vec![0.0; POSES]; 3], kind: 0 }
     };
-    let pi = std::f64::consts::PI;
     let mut list = Vec::new();
     let mut add = |action: Vec<(&str, f64)>, words: String, run: Run, volume: f64| {
         list.push(Experiment {
@@ -36,27 +40,20 @@ pub(super) fn experiments(model: &LiquidTiltModel, recording: &Recording) -> Vec
     };
     for share in [0.0, 0.1, 0.25, 0.5, 0.75, 0.95] {
         let volume = share * capacity;
-        let words = if share == 0.0 {
-            "sweep the empty container from upright to upside down".to_owned()
+        let bottle = if share == 0.0 {
+            "the empty container".to_owned()
         } else {
-            format!("sweep it from upright to upside down with {:.0} mL in it", volume * 1e6)
+            format!("it with {:.0} mL in it", volume * 1e6)
         };
-        add(vec![("volume_m3", volume)], words, sweep(0.0, pi, volume), volume);
-    }
-    for (from, to) in [(0.0, 0.5 * pi), (0.5 * pi, pi)] {
-        let volume = 0.5 * capacity;
-        let words = format!(
-            "sweep it from {:.0} to {:.0} degrees with {:.0} mL in it",
-            from.to_degrees(),
-            to.to_degrees(),
-            volume * 1e6
-        );
-        add(
-            vec![("from_rad", from), ("theta_rad", to), ("volume_m3", volume)],
-            words,
-            sweep(from, to, volume),
-            volume,
-        );
+        for (from, to) in RANGES.map(|(from, to)| (from * PI, to * PI)) {
+            let range = if (from, to) == (0.0, PI) {
+                "from upright to upside down".to_owned()
+            } else {
+                format!("from {:.0} to {:.0} degrees", from.to_degrees(), to.to_degrees())
+            };
+            let action = vec![("from_rad", from), ("theta_rad", to), ("volume_m3", volume)];
+            add(action, format!("sweep {bottle} {range}"), sweep(from, to, volume), volume);
+        }
     }
     list
 }

@@ -1,0 +1,61 @@
+//! What is proposed where two mechanisms explain a recording, done.
+#![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+
+use std::fmt::Write as _;
+
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, Normal};
+use worlds::press::{Effects, Indenter, PressWorld, Step};
+
+/// Curves of a ball on a soft body, each from a depth to another.
+fn ask(effects: Effects, curves: &[[f64; 2]], seed: u64) -> Diagnosis {
+    const ROWS: usize = 40;
+    let step = |[from, to]: [f64; 2], row: usize| {
+        let share = row as f64 / (ROWS - 1) as f64;
+        Step { delta_m: from + share * (to - from), t_s: share, down: true }
+    };
+    let world = PressWorld {
+        indenter: Indenter::Sphere(0.01),
+        poisson_ratio: 0.5,
+        moduli_pa: vec![2e4],
+        runs: curves.iter().map(|&curve| (0, (0..ROWS).map(|row| step(curve, row)).collect())).collect(),
+        effects,
+    };
+    let (mut rng, noise) = (ChaCha8Rng::seed_from_u64(seed), Normal::new(0.0, 1e-3).unwrap());
+    let mut data = "run,delta_m,force_n,t_s,segment\n".to_owned();
+    let steps =
+        world.runs.iter().enumerate().flat_map(|(run, (_, steps))| steps.iter().map(move |s| (run, s)));
+    for ((run, step), force) in steps.zip(world.readings()) {
+        let force = force + noise.sample(&mut rng);
+        writeln!(data, "{run},{:.7},{force:.6},{:.4},load", step.delta_m, step.t_s).unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let header = "format = 1\ndomain = \"indentation\"\ndata = \"data.csv\"\n\n[rig]\n\
+                  indenter = { shape = \"sphere\", radius_m = 0.01 }\npoisson_ratio = 0.5\n";
+    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).unwrap();
+    let options = Options { replicates: 199, ..Options::default() };
+    diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent).unwrap()
+}
+
+/// A faint constant force looks like adhesion wherever there is contact; above the contact only the sensor's own offset is felt.
+#[test]
+fn an_offset_that_looks_like_adhesion_is_looked_for_above_the_contact() {
+    let effects = Effects { force_offset_n: -1.5e-3, ..Effects::default() };
+    let first = [[0.0, 1e-3]; 3];
+    let unsure = (0..20)
+        .map(|seed| (seed, ask(effects, &first, seed)))
+        .find(|(_, answer)| answer.verdict.word() == "ambiguous");
+    let (seed, answer) = unsure.unwrap();
+    let next = answer.next_experiment.unwrap();
+    let value = |name: &str| next.action.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+    let [from, to] = [value("from_m").unwrap(), value("delta_m").unwrap()];
+    assert!(from < 0.0 && to > 0.0, "{}", next.words);
+    let curves = [first, [[from, to]; 3]].concat();
+    assert_eq!(ask(effects, &curves, seed).chosen, ["force-offset"]);
+}
