@@ -95,17 +95,17 @@ fn rebound(before: &Velocity, effects: &Effects, spread: &Spread, rng: &mut impl
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
 
-    const EFFECTS: Effects = Effects { unheard: 1.0, ..Effects::none(9.81, 0.8) };
+    pub(in super::super) const EFFECTS: Effects = Effects { unheard: 1.0, ..Effects::none(9.81, 0.8) };
 
     /// A ball that drifts a little along x on its six impacts.
-    fn drop() -> Drop {
+    pub(in super::super) fn drop() -> Drop {
         let flights: Vec<f64> = (0..5).map(|k| 0.45 * 0.8f64.powi(k)).collect();
         let sums = |f: fn(&f64) -> f64| {
             let rest = flights.iter().scan(0.0, move |sum, t| {

@@ -326,15 +326,18 @@ impl Drop {
         (self.first()..self.times_s.len() - 1).map(|i| self.heading(i, effects)).collect()
     }
 
-    /// Speed at which the ball comes to each of those impacts, m/s.
+    /// Speed at which the ball comes to each impact, or leaves the first where its fall is not known, m/s.
     pub(super) fn speeds(&self, effects: &Effects) -> Vec<f64> {
         let landing = (0..self.times_s.len() - 1)
             .map(|i| speed(&self.flight(i, effects, self.hidden(i), Part::Last).1));
-        let dropped = self.height_m.map(|h| {
-            let hidden = self.unheard.first().copied().unwrap_or(0);
-            speed_after_drop(h, effects.gravity_m_s2, 0.0) * effects.restitution.powi(hidden as i32)
-        });
-        dropped.into_iter().chain(landing).take(self.impacts()).collect()
+        let first = self.height_m.map_or_else(
+            || self.leaves_m_s(effects),
+            |h| {
+                let hidden = self.unheard.first().copied().unwrap_or(0);
+                speed_after_drop(h, effects.gravity_m_s2, 0.0) * effects.restitution.powi(hidden as i32)
+            },
+        );
+        std::iter::once(first).chain(landing).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The full model of a bouncing ball: by how much each impact is off, for every effect at once.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
@@ -42,8 +43,7 @@ struct Known {
     shown: Vec<f64>,
     /// Where each impact was heard, and when by each microphone.
     heard: Vec<([f64; 2], Vec<f64>)>,
-    /// The first of them about which something is known.
-    first: usize,
+    rows: Rows,
     /// What chance alone may do to it, in sigmas, `[world][copy][channel][impact]`.
     by_chance: Vec<Vec<Vec<Vec<f64>>>>,
 }
@@ -63,6 +63,22 @@ pub(super) struct BounceModel {
     nominal: Effects,
     microphones: Microphones,
     drops: HashMap<String, Known>,
+}
+
+/// The impacts of a drop that are rows of its run.
+#[derive(Debug, Clone)]
+struct Rows {
+    heard: Range<usize>,
+    /// Those of which more is known than when each microphone heard them.
+    known: Range<usize>,
+}
+
+impl Rows {
+    /// The number among the known ones of a row's impact; none where no more is known of it.
+    fn known(&self, row: usize) -> Option<usize> {
+        let impact = self.heard.start + row;
+        self.known.contains(&impact).then(|| impact - self.known.start)
+    }
 }
 
 impl BounceModel {
@@ -115,44 +131,57 @@ impl BounceModel {
         numbers: &[f64],
         copies: usize,
     ) -> Option<Run> {
-        let (n, first) = (drop.impacts(), drop.first());
-        let speeds = linear.drop.speeds(&self.nominal);
-        let places = linear.drop.places_m.clone();
-        let by_chance = self.by_chance(&linear, drop, copies);
+        let heard: Vec<([f64; 2], Vec<f64>)> =
+            drop.places_m.iter().copied().zip(drop.arrivals_s.iter().cloned()).collect();
+        let rows = self.rows(drop);
+        let of_row = |column: &[f64]| column[rows.heard.clone()].to_vec();
+        let places = &linear.drop.places_m;
+        let mut inputs = vec![of_row(numbers), of_row(&linear.drop.speeds(&self.nominal))];
+        // Likely places: their errors, unlike the measured ones', have nothing to do with those of the impacts.
+        inputs.extend((0..2).map(|k| of_row(&places.iter().map(|p| p[k]).collect::<Vec<f64>>())));
+        let by_chance = self.by_chance(&linear, drop, &rows, copies);
         let weights = Weights::new(linear, self.spread)?;
         let shown = weights.errors(&self.nominal, &[])?.as_slice().to_vec();
         if shown.iter().any(|v| !v.is_finite()) {
             return None;
         }
-        let of = |k: usize| (0..n).map(|i| shown[drop.row(i, k)]).collect::<Vec<f64>>();
-        let mut inputs = vec![numbers[first..first + n].to_vec(), speeds];
-        // Likely places: their errors, unlike the measured ones', have nothing to do with those of the impacts.
-        inputs.extend((0..2).map(|k| places[first..first + n].iter().map(|p| p[k]).collect()));
+        let of = |k: usize| -> Vec<f64> {
+            (0..rows.heard.len())
+                .map(|row| rows.known(row).map_or(f64::NAN, |impact| shown[drop.row(impact, k)]))
+                .collect()
+        };
         let mut outputs: Vec<Vec<f64>> = (0..PER_IMPACT).map(of).collect();
-        let heard: Vec<([f64; 2], Vec<f64>)> =
-            drop.places_m.iter().copied().zip(drop.arrivals_s.iter().cloned()).collect();
         outputs.extend((0..self.microphones.spare()).map(|k| {
             // A drop that is only imagined is heard as it should be.
             let misfit = |i: usize| {
                 heard.get(i).map_or(0.0, |(p, t)| self.microphones.misfit(*p, t, &Wrong::default())[k])
             };
-            (first..first + n).map(misfit).collect::<Vec<f64>>()
+            rows.heard.clone().map(misfit).collect::<Vec<f64>>()
         }));
-        self.drops.insert(label.to_owned(), Known { weights, shown, heard, first, by_chance });
+        self.drops.insert(label.to_owned(), Known { weights, shown, heard, rows, by_chance });
         Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
     }
 
-    fn by_chance(&self, likely: &Linear, drop: &Drop, copies: usize) -> Vec<Vec<Vec<Vec<f64>>>> {
+    /// Of the first and the last impact it may be known only when each microphone heard them.
+    fn rows(&self, drop: &Drop) -> Rows {
+        let known = drop.first()..drop.first() + drop.impacts();
+        let all = drop.arrivals_s.len() == drop.times_s.len() && self.microphones.spare() > 0;
+        Rows { heard: if all { 0..drop.times_s.len() } else { known.clone() }, known }
+    }
+
+    fn by_chance(&self, likely: &Linear, drop: &Drop, rows: &Rows, copies: usize) -> Vec<Vec<Vec<Vec<f64>>>> {
         let mut rng = ChaCha8Rng::seed_from_u64(0xba11);
         rng.set_stream(self.drops.len() as u64);
         let sigmas = self.spread.of_channels();
         let mut world = |truth: &Spread| {
             let errors = errors_by_chance(likely, &self.nominal, [truth, &self.spread], copies, &mut rng);
             let mut shaped = |errors: Vec<f64>| {
-                let of = |k: usize| (0..drop.impacts()).map(move |i| drop.row(i, k));
-                let mut channels: Vec<Vec<f64>> =
-                    (0..PER_IMPACT).map(|k| of(k).map(|row| errors[row] / sigmas[k]).collect()).collect();
-                let mut white = || (0..drop.impacts()).map(|_| StandardNormal.sample(&mut rng)).collect();
+                let of = |k: usize| -> Vec<f64> {
+                    let error = |impact: usize| errors[drop.row(impact, k)] / sigmas[k];
+                    (0..rows.heard.len()).map(|row| rows.known(row).map_or(f64::NAN, error)).collect()
+                };
+                let mut channels: Vec<Vec<f64>> = (0..PER_IMPACT).map(of).collect();
+                let mut white = || rows.heard.clone().map(|_| StandardNormal.sample(&mut rng)).collect();
                 channels.extend((0..self.microphones.spare()).map(|_| white()));
                 channels
             };
@@ -247,20 +276,68 @@ impl Model for BounceModel {
         let n = run.len();
         let (impacts, heard) = out.split_at_mut(PER_IMPACT * n);
         let listened = if heard.is_empty() { 0 } else { n };
-        for (i, (place, arrivals)) in known.heard.iter().skip(known.first).take(listened).enumerate() {
+        for (row, (place, arrivals)) in
+            known.heard.iter().skip(known.rows.heard.start).take(listened).enumerate()
+        {
             let right = self.microphones.misfit(*place, arrivals, &Wrong::default());
-            let by = moved.get(known.first + i).map_or([0.0; 2], |[_, x, y]| [*x, *y]);
+            let by = moved.get(known.rows.heard.start + row).map_or([0.0; 2], |[_, x, y]| [*x, *y]);
             let now = self.microphones.misfit([place[0] + by[0], place[1] + by[1]], arrivals, &array);
             for (k, (right, now)) in right.iter().zip(&now).enumerate() {
-                heard[k * n + i] = right - now;
+                heard[k * n + row] = right - now;
             }
         }
         for (channel, values) in impacts.chunks_exact_mut(n.max(1)).enumerate() {
-            for (impact, value) in values.iter_mut().enumerate() {
-                let at = known.weights.linear.drop.row(impact, channel);
-                *value = known.shown[at] - errors[at];
+            for (row, value) in values.iter_mut().enumerate() {
+                *value = known.rows.known(row).map_or(0.0, |impact| {
+                    let at = known.weights.linear.drop.row(impact, channel);
+                    known.shown[at] - errors[at]
+                });
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use super::super::chance::tests::{EFFECTS, drop};
+    use super::*;
+
+    /// Of a ball that is let go somewhere, the first and the last impact are known by their arrivals alone: the fourth microphone's.
+    #[test]
+    fn impacts_of_which_only_arrivals_are_known_are_rows_too() {
+        let corners = [[0.0, 0.0, 0.1], [0.6, 0.0, 0.1], [0.6, 0.6, 0.1], [0.0, 0.6, 0.1]];
+        let spread =
+            Spread { time_s: 3e-5, place_m: [1e-3; 2], kappa: 1e4, came_rad: 0.01, restitution: 0.0 };
+        let numbers: Vec<f64> = (1..=6).map(f64::from).collect();
+        for (count, rows, spare) in [(4, 6, 1), (3, 4, 0)] {
+            let microphones = Microphones { places_m: corners[..count].to_vec(), speed_of_sound_m_s: 340.0 };
+            let setup = Setup {
+                gravity_m_s2: 9.81,
+                drag_unit: None,
+                placed: true,
+                dropped: false,
+                released: false,
+                listened: true,
+                unheard: [0, 1],
+                microphones: count,
+            };
+            let mut model = BounceModel::new(setup, EFFECTS, (spread, vec![spread]), microphones);
+            let drop = Drop { height_m: None, arrivals_s: vec![vec![0.5; count]; 6], ..drop() };
+            let linear = Linear::about_straight(&drop, &EFFECTS);
+            let run = model.run("1", linear, &drop, &numbers, 1).unwrap();
+            assert_eq!((run.len(), run.outputs.len()), (rows, PER_IMPACT + spare));
+            assert!(run.inputs.iter().flatten().all(|v| v.is_finite()));
+            for (channel, column) in run.outputs.iter().enumerate() {
+                let known = column.iter().filter(|v| v.is_finite()).count();
+                assert_eq!(known, if channel < PER_IMPACT { 4 } else { rows });
+            }
+            assert_eq!(run.inputs[0][0], if spare == 1 { 1.0 } else { 2.0 });
+            let mut out = vec![0.0; run.len() * run.outputs.len()];
+            let start: Vec<f64> = model.spec.parameters.iter().map(|p| p.start).collect();
+            model.predict(&run, &start, &[], &mut out).unwrap();
+            assert!(out.iter().all(|v| v.is_finite()));
+        }
     }
 }
