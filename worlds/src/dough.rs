@@ -24,7 +24,7 @@ impl Elastic {
     }
 }
 
-/// Everything that may have changed since the training rolls; all zero is nothing.
+/// Everything that may have changed since the training rolls; all zero is nothing. A response is what a roll does in the end.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effects {
     /// By how much every response is larger.
@@ -71,6 +71,15 @@ impl Lying {
             d = d.clamp(1e-4, l);
         }
         d
+    }
+
+    /// This dough, its shape a part of the way to another's: that part of the strain, and of the change of its cross-section.
+    fn towards(&self, other: &Self, part: f64) -> Self {
+        Self {
+            length_m: self.length_m * (other.length_m / self.length_m).powf(part),
+            oval: self.oval + part * (other.oval - self.oval),
+            ..*self
+        }
     }
 
     /// Length, width and height in m.
@@ -162,9 +171,9 @@ impl DoughWorld {
         let mut made = Vec::with_capacity(piece.rolls.len());
         for (step, roll) in piece.rolls.iter().enumerate() {
             let action = within(&lying.dimensions_m(), roll.place);
-            let usual = piece.soft * roll.luck;
-            let now = usual * self.response(step, roll.t_s, action, lying.length_m, strain_before);
-            let mut after = self.flow(&lying, action, now);
+            let usual = self.flow(&lying, action, piece.soft * roll.luck);
+            let response = self.response(step, roll.t_s, action, lying.length_m, strain_before);
+            let mut after = lying.towards(&usual, response);
             strain_before = (after.length_m / lying.length_m).ln();
             // Each dimension of what is left is smaller alike.
             after.volume_m3 *= 1.0 - self.effects.loss;
@@ -173,13 +182,10 @@ impl DoughWorld {
                 before: lying.dimensions_m(),
                 action,
                 after: after.dimensions_m(),
-                usual: self.flow(&lying, action, usual).dimensions_m(),
+                usual: usual.dimensions_m(),
                 t_s: roll.t_s,
             });
-            let back = self.effects.springback;
-            let turned = after.length_m * (lying.length_m / after.length_m).powf(back);
-            let oval = after.oval + back * (lying.oval - after.oval);
-            lying = Lying { length_m: turned, oval, ..after };
+            lying = after.towards(&lying, self.effects.springback);
         }
         made
     }
@@ -199,8 +205,8 @@ impl DoughWorld {
         (1.0 + e.response) * faded * worked * law
     }
 
-    /// What a roll makes of a dough that answers with a part of its flow.
-    fn flow(&self, lying: &Lying, action: [f64; 2], response: f64) -> Lying {
+    /// What a roll makes of a dough that flows so much faster than others.
+    fn flow(&self, lying: &Lying, action: [f64; 2], soft: f64) -> Lying {
         let mut now = *lying;
         // The band follows the dough down.
         let force = self.band.force_n(action);
@@ -217,7 +223,7 @@ impl DoughWorld {
             // What is squeezed flows along the dough as the way is short.
             let along = 2.0 * half / (2.0 * half + self.breadth_m);
             let rate = self.rate_per_s * (excess / EXCESS_PA).powf(self.exponent);
-            let strain = response * along * touched / length * rate * (TRAVEL_M / SPEED_M_S / STEPS as f64);
+            let strain = soft * along * touched / length * rate * (TRAVEL_M / SPEED_M_S / STEPS as f64);
             now.oval += (self.flattens - 0.2 * now.oval) * strain;
             now.length_m *= strain.exp();
         }
@@ -282,7 +288,9 @@ mod tests {
         assert!((0.09..0.2).contains(&end), "{end}");
         for pair in made.windows(2) {
             assert_eq!(pair[0].after, pair[1].before);
-            assert_eq!(pair[0].after, pair[0].usual);
+            for (now, usual) in pair[0].after.iter().zip(pair[0].usual) {
+                approx::assert_relative_eq!(*now, usual, max_relative = 1e-12);
+            }
             assert!(pair[1].after[0] > pair[0].after[0] && pair[1].after[2] < pair[0].after[2]);
         }
         assert!(made[0].after[0] - made[0].before[0] < 0.02);
@@ -308,6 +316,10 @@ mod tests {
         let plain = lengths(Effects::default());
         let none = Effects::default();
         assert!(lengths(Effects { response: 0.3, ..none })[39] > plain[39] * 1.03);
+        for m in &world(Effects { response: -0.5, ..none }).rolled()[0] {
+            let strain = |to: &[f64; 3]| (to[0] / m.before[0]).ln();
+            approx::assert_relative_eq!(strain(&m.after), 0.5 * strain(&m.usual), max_relative = 1e-9);
+        }
         assert!(lengths(Effects { drying_per_s: 2e-3, ..none })[39] < plain[39] * 0.99);
         assert!(lengths(Effects { softening_per_roll: 0.02, ..none })[39] < plain[39] * 0.99);
         let stuck = world(Effects { slip_n: 1e3, ..none }).rolled();
