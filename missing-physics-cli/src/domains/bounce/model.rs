@@ -44,7 +44,7 @@ struct Known {
     /// Where each impact was heard, and when by each microphone.
     heard: Vec<([f64; 2], Vec<f64>)>,
     rows: Rows,
-    /// What chance alone may do to it, in sigmas, `[world][copy][channel][impact]`.
+    /// What chance alone may do to it, in sigmas, `[world][copy][channel][row]`.
     by_chance: Vec<Vec<Vec<Vec<f64>>>>,
 }
 
