@@ -83,10 +83,13 @@ impl Places {
     }
 }
 
+/// Over how wide a range of forces a band begins to grip, of the strongest: as good as none, and still a slope to follow.
+const ONSET: f64 = 0.001;
+
 /// The specification; `longest_s` where times were recorded, the strongest roll's force, the last step of a run.
 pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spec, Places) {
     let mut b = Builder::default();
-    let mut p = Places { onset_n: 0.004 * strongest_n, ..Places::default() };
+    let mut p = Places { onset_n: ONSET * strongest_n, ..Places::default() };
     b.spec.baseline = "the dynamics learned from the training rolls, as uncertain as they leave them".into();
     p.factor = b.shared("factor", "", 1.0, [0.0, 20.0], 0.05);
     b.mechanism(
