@@ -215,6 +215,17 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("\"{}{dots}\"", one_line(&short))
 }
 
+/// What another reader says, on one line, without its middle where it quotes much.
+pub(crate) fn brief(text: &str) -> String {
+    const END: usize = 100;
+    let line: Vec<char> = one_line(text).chars().collect();
+    if line.len() <= 2 * END {
+        return line.into_iter().collect();
+    }
+    let part = |chars: &[char]| chars.iter().collect::<String>();
+    format!("{}…{}", part(&line[..END]), part(&line[line.len() - END..]))
+}
+
 /// A text with everything that would break a line escaped.
 pub(crate) fn one_line(text: &str) -> String {
     text.chars()

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use crate::recording::{one_line, quoted};
+use crate::recording::{brief, quoted};
 
 /// The longest line that a simulator may answer, bytes.
 const LONGEST_LINE: u64 = 64 << 20;
@@ -163,7 +163,7 @@ pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) ->
             return forever(format!(
                 "the simulator answered {}, expected {{\"id\": {id}, \"channels\": {{…}}}} on one line ({})",
                 quoted(line),
-                one_line(&e.to_string())
+                brief(&e.to_string())
             ));
         }
     };
@@ -178,10 +178,7 @@ pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) ->
         let Some(values) = reply.channels.get(name) else {
             let names: Vec<&str> = reply.channels.keys().map(String::as_str).collect();
             let got = if names.is_empty() { "none".into() } else { names.join(", ") };
-            return forever(format!(
-                "the simulator answered the channels {}, expected {name}",
-                one_line(&got)
-            ));
+            return forever(format!("the simulator answered the channels {}, expected {name}", brief(&got)));
         };
         if values.len() != rows {
             return forever(format!(
