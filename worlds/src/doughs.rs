@@ -383,6 +383,35 @@ mod tests {
         }
     }
 
+    /// What is keyed is what a roll does: its strain over the usual one.
+    #[test]
+    fn effects_on_the_response_are_keyed_as_what_a_roll_does() {
+        let table = Table::drawn(&mut ChaCha8Rng::seed_from_u64(5));
+        let keyed = |effects: &Effects, listed| {
+            let mut key = Key::new(Hidden::One);
+            table.say(effects, listed, &mut key);
+            key.parameters[0].value
+        };
+        let check = |effects: Effects, expected: &dyn Fn(usize, &Made) -> f64| {
+            for rolls in (DoughWorld { effects, ..table.world.clone() }).rolled() {
+                for (step, m) in rolls.iter().enumerate() {
+                    let [now, usual] = [m.after, m.usual].map(|then| (then[0] / m.before[0]).ln());
+                    approx::assert_relative_eq!(now, expected(step, m) * usual, max_relative = 1e-6);
+                }
+            }
+        };
+        let none = Effects::default();
+        let half = Effects { response: -0.5, ..none };
+        let factor = keyed(&half, 0);
+        check(half, &|_, _| factor);
+        let dry = Effects { drying_per_s: 1e-3, ..none };
+        let rate = keyed(&dry, DRYING);
+        check(dry, &|_, m| (-rate * m.t_s).exp());
+        let soft = Effects { softening_per_roll: 0.02, ..none };
+        let rate = keyed(&soft, LISTED - 1);
+        check(soft, &|step, _| (-rate * step as f64).exp());
+    }
+
     /// The training file, or twice as many runs, the first half of which know nothing of an effect.
     #[test]
     fn there_is_something_to_learn_from() {
