@@ -105,8 +105,8 @@ impl Rig for Liquid {
 
     fn proposed(value: &dyn Fn(&str) -> Option<f64>) -> Option<Tilt> {
         Some(Tilt {
-            from_rad: value("from_rad").unwrap_or(0.0),
-            to_rad: value("theta_rad").unwrap_or(PI),
+            from_rad: value("from_rad")?,
+            to_rad: value("theta_rad")?,
             volume_m3: value("volume_m3")?,
         })
     }
