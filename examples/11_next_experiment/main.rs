@@ -5,7 +5,9 @@
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 mod contact;
-mod liquid;
+mod swung;
+mod tilted;
+mod wrist;
 
 use std::error::Error;
 
@@ -212,13 +214,15 @@ fn show(table: &[Vec<usize>; 3]) {
 fn main() -> Outcome<()> {
     let worlds = if examples::small() { 1 } else { 50 };
     println!("Experiments beyond the first until P(what is hidden) >= {SURE}\n");
-    let mut both = race::<liquid::Liquid>(worlds)?;
-    println!();
-    let contact = race::<contact::Contact>(worlds)?;
-    for (all, one) in both.iter_mut().zip(contact) {
-        all.extend(one);
+    let rigs = [race::<swung::Swung>, race::<tilted::Tilted>, race::<contact::Contact>];
+    let mut all = [const { Vec::new() }; 3];
+    for rig in rigs {
+        for (all, one) in all.iter_mut().zip(rig(worlds)?) {
+            all.extend(one);
+        }
+        println!();
     }
-    println!("\nboth");
-    show(&both);
+    println!("all rigs");
+    show(&all);
     Ok(())
 }

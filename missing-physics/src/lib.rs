@@ -4,6 +4,7 @@ mod answer;
 mod bank;
 mod compare;
 pub mod data;
+mod departure;
 pub mod diagnosis;
 pub mod engine;
 mod estimate;

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::departure::{self, Departure, Left};
 use crate::diagnosis::Location;
 use crate::fit::{Fit, NoiseState, whitened_columns};
 use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, own_given};
@@ -144,6 +145,7 @@ pub(crate) fn locate(
         .collect::<Result<_, _>>()?;
     let sizes = (selection.own.len(), selection.shared.len());
     let mut found: Vec<(f64, Location)> = Vec::new();
+    let mut worth = 0.0;
     for channel in 0..problem.channels() {
         let mut best: Option<(Scan, Interval)> = None;
         for variable in variables(problem) {
@@ -155,9 +157,22 @@ pub(crate) fn locate(
                 best = Some((scan, here));
             }
         }
-        if let Some((scan, interval)) = best.filter(|(_, interval)| interval.gain > 0.0) {
-            found.push((interval.gain, place(problem, &columns, sigma, channel, &scan, interval)));
+        if let Some((scan, Interval { gain, bins, worth: here })) = best.filter(|(_, b)| b.gain > 0.0) {
+            let (Scan { variable, edges, .. }, (_, coefficients)) = (&scan, scan.outside(bins));
+            let scanned = Scanned { variable: *variable, edges, bins, coefficients: &coefficients };
+            found.push((gain, place(problem, &columns, sigma, channel, &scanned, gain)));
+            worth += here;
         }
+    }
+    let left = Left { columns: &columns, sizes, shared: &baseline.shared, sigma };
+    // One departure of the law is more natural than one of each channel by itself.
+    if let Some(departure) = departure::best(problem, &left, EARLIER)?
+        && worth <= EARLIER * departure.worth
+    {
+        let Departure { variable, edges, bins, gains, baseline, .. } = departure;
+        let scanned = Scanned { variable, edges: &edges, bins, coefficients: &baseline };
+        let gaining = gains.into_iter().enumerate().filter(|(_, gain)| *gain > 0.0);
+        found = gaining.map(|(c, gain)| (gain, place(problem, &columns, sigma, c, &scanned, gain))).collect();
     }
     let total: f64 = found.iter().map(|(gain, _)| gain).sum();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -173,21 +188,29 @@ pub(crate) fn locate(
         .collect())
 }
 
+/// Bins along a variable, and the coefficients of each run's columns at which the baseline is right outside.
+struct Scanned<'a> {
+    variable: Option<usize>,
+    edges: &'a [f64],
+    bins: (usize, usize),
+    coefficients: &'a [Vec<f64>],
+}
+
 /// An interval as a place: what the rows in it miss where the baseline is fitted to the others.
 fn place(
     problem: &Problem<'_>,
     columns: &[Vec<Vec<f64>>],
     sigma: &[f64],
     channel: usize,
-    scan: &Scan,
-    Interval { gain, bins: (from, to), .. }: Interval,
+    scanned: &Scanned<'_>,
+    gain: f64,
 ) -> Location {
-    let (_, coefficients) = scan.outside((from, to));
+    let &Scanned { variable, edges, bins: (from, to), coefficients } = scanned;
     let mut residuals: Vec<(usize, f64)> = Vec::new();
     for (r, x) in coefficients.iter().enumerate() {
         let start: usize = (0..channel).map(|c| problem.rows[r].valid[c].len()).sum();
         for (k, &i) in problem.rows[r].valid[channel].iter().enumerate() {
-            let b = bin(value(problem, scan.variable, r, i), &scan.edges);
+            let b = bin(value(problem, variable, r, i), edges);
             if b >= from && b < to {
                 let fitted: f64 = x.iter().zip(&columns[r]).map(|(x, c)| x * c[start + k]).sum();
                 let measured = columns[r].last().map_or(0.0, |c| c[start + k]);
@@ -214,9 +237,9 @@ fn place(
         residuals.iter().map(|(_, v)| *v).fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
     Location {
         channel: problem.recording.channels[channel].name.clone(),
-        variable: Some(variable_name(problem, scan.variable)),
-        from: scan.edges.get(from).copied(),
-        to: scan.edges.get(to).copied(),
+        variable: Some(variable_name(problem, variable)),
+        from: edges.get(from).copied(),
+        to: edges.get(to).copied(),
         runs,
         share: 0.0,
         mean_residual: mean,
@@ -226,7 +249,7 @@ fn place(
 }
 
 /// The variables along which an interval may lie: the inputs, in the order of the recording, or the number of the row.
-fn variables(problem: &Problem<'_>) -> Vec<Option<usize>> {
+pub(crate) fn variables(problem: &Problem<'_>) -> Vec<Option<usize>> {
     if problem.recording.variables.is_empty() {
         return vec![None];
     }
@@ -237,12 +260,12 @@ fn variable_name(problem: &Problem<'_>, variable: Option<usize>) -> String {
     variable.map_or_else(|| "row".into(), |v| problem.recording.variables[v].name.clone())
 }
 
-fn value(problem: &Problem<'_>, variable: Option<usize>, run: usize, row: usize) -> f64 {
+pub(crate) fn value(problem: &Problem<'_>, variable: Option<usize>, run: usize, row: usize) -> f64 {
     variable.map_or(row as f64, |v| problem.recording.runs[run].inputs[v][row])
 }
 
 /// Edges of at most [`BINS`] bins with as many rows each.
-fn edges(problem: &Problem<'_>, channel: usize, variable: Option<usize>) -> Vec<f64> {
+pub(crate) fn edges(problem: &Problem<'_>, channel: usize, variable: Option<usize>) -> Vec<f64> {
     let mut values: Vec<f64> = (0..problem.rows.len())
         .flat_map(|r| problem.rows[r].valid[channel].iter().map(move |&i| (r, i)))
         .map(|(r, i)| value(problem, variable, r, i))
@@ -257,7 +280,7 @@ fn edges(problem: &Problem<'_>, channel: usize, variable: Option<usize>) -> Vec<
     edges
 }
 
-fn bin(value: f64, edges: &[f64]) -> usize {
+pub(crate) fn bin(value: f64, edges: &[f64]) -> usize {
     edges.partition_point(|e| *e <= value).clamp(1, edges.len() - 1) - 1
 }
 
@@ -308,7 +331,11 @@ fn normals(
 
 /// Least squares over runs from the lower triangles of their Gram matrices: `n_own` columns of each run's own, `n_free` of all, the
 /// residual last. Sum of squares that is left, and each run's coefficients.
-fn solve(grams: impl Iterator<Item = DMatrix<f64>>, n_own: usize, n_free: usize) -> (f64, Vec<Vec<f64>>) {
+pub(crate) fn solve(
+    grams: impl Iterator<Item = DMatrix<f64>>,
+    n_own: usize,
+    n_free: usize,
+) -> (f64, Vec<Vec<f64>>) {
     let mut information = DMatrix::zeros(n_free, n_free);
     let mut right = vec![0.0; n_free];
     let mut total = 0.0;

@@ -240,6 +240,21 @@ pub trait Model: Sync {
         Vec::new()
     }
 
+    /// How the predictions of all runs change (each as [`Model::predict`] fills it) by a unit of a departure that is small and has the
+    /// size `amounts[run][row]` in the law of each row: where rows are not alone, an effect in one shows in others. `None` (the
+    /// default) where a row that departs is off by itself.
+    ///
+    /// # Errors
+    /// As [`Model::predict`].
+    fn departing(
+        &self,
+        _runs: &[Run],
+        _shared: &[f64],
+        _amounts: &[Vec<f64>],
+    ) -> Result<Option<Vec<Vec<f64>>>, PredictError> {
+        Ok(None)
+    }
+
     /// Why a mechanism (index into [`Spec::mechanisms`]) is no explanation at these shared parameters, in a few words; `None`
     /// where it makes sense. Bounds say what each parameter may be; this says what they may not be together.
     fn implausible(&self, _mechanism: usize, _shared: &[f64]) -> Option<String> {

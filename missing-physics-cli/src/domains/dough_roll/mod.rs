@@ -85,15 +85,16 @@ impl Domain for DoughRoll {
         let variable = |name: &str, unit: &str| Quantity::new(name, unit);
         let recording = Recording {
             channels: CHANNELS.iter().map(|name| Quantity::new(*name, "m")).collect(),
+            // What dough and band are comes before the number of the roll and the time, with which a dough only grows.
             variables: vec![
-                variable("step", ""),
-                variable("t_s", "s"),
                 variable("length_m", "m"),
                 variable("width_m", "m"),
                 variable("height_m", "m"),
                 variable("throw_m", "m"),
                 variable("depth_m", "m"),
                 variable("force_n", "N"),
+                variable("step", ""),
+                variable("t_s", "s"),
             ],
             runs,
             noise_along: None,

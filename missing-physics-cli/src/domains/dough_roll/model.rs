@@ -61,7 +61,7 @@ pub(super) const CHANNELS: [&str; 6] =
     ["next_length_m", "next_width_m", "next_height_m", "length_m", "width_m", "height_m"];
 
 /// The force among a run's inputs.
-const FORCE: usize = 7;
+const FORCE: usize = 5;
 
 impl DoughModel {
     pub(super) fn new(band: Band, dynamics: Dynamics, timed: bool, steps: &[Step]) -> Self {
@@ -101,7 +101,7 @@ impl DoughModel {
     /// The common response, springback and loss that are most likely, one after the other.
     fn at_first_sight(&self, doughs: &[Dough], fresh: &Fresh) -> Effects {
         let cost = |effects: &Effects| -> f64 {
-            let off = |d| surprise(&self.follow(d, fresh, effects));
+            let off = |d| surprise(&self.follow(d, fresh, effects, &|_| 0.0));
             doughs.iter().map(off).map(|s| s.spread + s.square).sum()
         };
         let mut shown = Effects::OFF;
@@ -119,17 +119,24 @@ impl DoughModel {
     /// How the uncertainty of what was learned ties the errors of doughs.
     fn tie(&self, doughs: &[Dough], fresh: &Fresh, shown: &Effects) -> Tie {
         let answers = |dough: &Dough| {
-            let steps = self.follow(dough, fresh, shown);
+            let steps = self.follow(dough, fresh, shown, &|_| 0.0);
             self.dynamics
                 .unlearned(&steps, &dough.rolls, |i| self.response(dough, i, shown, steps[i].state[0]))
         };
         Tie::new(&doughs.iter().map(answers).collect::<Vec<_>>())
     }
 
-    fn follow(&self, dough: &Dough, fresh: &Fresh, effects: &Effects) -> Vec<Followed> {
+    /// Follows a dough under some effects, the response of each roll larger by a part of itself.
+    fn follow(
+        &self,
+        dough: &Dough,
+        fresh: &Fresh,
+        effects: &Effects,
+        larger: &dyn Fn(usize) -> f64,
+    ) -> Vec<Followed> {
         let left = (1.0 - effects.volume_loss).max(0.0).cbrt();
         follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, |i, x| {
-            let response = self.response(dough, i, effects, x[0]);
+            let response = (1.0 + larger(i)) * self.response(dough, i, effects, x[0]);
             let learned = x + self.dynamics.change(x, &dough.steps[i].roll.action);
             left * Vector3::from(answered(&(*x).into(), &learned.into(), response))
         })
@@ -147,12 +154,28 @@ impl DoughModel {
 
     /// The errors of a block under some effects: independent, of variance one.
     fn errors(&self, block: &Block, effects: &Effects) -> DVector<f64> {
+        self.errors_of(block, effects, &|_, _| 0.0)
+    }
+
+    /// Those of rolls whose response is larger by a part of itself, by dough and roll.
+    fn errors_of(
+        &self,
+        block: &Block,
+        effects: &Effects,
+        larger: &dyn Fn(usize, usize) -> f64,
+    ) -> DVector<f64> {
         let mut errors = DVector::zeros(block.off.len());
-        for dough in &block.doughs {
-            let own = white(&self.follow(dough, &block.fresh, effects));
+        for (at, dough) in block.doughs.iter().enumerate() {
+            let own = white(&self.follow(dough, &block.fresh, effects, &|roll| larger(at, roll)));
             errors.rows_mut(dough.first, own.len()).copy_from(&own);
         }
         block.tie.untie(&errors)
+    }
+
+    /// Block and dough of a run.
+    fn place(&self, run: &Run) -> Result<(usize, usize), PredictError> {
+        let unknown = || PredictError { run: run.label.clone(), reason: "no such rolls".into() };
+        self.runs.get(&run.label).copied().ok_or_else(unknown)
     }
 
     /// The same, kept for the other runs of the block.
@@ -177,19 +200,19 @@ impl DoughModel {
         let dough = &block.doughs[dough];
         let of = |f: &dyn Fn(&Step) -> f64| dough.steps.iter().map(f).collect::<Vec<f64>>();
         // The state that was expected: a measured one shares its noise with the error that is to be a function of it.
-        let followed = self.follow(dough, &block.fresh, &Effects::OFF);
+        let followed = self.follow(dough, &block.fresh, &Effects::OFF, &|_| 0.0);
         let expected = |k: usize| -> Vec<f64> {
             dough.steps.iter().zip(&followed).map(|(s, f)| s.roll.state[k] - f.before.off[k]).collect()
         };
         let inputs = vec![
-            of(&|s| s.step),
-            of(&|s| s.t_s),
             expected(0),
             expected(1),
             expected(2),
             of(&|s| s.roll.action[0]),
             of(&|s| s.roll.action[1]),
             of(&|s| self.force_n(s)),
+            of(&|s| s.step),
+            of(&|s| s.t_s),
         ];
         let channel = |c: usize| {
             let of = |i| self.scale[c] * block.off[dough.first + PER_ROLL * i + c];
@@ -218,9 +241,7 @@ impl Model for DoughModel {
     }
 
     fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        let Some(&(block, dough)) = self.runs.get(&run.label) else {
-            return Err(PredictError { run: run.label.clone(), reason: "no such rolls".into() });
-        };
+        let (block, dough) = self.place(run)?;
         let errors = self.kept_errors(block, shared);
         let block = &self.blocks[block];
         let (n, first) = (run.len(), block.doughs[dough].first);
@@ -244,6 +265,43 @@ impl Model for DoughModel {
         forces.dedup();
         let last = forces.len().saturating_sub(1);
         (1..=STARTS).filter_map(|k| Some(vec![(slip, *forces.get(k * last / (STARTS + 1))?)])).collect()
+    }
+
+    /// The response of each roll: what follows from that is measured in all rolls that what was learned ties to it.
+    fn departing(
+        &self,
+        runs: &[Run],
+        shared: &[f64],
+        amounts: &[Vec<f64>],
+    ) -> Result<Option<Vec<Vec<f64>>>, PredictError> {
+        const PART: f64 = 1e-4;
+        let effects = self.places.effects(shared);
+        let places = runs.iter().map(|run| self.place(run)).collect::<Result<Vec<_>, _>>()?;
+        let mut changes = vec![Vec::new(); runs.len()];
+        for (number, block) in self.blocks.iter().enumerate() {
+            let run_of = |dough| places.iter().position(|place| *place == (number, dough));
+            let of_dough: Vec<Option<usize>> = (0..block.doughs.len()).map(run_of).collect();
+            if of_dough.iter().all(Option::is_none) {
+                continue;
+            }
+            let moved = |by: f64| {
+                let larger =
+                    |dough: usize, roll: usize| of_dough[dough].map_or(0.0, |run| by * amounts[run][roll]);
+                self.errors_of(block, &effects, &larger)
+            };
+            let change = (moved(-PART) - moved(PART)) / (2.0 * PART);
+            for (run, dough) in
+                of_dough.iter().zip(&block.doughs).filter_map(|(run, dough)| Some(((*run)?, dough)))
+            {
+                let n = dough.steps.len();
+                let at = |place: usize| {
+                    let (channel, roll) = (place / n, place % n);
+                    self.scale[channel] * change[dough.first + PER_ROLL * roll + channel]
+                };
+                changes[run] = (0..PER_ROLL * n).map(at).collect();
+            }
+        }
+        Ok(Some(changes))
     }
 
     fn prediction_is_clean(&self) -> bool {

@@ -7,10 +7,11 @@ use super::model::{FILLS, SloshModel};
 
 /// Rows of a proposed run.
 const MOST_ROWS: usize = 2000;
-/// Repeats of a proposed run.
-const REPEATS: usize = 3;
+/// How high and how long a wave is proposed, beside the highest and the first so far.
+const HIGHER: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+const LONGER: [f64; 3] = [1.0 / 3.0, 1.0, 3.0];
 
-/// The same swing weaker and harder, recorded for longer, and with less or more liquid.
+/// Weaker and harder swings, recorded for a shorter or longer time, and one with less or more liquid.
 pub(super) fn experiments(model: &SloshModel, recording: &Recording) -> Vec<Experiment> {
     let Some(times) = recording.runs.first().and_then(|r| r.inputs.first()) else { return Vec::new() };
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return Vec::new() };
@@ -23,24 +24,24 @@ pub(super) fn experiments(model: &SloshModel, recording: &Recording) -> Vec<Expe
         Run { label: "next".into(), outputs: vec![vec![0.0; n]], inputs: vec![times], kind: kind as u32 }
     };
     let mut list = Vec::new();
-    let mut add = |action: Vec<(&str, f64)>, words: String, run: Run, amplitude: f64| {
-        list.push(Experiment {
-            action: action.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
-            words: format!("{words}, {REPEATS} times"),
-            runs: vec![run; REPEATS],
-            own: vec![model.wave(amplitude); REPEATS],
-        });
+    let mut add = |action: Vec<(String, f64)>, words: String, run: Run, amplitude: f64| {
+        list.push(Experiment { action, words, runs: vec![run], own: vec![model.wave(amplitude)] });
     };
     let largest = model.largest();
-    for share in [0.25, 0.5, 2.0] {
-        let words = format!("swing it so that the reading starts at {:.2e}", share * largest);
-        add(vec![("amplitude_share", share)], words, run(span, 0), share * largest);
+    let (channel, unit) = (model.channel(), model.channel().unit());
+    for amplitude in HIGHER.map(|share| share * largest) {
+        for duration in LONGER.map(|share| share * span) {
+            let words = format!(
+                "swing it so that the reading starts at {amplitude:.2e} {unit}, and record {duration:.3} s"
+            );
+            let action =
+                [(format!("amplitude_{}", channel.suffix()), amplitude), ("duration_s".into(), duration)];
+            add(action.into(), words, run(duration, 0), amplitude);
+        }
     }
-    let words = format!("record it for {:.0} s", 3.0 * span);
-    add(vec![("duration_s", 3.0 * span)], words, run(3.0 * span, 0), largest);
     for (kind, share) in FILLS.iter().enumerate().skip(1).filter(|(kind, _)| model.holds(*kind)) {
         let words = format!("swing it with {share} times the liquid");
-        add(vec![("volume_share", *share)], words, run(span, kind), largest);
+        add(vec![("volume_share".into(), *share)], words, run(span, kind), largest);
     }
     list
 }

@@ -118,6 +118,11 @@ impl SloshModel {
         own
     }
 
+    /// What was measured.
+    pub fn channel(&self) -> Channel {
+        self.setup.channel
+    }
+
     /// The largest amplitude with which a run begins.
     pub fn largest(&self) -> f64 {
         self.largest

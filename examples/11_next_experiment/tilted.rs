@@ -3,18 +3,14 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use hw_traits::clock::{Clock, Stamped};
-use hw_traits::force_torque::{ForceTorque, Wrench};
 use hw_traits::programme::{TiltProgramme, run};
-use hw_traits::rotary::Rotary;
-use hw_traits::{ErrorKind, ErrorType};
 use liquid_haptics::wrench::{PlanarWrench, world_from_body};
-use rand::{RngExt as _, SeedableRng as _};
+use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, StandardNormal};
 use worlds::GRAVITY_M_S2;
 use worlds::tilt::{Cavity, Effects, Sweep, TiltWorld};
 
+use super::wrist::{Load, Turn, Wrist};
 use super::{Outcome, Rig, on_log_scale};
 
 const WATER: f64 = 997.0;
@@ -23,9 +19,6 @@ const BOTTLE_KG: f64 = 0.085;
 const GRIPPER_KG: f64 = 0.9;
 const GRASP_M: f64 = 0.75 * OUTSIDE.length_m;
 const POSES: usize = 13;
-/// One sigma of a reading of a force (N) and of a torque (N m): an ATI Axia80's resolution.
-const SIGMA_N: f64 = 0.1;
-const SIGMA_NM: f64 = 0.005;
 
 /// What may be hidden; the world's effects with that alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,12 +36,12 @@ pub(super) struct Tilt {
 }
 
 /// The rig.
-pub(super) struct Liquid;
+pub(super) struct Tilted;
 
-impl Rig for Liquid {
+impl Rig for Tilted {
     type Hidden = Hidden;
     type Action = Tilt;
-    const NAME: &'static str = "liquid";
+    const NAME: &'static str = "a bottle tilted";
     const COLUMNS: &'static str = "run,theta_rad,fx_n,fy_n,tau_z_nm,volume_m3";
 
     fn header() -> String {
@@ -112,7 +105,7 @@ impl Rig for Liquid {
     }
 
     fn act(tilt: Tilt, hidden: Hidden, label: usize, seed: u64) -> Outcome<String> {
-        let mut wrist = Wrist::new(tilt, hidden.effects, seed);
+        let mut wrist = Wrist::new(Held::new(tilt, hidden.effects), seed);
         let angle = |k: usize| tilt.from_rad + (tilt.to_rad - tilt.from_rad) * k as f64 / (POSES - 1) as f64;
         let programme = TiltProgramme {
             angles_rad: (0..POSES).map(angle).collect(),
@@ -132,18 +125,15 @@ impl Rig for Liquid {
     }
 }
 
-/// A simulated wrist that holds the bottle and is where it was told to be as soon as somebody has waited.
-struct Wrist {
+/// The bottle as the wrist holds it.
+struct Held {
     world: TiltWorld,
-    now_s: f64,
-    angle_rad: f64,
-    /// Force and torque where it stands, if they were asked.
-    felt: Option<[f64; 2]>,
-    rng: ChaCha8Rng,
+    /// Force and torque at the last angle asked.
+    felt: Option<(f64, [f64; 2])>,
 }
 
-impl Wrist {
-    fn new(tilt: Tilt, effects: Effects, seed: u64) -> Self {
+impl Held {
+    fn new(tilt: Tilt, effects: Effects) -> Self {
         // A drop stays in an empty bottle.
         let volume_m3 = tilt.volume_m3.max(1e-9);
         let world = TiltWorld {
@@ -154,67 +144,18 @@ impl Wrist {
             sweeps: vec![Sweep { mass_kg: WATER * volume_m3, volume_m3, tilts_rad: vec![0.0] }],
             effects,
         };
-        Self { world, now_s: 0.0, angle_rad: 0.0, felt: None, rng: ChaCha8Rng::seed_from_u64(seed) }
+        Self { world, felt: None }
     }
 }
 
-impl ErrorType for Wrist {
-    type Error = ErrorKind;
-}
-
-impl Clock for Wrist {
-    fn now_s(&mut self) -> Result<f64, ErrorKind> {
-        Ok(self.now_s)
-    }
-
-    fn sleep_s(&mut self, duration_s: f64) -> Result<(), ErrorKind> {
-        self.now_s += duration_s.max(0.0);
-        Ok(())
-    }
-}
-
-impl Rotary for Wrist {
-    fn limits_rad(&self) -> (f64, f64) {
-        (0.0, PI)
-    }
-
-    fn turn_to(&mut self, angle_rad: f64, rate_rad_s: f64) -> Result<(), ErrorKind> {
-        if !((0.0..=PI).contains(&angle_rad) && rate_rad_s > 0.0) {
-            return Err(ErrorKind::OutOfRange);
+impl Load for Held {
+    fn felt(&mut self, turn: &Turn, _since_s: f64) -> Option<[f64; 2]> {
+        if let Some((_, felt)) = self.felt.filter(|(angle_rad, _)| *angle_rad == turn.to_rad) {
+            return Some(felt);
         }
-        (self.angle_rad, self.felt) = (angle_rad, None);
-        Ok(())
-    }
-
-    fn angle_rad(&mut self) -> Result<Stamped<f64>, ErrorKind> {
-        Ok(Stamped { t_s: self.now_s, value: self.angle_rad })
-    }
-
-    fn settled(&mut self) -> Result<bool, ErrorKind> {
-        Ok(true)
-    }
-}
-
-impl ForceTorque for Wrist {
-    fn read(&mut self) -> Result<Stamped<Wrench>, ErrorKind> {
-        let [up_n, torque_nm] = if let Some(felt) = self.felt {
-            felt
-        } else {
-            self.world.sweeps[0].tilts_rad[0] = self.angle_rad;
-            self.world.readings().first().copied().ok_or(ErrorKind::Other)?
-        };
-        self.felt = Some([up_n, torque_nm]);
-        let mut noise = || -> f64 { StandardNormal.sample(&mut self.rng) };
-        // The sensor's axes turn with the wrist.
-        let (sin, cos) = self.angle_rad.sin_cos();
-        let value = Wrench {
-            force_n: [-up_n * sin + SIGMA_N * noise(), up_n * cos + SIGMA_N * noise(), SIGMA_N * noise()],
-            torque_nm: [SIGMA_NM * noise(), SIGMA_NM * noise(), torque_nm + SIGMA_NM * noise()],
-        };
-        Ok(Stamped { t_s: self.now_s, value })
-    }
-
-    fn tare(&mut self, _readings: usize) -> Result<(), ErrorKind> {
-        Err(ErrorKind::Other)
+        self.world.sweeps[0].tilts_rad[0] = turn.to_rad;
+        let felt = *self.world.readings().first()?;
+        self.felt = Some((turn.to_rad, felt));
+        Some(felt)
     }
 }
