@@ -95,8 +95,22 @@ pub struct Step {
     pub after: Innovation,
     /// What of that goes into the estimate of the state before.
     pub back: Matrix3<f64>,
-    /// The part of the change that is undone before the next roll.
+    /// What of the state after it, and of the one before it, makes the state before the next roll.
+    pub shares: [f64; 2],
+}
+
+/// What becomes of a dough beside its dynamics.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beside {
+    /// The part of each roll's strain that is undone before the next roll.
     pub undone: f64,
+    /// What a roll leaves of each dimension; what it takes does not come back.
+    pub left: f64,
+}
+
+impl Beside {
+    /// A dough that keeps all its shape and volume.
+    pub const NOTHING: Self = Self { undone: 0.0, left: 1.0 };
 }
 
 /// Covariances of the states before and after a roll, and between them.
@@ -107,12 +121,11 @@ struct Both {
 }
 
 impl Both {
-    /// Covariance of a state that is a part of the way back from the one after to the one before, once the one after was measured.
-    fn between(&self, measured: &Innovation, back: &Matrix3<f64>, part: f64) -> Matrix3<f64> {
+    /// Covariance of a state made of shares of the one after and the one before, once the one after was measured.
+    fn between(&self, measured: &Innovation, back: &Matrix3<f64>, [kept, part]: [f64; 2]) -> Matrix3<f64> {
         let after = self.after - measured.gain * self.after;
         let before = self.before - back * self.cross.transpose();
         let cross = self.cross - back * self.after;
-        let kept = 1.0 - part;
         let p = kept * kept * after + part * part * before + part * kept * (cross + cross.transpose());
         0.5 * (p + p.transpose())
     }
@@ -120,15 +133,17 @@ impl Both {
 
 /// Follows a dough through its rolls.
 ///
-/// `next(i, x)` is the state after roll `i` from the state `x`; a part `undone` of each change is undone before the next roll.
+/// `next(i, x)` is the state after roll `i` from the state `x`, without what a roll takes beside its dynamics.
 pub fn follow(
     rolls: &[Roll],
     fresh: &Fresh,
     noise: &Noise,
-    undone: f64,
+    Beside { undone, left }: Beside,
     next: impl Fn(usize, &Vector3<f64>) -> Vector3<f64>,
 ) -> Vec<Step> {
     const STEP_M: f64 = 1e-6;
+    let shares = [1.0 - undone, undone * left];
+    let next = |i: usize, x: &Vector3<f64>| left * next(i, x);
     let (mut x, mut p) = (fresh.mean, fresh.covariance);
     let mut steps = Vec::with_capacity(rolls.len());
     for (i, roll) in rolls.iter().enumerate() {
@@ -142,18 +157,18 @@ pub fn follow(
             moved[k] += STEP_M;
             gradient.set_column(k, &((next(i, &moved) - there) / STEP_M));
         }
-        let change = there - x;
+        let change = there - left * x;
         let scatter = change * change.transpose() * noise.scatter;
         // The states before and after it, estimated together.
         let mut both = Both { before: p, cross: p * gradient.transpose(), after: Matrix3::zeros() };
         both.after = gradient * both.cross + Matrix3::from_diagonal(&noise.process) + scatter;
         let after = innovation(&Vector3::from(roll.next), &there, &both.after, &noise.measured[1]);
         let back = after.share(&both.cross);
-        steps.push(Step { before, state, covariance, change, gradient, after, back, undone });
+        steps.push(Step { before, state, covariance, change, gradient, after, back, shares });
         (x, p) = updated(&there, &both.after, &after);
         if undone != 0.0 {
-            x = (1.0 - undone) * x + undone * (state + back * after.off);
-            p = both.between(&after, &back, undone);
+            x = shares[0] * x + shares[1] * (state + back * after.off);
+            p = both.between(&after, &back, shares);
         }
     }
     steps

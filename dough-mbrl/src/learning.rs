@@ -6,7 +6,7 @@ use argmin::core::{CostFunction, Error, Executor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 use crate::dynamics::{LearnError, Own, Roll};
-use crate::filter::{Fresh, Noise, follow};
+use crate::filter::{Beside, Fresh, Noise, follow};
 use crate::powell::Powell;
 use crate::sensitivity::{COURSES, OWN, PER_ROLL, courses, sensitivity, surprise, white};
 use crate::surface::Surface;
@@ -21,6 +21,9 @@ const DOUGHS: usize = 3;
 const LOG_PROCESS: [f64; 2] = [-7.0, 4.0];
 /// Logarithm of the variance of the part by which a roll does more or less: 0.3 to 30 %.
 const LOG_SCATTER: [f64; 2] = [-11.6, -2.4];
+
+/// A roll keeps the volume of a dough of any size: relative changes of its dimensions come to no more than this part of one of them.
+const LOST: f64 = 0.2;
 
 /// What was learned.
 #[derive(Debug, Clone)]
@@ -117,7 +120,7 @@ impl Learning<'_> {
         let mut sums = Sums { square: DMatrix::zeros(n, n), pull: DVector::zeros(n), own: Vec::new() };
         for (at, dough) in self.doughs.iter().enumerate() {
             let next = |i: usize, x: &Vector3<f64>| x + self.surface.change(x, &dough[i].action);
-            let steps = follow(dough, &fresh, &self.noise, 0.0, next);
+            let steps = follow(dough, &fresh, &self.noise, Beside::NOTHING, next);
             let terms = |i: usize| self.surface.slopes(&steps[i].state, &dough[i].action);
             let all = sensitivity(&steps, terms, |_| 1.0, n / 3);
             let (off, shared, own) = (white(&steps), all.columns(0, n), all.columns(n, OWN));
@@ -165,6 +168,15 @@ impl Learning<'_> {
             for k in 0..3 {
                 for j in range.clone() {
                     normal[(k * p + j, k * p + j)] += 1.0 / variances[k];
+                }
+            }
+        }
+        let (of_size, relative) = self.surface.of_size();
+        for (range, variances) in degrees.iter().zip(&self.remainder) {
+            let mean = relative.component_mul(&relative).dot(variances) / 3.0;
+            for j in of_size.iter().filter(|j| range.contains(j)) {
+                for (k, l) in (0..3).flat_map(|k| (0..3).map(move |l| (k, l))) {
+                    normal[(k * p + j, l * p + j)] += relative[k] * relative[l] / (LOST * LOST * mean);
                 }
             }
         }
@@ -284,7 +296,7 @@ impl CostFunction for Process<'_, '_> {
                 let level: Vector3<f64> = own.courses.iter().zip(&courses).map(|(own, c)| own * c[i]).sum();
                 x + (1.0 + own.softness) * surface.change(x, &dough[i].action) + level
             };
-            let of = surprise(&follow(dough, &fresh, &noise, 0.0, next));
+            let of = surprise(&follow(dough, &fresh, &noise, Beside::NOTHING, next));
             spread += of.spread;
             square += of.square;
         }

@@ -74,7 +74,7 @@ pub fn sensitivity(
         write(&mut all, row, &step.after.factor, &moved);
         state -= step.back * &moved;
         moved -= step.after.gain * &moved;
-        moved = (1.0 - step.undone) * moved + step.undone * state;
+        moved = step.shares[0] * moved + step.shares[1] * state;
     }
     all
 }

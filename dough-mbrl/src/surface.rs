@@ -116,6 +116,12 @@ impl Surface {
         (0..REMAINDER).map(|d| self.features.up_to(d)..self.features.up_to(d + 1)).collect()
     }
 
+    /// Terms in which the size is, and what a unit of a coefficient of each dimension is as a relative change.
+    pub(crate) fn of_size(&self) -> (Vec<usize>, Vector3<f64>) {
+        let terms = (0..self.features.len()).filter(|&term| self.features.power(term, SIZE) > 0).collect();
+        (terms, self.mean_m.map(|m| 1.0 / m))
+    }
+
     /// All coefficients, one dimension after the other.
     pub(crate) fn flat(&self) -> DVector<f64> {
         DVector::from_column_slice(self.coefficients.as_slice())

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
 use dough_mbrl::dynamics::{Dynamics, LearnError, Roll};
-use dough_mbrl::filter::{Fresh, Noise, follow};
+use dough_mbrl::filter::{Beside, Fresh, Noise, follow};
 use dough_mbrl::sensitivity::{PER_ROLL, white};
 use dough_mbrl::tie::Tie;
 use nalgebra::DVector;
@@ -20,7 +20,7 @@ fn law(state: [f64; 3], action: [f64; 2], cubic: f64) -> [f64; 3] {
 }
 
 fn doughs(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Roll>> {
-    uneven(n, cubic, sigma, [0.0; 3], rng)
+    uneven(n, cubic, sigma, [0.0; 2], Beside::NOTHING, rng)
 }
 
 /// Doughs that are rolled eight times each; states are measured twice, after a roll and before the next. Each roll, and each dough in all
@@ -29,7 +29,8 @@ fn uneven(
     n: usize,
     cubic: f64,
     sigma: f64,
-    [scatter, softness, undone]: [f64; 3],
+    [scatter, softness]: [f64; 2],
+    Beside { undone, left }: Beside,
     rng: &mut ChaCha8Rng,
 ) -> Vec<Vec<Roll>> {
     let part = |sigma: f64, rng: &mut ChaCha8Rng| -> f64 {
@@ -56,8 +57,8 @@ fn uneven(
                     let before = measured(state, rng);
                     let next = law(state, action, cubic);
                     let does = soft * part(scatter, rng);
-                    let after = std::array::from_fn(|k| state[k] + does * (next[k] - state[k]));
-                    state = std::array::from_fn(|k| after[k] + undone * (state[k] - after[k]));
+                    let after = std::array::from_fn(|k| left * (state[k] + does * (next[k] - state[k])));
+                    state = std::array::from_fn(|k| after[k] + undone * (left * state[k] - after[k]));
                     Roll { state: before, action, next: measured(after, rng) }
                 })
                 .collect()
@@ -130,7 +131,9 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
         let first: Vec<[f64; 3]> = others.iter().map(|d| d[0].state).collect();
         let fresh = Fresh::of(&first, dynamics.noise());
         let follow_one = |dough: &Vec<Roll>| {
-            follow(dough, &fresh, dynamics.noise(), 0.0, |i, x| x + dynamics.change(x, &dough[i].action))
+            follow(dough, &fresh, dynamics.noise(), Beside::NOTHING, |i, x| {
+                x + dynamics.change(x, &dough[i].action)
+            })
         };
         let steps: Vec<_> = others.iter().map(follow_one).collect();
         let answers: Vec<_> =
@@ -157,7 +160,8 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
 fn scatter_of_rolls_and_softness_of_doughs_are_told_apart() {
     for [scatter, softness] in [[0.1, 0.0], [0.0, 0.1]] {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let dynamics = Dynamics::learn(&uneven(60, 0.0, SIGMA, [scatter, softness, 0.0], &mut rng)).unwrap();
+        let dynamics =
+            Dynamics::learn(&uneven(60, 0.0, SIGMA, [scatter, softness], Beside::NOTHING, &mut rng)).unwrap();
         for (name, found, is) in [
             ("scatter", dynamics.noise().scatter.sqrt(), scatter),
             ("softness", dynamics.own().softness.sqrt(), softness),
@@ -168,12 +172,13 @@ fn scatter_of_rolls_and_softness_of_doughs_are_told_apart() {
     }
 }
 
-/// A filter that knows the law, the noise and how much springs back leaves innovations that are white.
+/// A filter that knows the law, the noise and how much springs back and is lost leaves innovations that are white.
 #[test]
 fn innovations_are_white() {
-    for undone in [0.0, 0.4] {
+    for (undone, left) in [(0.0, 1.0), (0.4, 1.0), (0.4, 0.98)] {
+        let beside = Beside { undone, left };
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let doughs = uneven(200, 0.0, SIGMA, [0.0, 0.0, undone], &mut rng);
+        let doughs = uneven(200, 0.0, SIGMA, [0.0, 0.0], beside, &mut rng);
         let variance = nalgebra::Vector3::repeat(SIGMA * SIGMA);
         let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros(), scatter: 0.0 };
         let first: Vec<[f64; 3]> = doughs.iter().map(|d| d[0].state).collect();
@@ -181,7 +186,7 @@ fn innovations_are_white() {
         let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);
         for dough in &doughs {
             let next = |i: usize, x: &nalgebra::Vector3<f64>| law((*x).into(), dough[i].action, 0.0).into();
-            for pair in follow(dough, &fresh, &noise, undone, next).windows(2) {
+            for pair in follow(dough, &fresh, &noise, beside, next).windows(2) {
                 let [after, before] = [pair[0].after.white(), pair[1].before.white()];
                 squares += after.norm_squared() + before.norm_squared();
                 tied += after.dot(&before);
@@ -190,8 +195,8 @@ fn innovations_are_white() {
         }
         // 8,400 innovations: 4 standard errors of their variance and of a correlation.
         let mean = squares / (2.0 * count);
-        assert!((mean - 1.0f64).abs() < 4.0 * f64::sqrt(1.0 / count), "{undone}: {mean}");
-        assert!((tied / count).abs() < 4.0 / f64::sqrt(count), "{undone}: {}", tied / count);
+        assert!((mean - 1.0f64).abs() < 4.0 * f64::sqrt(1.0 / count), "{beside:?}: {mean}");
+        assert!((tied / count).abs() < 4.0 / f64::sqrt(count), "{beside:?}: {}", tied / count);
     }
 }
 

@@ -131,7 +131,9 @@ pub(crate) fn estimates(
                 let half = reach * covariance[(i, i)].max(0.0).sqrt();
                 ci95 = [value - half, value + half];
                 if profile {
-                    ci95 = Profile::new(problem, candidate, i).interval(half, reach);
+                    let profile = Profile::new(problem, candidate, i);
+                    let between = profile.between(problem.model.jumps(slot));
+                    ci95 = between.unwrap_or_else(|| profile.interval(half, reach));
                 }
                 ci95 = [ci95[0].max(info.lower), ci95[1].min(info.upper)];
             }
@@ -258,6 +260,10 @@ const LOOK: [f64; 6] = [0.75, 1.5, 3.0, 6.0, 12.0, 24.0];
 /// A top is a better one where the sum of squares is lower by this.
 const BETTER: f64 = 0.05;
 
+/// A stair of the likelihood is looked at until this many treads in a row have a sum of squares that is higher by so much.
+const UNLIKELY: f64 = 30.0;
+const UNLIKELY_TREADS: usize = 3;
+
 /// The likelihood of one free shared parameter, all others fitted at each of its values.
 struct Profile<'a> {
     problem: &'a Problem<'a>,
@@ -312,6 +318,46 @@ impl<'a> Profile<'a> {
         let bound = self.bound(side);
         let values = LOOK.map(|k| self.fit.shared[self.slot] + side * k * error);
         values.into_iter().filter(move |value| (value - bound) * side < 0.0)
+    }
+
+    /// The 95 % interval of a parameter at whose values predictions jump: the likelihood is a stair, whose treads weigh what they are wide
+    /// (a posterior of an even prior). `None` where nothing jumps.
+    fn between(&self, jumps: &[f64]) -> Option<[f64; 2]> {
+        let [lowest, highest] = [jumps.first()?, jumps.last()?].map(|end| *end);
+        let ends = [self.bound(-1.0).min(lowest), self.bound(1.0).max(highest)];
+        let edges: Vec<f64> = ends[..1].iter().chain(jumps).chain(&ends[1..]).copied().collect();
+        let treads: Vec<[f64; 2]> = edges.windows(2).map(|w| [w[0], w[1]]).filter(|t| t[1] > t[0]).collect();
+        let here = treads.iter().position(|t| self.fit.shared[self.slot] <= t[1])?;
+        let mut rises = vec![f64::INFINITY; treads.len()];
+        let (down, up): (Vec<usize>, Vec<usize>) =
+            ((0..here).rev().collect(), (here..treads.len()).collect());
+        for side in [up, down] {
+            let mut unlikely = 0;
+            for at in side {
+                rises[at] = self.rise(0.5 * (treads[at][0] + treads[at][1])).unwrap_or(f64::INFINITY);
+                unlikely = if rises[at] > UNLIKELY { unlikely + 1 } else { 0 };
+                if unlikely == UNLIKELY_TREADS {
+                    break;
+                }
+            }
+        }
+        let least = rises.iter().copied().fold(f64::INFINITY, f64::min);
+        let masses: Vec<f64> = treads
+            .iter()
+            .zip(&rises)
+            .map(|(t, rise)| (t[1] - t[0]) * (-0.5 * (rise - least)).exp())
+            .collect();
+        let all: f64 = masses.iter().sum();
+        let holding = |part: f64| {
+            let mut below = 0.0;
+            let mut sums = masses.iter().map(|mass| {
+                below += mass;
+                below
+            });
+            sums.position(|sum| sum >= part * all)
+        };
+        // Within a tread all values are alike: whole treads.
+        Some([treads[holding(1.0 - END)?][0], treads[holding(END)?][1]])
     }
 
     /// The 95 % interval, where the quadratic one of this half width, so many standard errors, misleads.

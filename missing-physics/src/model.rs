@@ -240,6 +240,12 @@ pub trait Model: Sync {
         Vec::new()
     }
 
+    /// Values, rising, at which predictions jump as the shared parameter at a slot grows; between two of them next to nothing depends
+    /// on it. None (the default) where predictions are smooth.
+    fn jumps(&self, _shared_slot: usize) -> &[f64] {
+        &[]
+    }
+
     /// How the predictions of all runs change (each as [`Model::predict`] fills it) by a unit of a departure that is small and has the
     /// size `amounts[run][row]` in the law of each row: where rows are not alone, an effect in one shows in others. `None` (the
     /// default) where a row that departs is off by itself.

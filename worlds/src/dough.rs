@@ -175,9 +175,12 @@ impl DoughWorld {
             let response = self.response(step, roll.t_s, action, lying.length_m, strain_before);
             let mut after = lying.towards(&usual, response);
             strain_before = (after.length_m / lying.length_m).ln();
-            // Each dimension of what is left is smaller alike.
-            after.volume_m3 *= 1.0 - self.effects.loss;
-            after.length_m *= (1.0 - self.effects.loss).cbrt();
+            // Each dimension of what is left is smaller alike; what springs back is its strain, and not what was lost.
+            let mut unstrained = lying;
+            for dough in [&mut after, &mut unstrained] {
+                dough.volume_m3 *= 1.0 - self.effects.loss;
+                dough.length_m *= (1.0 - self.effects.loss).cbrt();
+            }
             made.push(Made {
                 before: lying.dimensions_m(),
                 action,
@@ -185,7 +188,7 @@ impl DoughWorld {
                 usual: usual.dimensions_m(),
                 t_s: roll.t_s,
             });
-            lying = after.towards(&lying, self.effects.springback);
+            lying = after.towards(&unstrained, self.effects.springback);
         }
         made
     }
@@ -331,6 +334,13 @@ mod tests {
         let sticks = &world(Effects { loss: 0.02, ..none }).rolled()[0];
         for m in sticks {
             approx::assert_relative_eq!(volume(&m.after) / volume(&m.usual), 0.98, max_relative = 1e-9);
+        }
+        // What is lost without a strain does not spring back.
+        let idle = Effects { loss: 0.02, slip_n: 1e3, springback: 0.4, ..none };
+        for pair in world(idle).rolled()[0].windows(2) {
+            for k in 0..3 {
+                approx::assert_relative_eq!(pair[1].before[k], pair[0].after[k], max_relative = 1e-9);
+            }
         }
     }
 

@@ -4,6 +4,7 @@
 //! the dynamics ties them over all doughs; they are taken apart by its covariance first.
 
 mod experiments;
+mod forces;
 mod model;
 mod read;
 mod spec;

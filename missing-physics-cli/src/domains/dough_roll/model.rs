@@ -1,11 +1,11 @@
 //! The full model of a rolled dough: learned dynamics, and what may have become of the response since.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::{Dynamics, Roll};
-use dough_mbrl::filter::{Fresh, Step as Followed, follow};
+use dough_mbrl::filter::{Beside, Fresh, Step as Followed, follow};
 use dough_mbrl::repair::answered;
 use dough_mbrl::sensitivity::{PER_ROLL, surprise, white};
 use dough_mbrl::tie::Tie;
@@ -13,6 +13,7 @@ use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
 use nalgebra::{DVector, Vector3};
 
+use super::forces::Forces;
 use super::read::{RunOfRolls, Step};
 use super::spec::{Effects, Places, build};
 
@@ -38,12 +39,17 @@ struct Dough {
 type Errors = Mutex<HashMap<(usize, Vec<u64>), Arc<DVector<f64>>>>;
 /// Errors that are kept.
 const MOST_KEPT: usize = 256;
+/// Forces below which a band may slip that are looked at, and those from which a fit begins.
+const MOST_SLIPS: usize = 200;
+const STARTS: usize = 5;
 
 /// The model of the domain `dough-roll`.
 #[derive(Debug)]
 pub(super) struct DoughModel {
     band: Band,
     dynamics: Dynamics,
+    /// Of the recording's rolls.
+    forces: Forces,
     spec: Spec,
     places: Places,
     blocks: Vec<Block>,
@@ -52,6 +58,7 @@ pub(super) struct DoughModel {
     /// Block and dough of each run.
     runs: HashMap<String, (usize, usize)>,
     kept: Errors,
+    slips: OnceLock<Vec<(f64, DVector<f64>)>>,
     /// Typical sigma of each channel: errors are shown in metres.
     scale: [f64; 6],
 }
@@ -60,13 +67,10 @@ pub(super) struct DoughModel {
 pub(super) const CHANNELS: [&str; 6] =
     ["next_length_m", "next_width_m", "next_height_m", "length_m", "width_m", "height_m"];
 
-/// The force among a run's inputs.
-const FORCE: usize = 5;
-
 impl DoughModel {
     pub(super) fn new(band: Band, dynamics: Dynamics, timed: bool, steps: &[Step]) -> Self {
-        let strongest =
-            steps.iter().map(|s| band.force_n(s.roll.action[0], s.roll.action[1])).fold(0.0, f64::max);
+        let forces = Forces::of(steps.iter().map(|s| band.force_n(s.roll.action[0], s.roll.action[1])));
+        let strongest = forces.rising().last().copied().unwrap_or_default();
         let longest = steps.iter().map(|s| s.t_s).fold(0.0, f64::max);
         let last = steps.iter().map(|s| s.step).fold(1.0, f64::max);
         let (spec, places) = build(timed.then_some(longest.max(1.0)), strongest.max(1e-9), last);
@@ -74,8 +78,8 @@ impl DoughModel {
         let scale = std::array::from_fn(|c| {
             (noise.measured[usize::from(c < 3)][c % 3] + noise.process[c % 3]).sqrt()
         });
-        let (blocks, runs, kept) = (Vec::new(), HashMap::new(), Mutex::default());
-        Self { band, dynamics, spec, places, blocks, shown: None, runs, kept, scale }
+        let (blocks, runs, kept, slips) = (Vec::new(), HashMap::new(), Mutex::default(), OnceLock::new());
+        Self { band, dynamics, forces, spec, places, blocks, shown: None, runs, kept, slips, scale }
     }
 
     /// Adds runs whose errors are tied, and says what the engine is to see of them.
@@ -134,18 +138,19 @@ impl DoughModel {
         effects: &Effects,
         larger: &dyn Fn(usize) -> f64,
     ) -> Vec<Followed> {
-        let left = (1.0 - effects.volume_loss).max(0.0).cbrt();
-        follow(&dough.rolls, fresh, self.dynamics.noise(), effects.springback, |i, x| {
+        let beside = Beside { undone: effects.springback, left: (1.0 - effects.volume_loss).max(0.0).cbrt() };
+        follow(&dough.rolls, fresh, self.dynamics.noise(), beside, |i, x| {
             let response = (1.0 + larger(i)) * self.response(dough, i, effects, x[0]);
             let learned = x + self.dynamics.change(x, &dough.steps[i].roll.action);
-            left * Vector3::from(answered(&(*x).into(), &learned.into(), response))
+            Vector3::from(answered(&(*x).into(), &learned.into(), response))
         })
     }
 
     /// What of the learned response of a roll takes place.
     fn response(&self, dough: &Dough, roll: usize, effects: &Effects, length_m: f64) -> f64 {
         let step = &dough.steps[roll];
-        effects.response(step.step, step.t_s, self.force_n(step), step.roll.action[0], length_m)
+        let grip = self.forces.grip(self.force_n(step), effects.slip_n);
+        grip * effects.response(step.step, step.t_s, step.roll.action[0], length_m)
     }
 
     fn force_n(&self, step: &Step) -> f64 {
@@ -170,6 +175,38 @@ impl DoughModel {
             errors.rows_mut(dough.first, own.len()).copy_from(&own);
         }
         block.tie.untie(&errors)
+    }
+
+    /// What slips change, by the force below which the band slips: halfway between the forces of two rolls.
+    fn slips(&self) -> &[(f64, DVector<f64>)] {
+        self.slips.get_or_init(|| {
+            let (Some(block), forces) = (self.blocks.first(), self.forces.rising()) else {
+                return Vec::new();
+            };
+            let every = forces.len().div_ceil(MOST_SLIPS).max(1);
+            let halfway = forces.windows(2).step_by(every).map(|w| 0.5 * (w[0] + w[1]));
+            let change = |slip_n| {
+                let slips = Effects { slip_n, ..Effects::OFF };
+                (slip_n, &block.off - self.errors(block, &slips))
+            };
+            halfway.map(change).collect()
+        })
+    }
+
+    /// What a change of the recording's errors leaves of a residual, as a sum of squares.
+    fn misses(&self, runs: &[Run], residual: &[Vec<Vec<f64>>], change: &DVector<f64>) -> f64 {
+        let mut sum = 0.0;
+        for (run, residual) in runs.iter().zip(residual) {
+            let Ok((0, dough)) = self.place(run) else { continue };
+            let first = self.blocks[0].doughs[dough].first;
+            for (channel, rows) in residual.iter().enumerate() {
+                for (roll, left) in rows.iter().enumerate().filter(|(_, left)| left.is_finite()) {
+                    let changed = change[first + PER_ROLL * roll + channel];
+                    sum += (left / self.scale[channel] - changed).powi(2);
+                }
+            }
+        }
+        sum
     }
 
     /// Block and dough of a run.
@@ -253,18 +290,25 @@ impl Model for DoughModel {
         Ok(())
     }
 
-    /// Forces below which the band may slip, evenly through those of the rolls: between two of them there is no slope to follow.
-    fn starts(&self, mechanism: usize, runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        const STARTS: usize = 12;
+    /// Forces below which the band may slip: between two of those of the rolls there is no slope to follow, so that all are looked at.
+    fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let slip = self.places.slip.index;
         if self.spec.mechanisms[mechanism].parameters != [slip] {
             return Vec::new();
         }
-        let mut forces: Vec<f64> = runs.iter().flat_map(|run| run.inputs[FORCE].clone()).collect();
-        forces.sort_by(f64::total_cmp);
-        forces.dedup();
-        let last = forces.len().saturating_sub(1);
-        (1..=STARTS).filter_map(|k| Some(vec![(slip, *forces.get(k * last / (STARTS + 1))?)])).collect()
+        let misses: Vec<(f64, f64)> =
+            self.slips().iter().map(|(force_n, off)| (*force_n, self.misses(runs, residual, off))).collect();
+        let least = |&at: &usize| {
+            let near = &misses[at.saturating_sub(1)..(at + 2).min(misses.len())];
+            near.iter().all(|other| misses[at].1 <= other.1)
+        };
+        let mut tops: Vec<usize> = (0..misses.len()).filter(least).collect();
+        tops.sort_by(|&a, &b| misses[a].1.total_cmp(&misses[b].1));
+        tops.iter().take(STARTS).map(|&at| vec![(slip, misses[at].0)]).collect()
+    }
+
+    fn jumps(&self, shared_slot: usize) -> &[f64] {
+        if shared_slot == self.places.slip.slot { self.forces.rising() } else { &[] }
     }
 
     /// The response of each roll: what follows from that is measured in all rolls that what was learned ties to it.

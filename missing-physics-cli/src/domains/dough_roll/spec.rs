@@ -10,8 +10,6 @@ pub(super) struct Effects {
     pub(super) factor: f64,
     pub(super) drying_per_s: f64,
     pub(super) slip_n: f64,
-    /// Over which force the response sets in, N.
-    pub(super) onset_n: f64,
     pub(super) springback: f64,
     pub(super) volume_loss: f64,
     pub(super) softening_per_roll: f64,
@@ -27,7 +25,6 @@ impl Effects {
         factor: 1.0,
         drying_per_s: 0.0,
         slip_n: 0.0,
-        onset_n: 1.0,
         springback: 0.0,
         volume_loss: 0.0,
         softening_per_roll: 0.0,
@@ -36,17 +33,12 @@ impl Effects {
         length: 0.0,
     };
 
-    /// By how much the response is larger than the learned one.
-    pub(super) fn response(&self, step: f64, t_s: f64, force_n: f64, throw_m: f64, length_m: f64) -> f64 {
+    /// By how much the response of a roll that grips is larger than the learned one.
+    pub(super) fn response(&self, step: f64, t_s: f64, throw_m: f64, length_m: f64) -> f64 {
         let faded = (-self.drying_per_s * t_s - self.softening_per_roll * (step - 1.0)).exp();
         let even = if (step.round() as i64) % 2 == 0 { 1.0 } else { -1.0 };
         let law = 1.0 + self.parity * even + self.throw * (throw_m - 0.08) + self.length * (length_m - 0.06);
-        self.factor * faded * self.grips(force_n) * law
-    }
-
-    /// What of the band grips at a force.
-    fn grips(&self, force_n: f64) -> f64 {
-        if self.slip_n > 0.0 { 1.0 / (1.0 + (-(force_n - self.slip_n) / self.onset_n).exp()) } else { 1.0 }
+        self.factor * faded * law
     }
 }
 
@@ -57,7 +49,6 @@ pub(super) struct Places {
     drying: Option<At>,
     /// The force below which the band slips.
     pub(super) slip: At,
-    onset_n: f64,
     springback: At,
     loss: At,
     softening: At,
@@ -72,7 +63,6 @@ impl Places {
             factor: shared[self.factor.slot],
             drying_per_s: self.drying.map_or(0.0, |at| shared[at.slot]),
             slip_n: shared[self.slip.slot],
-            onset_n: self.onset_n,
             springback: shared[self.springback.slot],
             volume_loss: shared[self.loss.slot],
             softening_per_roll: shared[self.softening.slot],
@@ -83,13 +73,10 @@ impl Places {
     }
 }
 
-/// Over how wide a range of forces a band begins to grip, of the strongest: as good as none, and still a slope to follow.
-const ONSET: f64 = 0.001;
-
 /// The specification; `longest_s` where times were recorded, the strongest roll's force, the last step of a run.
 pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spec, Places) {
     let mut b = Builder::default();
-    let mut p = Places { onset_n: ONSET * strongest_n, ..Places::default() };
+    let mut p = Places::default();
     b.spec.baseline = "the dynamics learned from the training rolls, as uncertain as they leave them".into();
     p.factor = b.shared("factor", "", 1.0, [0.0, 20.0], 0.05);
     b.mechanism(
@@ -136,7 +123,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
         &[p.springback],
         [
             "springback",
-            "The dough undoes a part of each change before the next roll.",
+            "The dough undoes a part of each change before the next roll; dough that was lost does not come back.",
             "length at the next roll = next_length - fraction (next_length - length)",
             "Charalambides et al. 2002, doi:10.1007/s00397-002-0242-2 (elastic recovery of dough)",
         ],
