@@ -45,7 +45,7 @@ pub(super) struct Contact;
 impl Rig for Contact {
     type Hidden = Hidden;
     type Action = Press;
-    const NAME: &'static str = "contact";
+    const NAME: &'static str = "a soft body pressed";
     const COLUMNS: &'static str = "run,delta_m,force_n,t_s,segment";
 
     fn header() -> String {

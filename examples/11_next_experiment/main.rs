@@ -1,5 +1,5 @@
-//! A robot does what the tool proposes: something is hidden about a bottle, or about a soft body; the rig tilts or presses until the
-//! tool is sure what it is, against random actions and an even grid of them.
+//! A robot does what the tool proposes: something is hidden about a bottle, or about a soft body; the rig swings, tilts or presses until
+//! the tool is sure what it is, against random actions and an even grid of them.
 //!
 //! `cargo run --release -p examples --example 11_next_experiment` (50 worlds a rig; `--small`: 1, of two experiments at most)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
@@ -193,9 +193,12 @@ fn race<R: Rig>(worlds: u64) -> Outcome<[Vec<usize>; 3]> {
     Ok(table)
 }
 
+fn mean(counts: &[usize]) -> f64 {
+    counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64
+}
+
 /// Mean, median, most, and how many were never sure, of each policy; its mean over that of random actions.
 fn show(table: &[Vec<usize>; 3]) {
-    let mean = |counts: &[usize]| counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
     println!(
         "  {:10} {:>6} {:>8} {:>6} {:>6} {:>16}",
         "policy", "mean", "median", "most", "never", "over random's"
@@ -211,18 +214,35 @@ fn show(table: &[Vec<usize>; 3]) {
     }
 }
 
+/// One line of the summary: worlds, and mean experiments of each policy.
+fn sum_up(name: &str, table: &[Vec<usize>; 3]) {
+    let [proposed, random, grid] = table.each_ref().map(|counts| mean(counts));
+    let share = proposed / random;
+    println!("{name:22} {:6} {proposed:12.2} {random:15.2} {grid:10.2} {share:14.2}", table[0].len());
+}
+
 fn main() -> Outcome<()> {
     let worlds = if examples::small() { 1 } else { 50 };
     println!("Experiments beyond the first until P(what is hidden) >= {SURE}\n");
-    let rigs = [race::<swung::Swung>, race::<tilted::Tilted>, race::<contact::Contact>];
-    let mut all = [const { Vec::new() }; 3];
-    for rig in rigs {
-        for (all, one) in all.iter_mut().zip(rig(worlds)?) {
-            all.extend(one);
-        }
+    let rigs = [
+        (swung::Swung::NAME, race::<swung::Swung> as fn(u64) -> Outcome<[Vec<usize>; 3]>),
+        (tilted::Tilted::NAME, race::<tilted::Tilted>),
+        (contact::Contact::NAME, race::<contact::Contact>),
+    ];
+    let mut tables = Vec::new();
+    for (name, race) in rigs {
+        tables.push((name, race(worlds)?));
         println!();
     }
-    println!("all rigs");
-    show(&all);
+    println!(
+        "{:22} {:>6} {:>12} {:>15} {:>10} {:>14}",
+        "", "worlds", "experiments", "random actions", "even grid", "over random's"
+    );
+    let mut all = [const { Vec::new() }; 3];
+    for (name, table) in tables {
+        sum_up(name, &table);
+        all.iter_mut().zip(table).for_each(|(all, one)| all.extend(one));
+    }
+    sum_up("all", &all);
     Ok(())
 }

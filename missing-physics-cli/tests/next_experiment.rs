@@ -10,6 +10,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 use worlds::press::{Effects, Indenter, PressWorld, Step};
+use worlds::wave::{Start, WaveWorld};
 
 /// Curves of a ball on a soft body, each from a depth to another.
 fn ask(effects: Effects, curves: &[[f64; 2]], seed: u64) -> Diagnosis {
@@ -58,4 +59,44 @@ fn an_offset_that_looks_like_adhesion_is_looked_for_above_the_contact() {
     assert!(from < 0.0 && to > 0.0, "{}", next.words);
     let curves = [first, [[from, to]; 3]].concat();
     assert_eq!(ask(effects, &curves, seed).chosen, ["force-offset"]);
+}
+
+/// What is proposed of a wave says how high it is to begin, in the reading's unit, and how long it is to be recorded.
+#[test]
+fn a_proposed_swing_says_how_high_and_how_long() {
+    let (radius_m, volume_m3, mass_kg) = (0.04, 4e-4, 0.4);
+    let world = WaveWorld {
+        radius_m,
+        mass_kg,
+        volume_m3,
+        viscosity_m2_s: 1e-6,
+        starts: vec![Start::wave(0.02, 0.5)],
+        rows: 121,
+        rate_hz: 40.0,
+        effects: worlds::wave::Effects::default(),
+    };
+    let mut data = "run,t_s,tau_z_nm\n".to_owned();
+    for (row, torque_nm) in world.readings().iter().enumerate() {
+        writeln!(data, "1,{:.4},{torque_nm:.7}", row as f64 / world.rate_hz).unwrap();
+    }
+    let header = format!(
+        "format = 1\ndomain = \"slosh\"\ndata = \"data.csv\"\n\n[rig]\ncontainer = {{ shape = \"cylinder\", \
+         radius_m = {radius_m} }}\nliquid_mass_kg = {mass_kg}\nvolume_m3 = {volume_m3}\n"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).unwrap();
+    let mut heights = Vec::new();
+    for experiment in &loaded.experiments {
+        let value = |name: &str| experiment.action.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+        let (Some(height), Some(duration)) = (value("amplitude_nm"), value("duration_s")) else { continue };
+        heights.push(height);
+        assert_eq!(experiment.own[0].iter().copied().fold(0.0, f64::max), height);
+        let last = experiment.runs[0].inputs[0].last().unwrap();
+        assert!((last - duration).abs() < 1.5 / world.rate_hz, "{last} s, and not {duration} s");
+    }
+    for share in [0.25, 4.0] {
+        assert!(heights.iter().any(|h| (h / (share * 0.02) - 1.0).abs() < 0.02), "{heights:?}");
+    }
 }
