@@ -23,7 +23,7 @@ const LOG_PROCESS: [f64; 2] = [-7.0, 4.0];
 const LOG_SCATTER: [f64; 2] = [-11.6, -2.4];
 
 /// A roll keeps the volume of a dough of any size: relative changes of its dimensions come to no more than this part of one of them.
-const LOST: f64 = 0.2;
+const LOST: f64 = 0.07;
 
 /// What was learned.
 #[derive(Debug, Clone)]

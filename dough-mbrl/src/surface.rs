@@ -16,6 +16,9 @@ const REMAINDER: u8 = 4;
 const LEAST_M: f64 = 1e-4;
 /// Where the size is among the variables.
 const SIZE: usize = 2;
+/// A ratio of sizes may do so many times what the same ratio of lengths does: pressure goes as one over the square of a length, and flow
+/// faster than in proportion to pressure.
+const SIZE_MORE: f64 = 3.0;
 
 /// Shape and size of a dough, all logarithms of lengths.
 #[derive(Debug, Clone, Copy)]
@@ -155,5 +158,8 @@ fn weights(features: &Polynomial, rows: &[Vec<f64>]) -> DVector<f64> {
         row[SIZE] = features.one_off(SIZE);
         squares.iter_mut().zip(features.terms(&row)).for_each(|(s, term)| *s += term * term);
     }
-    squares.map(|s| if s > 0.0 { (rows.len() as f64 / s).sqrt() } else { 1.0 })
+    let more = |term: usize| if features.power(term, SIZE) > 0 { SIZE_MORE } else { 1.0 };
+    let weight =
+        |(term, s): (usize, &f64)| if *s > 0.0 { more(term) * (rows.len() as f64 / s).sqrt() } else { 1.0 };
+    DVector::from_iterator(squares.len(), squares.iter().enumerate().map(weight))
 }
