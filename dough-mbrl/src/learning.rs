@@ -22,9 +22,6 @@ const LOG_PROCESS: [f64; 2] = [-7.0, 4.0];
 /// Logarithm of the variance of the part by which a roll does more or less: 0.3 to 30 %.
 const LOG_SCATTER: [f64; 2] = [-11.6, -2.4];
 
-/// A roll keeps the volume of a dough of any size: relative changes of its dimensions come to no more than this part of one of them.
-const LOST: f64 = 0.07;
-
 /// What was learned.
 #[derive(Debug, Clone)]
 pub(crate) struct Learned {
@@ -168,15 +165,6 @@ impl Learning<'_> {
             for k in 0..3 {
                 for j in range.clone() {
                     normal[(k * p + j, k * p + j)] += 1.0 / variances[k];
-                }
-            }
-        }
-        let (of_size, relative) = self.surface.of_size();
-        for (range, variances) in degrees.iter().zip(&self.remainder) {
-            let mean = relative.component_mul(&relative).dot(variances) / 3.0;
-            for j in of_size.iter().filter(|j| range.contains(j)) {
-                for (k, l) in (0..3).flat_map(|k| (0..3).map(move |l| (k, l))) {
-                    normal[(k * p + j, l * p + j)] += relative[k] * relative[l] / (LOST * LOST * mean);
                 }
             }
         }

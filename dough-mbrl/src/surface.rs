@@ -16,9 +16,6 @@ const REMAINDER: u8 = 4;
 const LEAST_M: f64 = 1e-4;
 /// Where the size is among the variables.
 const SIZE: usize = 2;
-/// A ratio of sizes may do so many times what the same ratio of lengths does: pressure goes as one over the square of a length, and flow
-/// faster than in proportion to pressure.
-const SIZE_MORE: f64 = 3.0;
 
 /// Shape and size of a dough, all logarithms of lengths.
 #[derive(Debug, Clone, Copy)]
@@ -119,12 +116,6 @@ impl Surface {
         (0..REMAINDER).map(|d| self.features.up_to(d)..self.features.up_to(d + 1)).collect()
     }
 
-    /// Terms in which the size is, and what a unit of a coefficient of each dimension is as a relative change.
-    pub(crate) fn of_size(&self) -> (Vec<usize>, Vector3<f64>) {
-        let terms = (0..self.features.len()).filter(|&term| self.features.power(term, SIZE) > 0).collect();
-        (terms, self.mean_m.map(|m| 1.0 / m))
-    }
-
     /// All coefficients, one dimension after the other.
     pub(crate) fn flat(&self) -> DVector<f64> {
         DVector::from_column_slice(self.coefficients.as_slice())
@@ -158,8 +149,5 @@ fn weights(features: &Polynomial, rows: &[Vec<f64>]) -> DVector<f64> {
         row[SIZE] = features.one_off(SIZE);
         squares.iter_mut().zip(features.terms(&row)).for_each(|(s, term)| *s += term * term);
     }
-    let more = |term: usize| if features.power(term, SIZE) > 0 { SIZE_MORE } else { 1.0 };
-    let weight =
-        |(term, s): (usize, &f64)| if *s > 0.0 { more(term) * (rows.len() as f64 / s).sqrt() } else { 1.0 };
-    DVector::from_iterator(squares.len(), squares.iter().enumerate().map(weight))
+    squares.map(|s| if s > 0.0 { (rows.len() as f64 / s).sqrt() } else { 1.0 })
 }

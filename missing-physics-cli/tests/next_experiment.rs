@@ -6,11 +6,19 @@ use std::fmt::Write as _;
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
+use missing_physics_cli::domains::Loaded;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 use worlds::press::{Effects, Indenter, PressWorld, Step};
 use worlds::wave::{Start, WaveWorld};
+
+fn load(header: &str, data: &str) -> Loaded {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    missing_physics_cli::domains::load(folder.path()).unwrap().1
+}
 
 /// Curves of a ball on a soft body, each from a depth to another.
 fn ask(effects: Effects, curves: &[[f64; 2]], seed: u64) -> Diagnosis {
@@ -34,12 +42,9 @@ fn ask(effects: Effects, curves: &[[f64; 2]], seed: u64) -> Diagnosis {
         let force = force + noise.sample(&mut rng);
         writeln!(data, "{run},{:.7},{force:.6},{:.4},load", step.delta_m, step.t_s).unwrap();
     }
-    let folder = tempfile::tempdir().unwrap();
     let header = "format = 1\ndomain = \"indentation\"\ndata = \"data.csv\"\n\n[rig]\n\
                   indenter = { shape = \"sphere\", radius_m = 0.01 }\npoisson_ratio = 0.5\n";
-    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
-    std::fs::write(folder.path().join("data.csv"), data).unwrap();
-    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).unwrap();
+    let loaded = load(header, &data);
     let options = Options { replicates: 199, ..Options::default() };
     diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent).unwrap()
 }
@@ -83,10 +88,7 @@ fn a_proposed_swing_says_how_high_and_how_long() {
         "format = 1\ndomain = \"slosh\"\ndata = \"data.csv\"\n\n[rig]\ncontainer = {{ shape = \"cylinder\", \
          radius_m = {radius_m} }}\nliquid_mass_kg = {mass_kg}\nvolume_m3 = {volume_m3}\n"
     );
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
-    std::fs::write(folder.path().join("data.csv"), data).unwrap();
-    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).unwrap();
+    let loaded = load(&header, &data);
     let mut heights = Vec::new();
     for experiment in &loaded.experiments {
         let value = |name: &str| experiment.action.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
