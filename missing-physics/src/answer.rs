@@ -225,10 +225,11 @@ impl Answer<'_> {
 
     /// The leading sets, likeliest first.
     pub(crate) fn sets(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<SetReport> {
+        let tested = |b: &Best| [Some((b.at, b.p_value)), b.doubted].into_iter().flatten();
         let set = |(c, probability): (&Candidate, f64)| SetReport {
             ids: self.ids(&c.set),
             probability,
-            p_value: best.filter(|b| ranking.at(b.at).set == c.set).map(|b| b.p_value),
+            p_value: best.and_then(|b| tested(b).find(|&(at, _)| ranking.at(at).set == c.set)).map(|t| t.1),
             heldout_log_score_gain: ranking.gain(&c.set),
             ruled_out: None,
         };

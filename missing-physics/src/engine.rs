@@ -15,7 +15,7 @@ use crate::noise_rule::noise_rule;
 use crate::observer::{Observer, Progress};
 use crate::outliers::set_aside;
 use crate::problem::Problem;
-use crate::ranking::{Best, Ranking};
+use crate::ranking::{Best, Ranking, clearly};
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -199,8 +199,8 @@ impl Course<'_> {
         let best = ranking.best(self.options.alpha, |c, stream| self.test(c, stream))?;
         self.tell("predicting unseen data", 0.0)?;
         ranking.score(problem, best.as_ref());
-        // The chosen set has been selected to fit: only a clear failure (a fifth of alpha) speaks against it.
-        let fails = |best: &Best| best.p_value <= self.options.alpha / 5.0;
+        // The chosen set has been selected to fit: only a clear failure speaks against it.
+        let fails = |best: &Best| best.p_value <= clearly(self.options.alpha);
         let explained = best.as_ref().filter(|b| !fails(b) && ranking.gains(b.at));
 
         let ended_with = explained.map_or(baseline, |b| ranking.at(b.at));
@@ -215,7 +215,7 @@ impl Course<'_> {
         diagnosis.location = locate(problem, &baseline.selection, &self.plain.fit, &sigma)?;
         if let Some(chosen) = explained {
             diagnosis.final_p_value = Some(chosen.p_value);
-            self.explained(&mut diagnosis, &answer, &ranking, chosen.at)?;
+            self.explained(&mut diagnosis, &answer, &ranking, chosen)?;
         } else {
             if let Some(closest) = &best {
                 diagnosis.remarks.push(answer.closest(&ranking, closest, fails(closest)));
@@ -250,10 +250,10 @@ impl Course<'_> {
         diagnosis: &mut Diagnosis,
         answer: &Answer<'_>,
         ranking: &Ranking,
-        at: usize,
+        best: &Best,
     ) -> Result<(), DiagnoseError> {
         let problem = &self.begun.problem;
-        let chosen = ranking.at(at);
+        let chosen = ranking.at(best.at);
         diagnosis.chosen = answer.ids(&chosen.set);
         let after = law::predictions(problem, &chosen.fit)?;
         if let Some(score) = ranking.score_of(&chosen.set) {
@@ -262,7 +262,7 @@ impl Course<'_> {
         draw(diagnosis, &after);
         diagnosis.undetermined.extend(answer.open_numbers(chosen));
         self.tell("telling the rivals apart", 0.0)?;
-        let rivals = ranking.rivals(chosen);
+        let rivals = ranking.rivals(best);
         if rivals.len() == 1 {
             diagnosis.verdict = Verdict::Explained;
             return Ok(());
@@ -276,6 +276,12 @@ impl Course<'_> {
         diagnosis.next_experiment = experiment::best(problem, &rivals, self.experiments);
         let names: Vec<String> = rivals.iter().map(|c| answer.names(&c.set)).collect();
         diagnosis.undetermined.push(format!("{} cannot be told apart in these data", listed(&names)));
+        if let Some((simpler, p_value)) = best.doubted {
+            let names = answer.names(&ranking.at(simpler).set);
+            diagnosis
+                .undetermined
+                .push(format!("{names} alone is hardly less likely and fits doubtfully (p = {p_value})"));
+        }
         if diagnosis.next_experiment.is_none() {
             diagnosis.undetermined.push("no experiment in the rig's range would separate them".into());
         }

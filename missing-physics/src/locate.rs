@@ -18,6 +18,11 @@ const EARLIER: f64 = 1.2;
 /// An interval may hold a smooth departure of so many coefficients (a parabola along the variable).
 const SMOOTH: usize = 3;
 
+/// What `rows` pay for a variance at which they miss by `missed`, a sum of squares: twice the likelihood that the logarithm costs.
+fn larger_variance(rows: f64, missed: f64) -> f64 {
+    rows * (missed / rows).max(std::f64::consts::E).ln()
+}
+
 /// What one run's rows of a channel say, whitened as white noise: Gram matrices of own and shared columns, of the departure's, and of
 /// the residual.
 struct Normals {
@@ -91,14 +96,15 @@ impl Scan {
     }
 
     /// An interval holds the misfit if the baseline is right without its rows, or right up to a smooth departure there. Freed rows
-    /// have to miss by more than noise does twice over; a departure's coefficients pay as in Schwarz's criterion.
+    /// pay what a larger variance of theirs costs, and at least what noise misses by twice over; a departure's coefficients pay as in
+    /// Schwarz's criterion.
     fn judge(&self, bins: (usize, usize)) -> Option<Interval> {
         let dropped: f64 = self.rows[bins.0..bins.1].iter().sum();
         if dropped < 1.0 {
             return None;
         }
         let gain = self.whole - self.outside(bins).0 - dropped;
-        let freed = Interval { worth: gain - dropped, gain, bins };
+        let freed = Interval { worth: gain - larger_variance(dropped, gain + dropped), gain, bins };
         let gain = self.whole - self.departing(bins);
         let price = SMOOTH as f64 * self.rows.iter().sum::<f64>().ln();
         let smooth = Interval { worth: gain - price, gain: gain - SMOOTH as f64, bins };

@@ -33,6 +33,15 @@ pub(crate) struct Best {
     pub(crate) p_value: f64,
     /// What the likeliest set fails in first, if it does.
     pub(crate) failing: String,
+    /// A simpler set that is hardly less likely, doubted but not clearly rejected: where it stands, and its p value.
+    pub(crate) doubted: Option<(usize, f64)>,
+    /// Sets that are as likely but clearly rejected: where they stand.
+    pub(crate) rejected: Vec<usize>,
+}
+
+/// At or below this p value a set that has been selected to fit is clearly rejected: a fifth of the level for the baseline.
+pub(crate) fn clearly(alpha: f64) -> f64 {
+    alpha / 5.0
 }
 
 impl Ranking {
@@ -71,8 +80,9 @@ impl Ranking {
         self.scores.get(at)?.as_ref()
     }
 
-    /// The likeliest set, or a simpler one that is adequate and hardly less likely. The baseline has been rejected: it is no
-    /// candidate any more, however cheap it is. `test` takes a candidate and the number of a random stream.
+    /// The likeliest set, or a simpler one that is adequate and hardly less likely. Where the likeliest is clearly rejected, one that
+    /// is adequate and hardly less likely takes its place. The baseline has been rejected: it is no candidate any more, however cheap
+    /// it is. `test` takes a candidate and the number of a random stream.
     pub(crate) fn best(
         &self,
         alpha: f64,
@@ -84,14 +94,31 @@ impl Ranking {
         let tested = test(&self.all[first], 2)?;
         let failing = tested.tests.first().map_or_else(String::new, |t| t.name.clone());
         let (mut at, mut p_value) = (first, tested.p_value);
-        while let Some(&simpler) = standing.iter().find(|&&i| self.simpler(i, at)) {
+        let mut rejected = Vec::new();
+        if p_value <= clearly(alpha) {
+            let near = |i: &&usize| self.all[**i].evidence > self.all[first].evidence - RIVAL_GAP;
+            for &other in standing[1..].iter().take_while(near).take(MOST_RIVALS - 1) {
+                let p = test(&self.all[other], 4)?.p_value;
+                if p > alpha {
+                    (at, p_value) = (other, p);
+                    rejected.push(first);
+                    break;
+                }
+                if p <= clearly(alpha) {
+                    rejected.push(other);
+                }
+            }
+        }
+        let mut doubted = None;
+        while let Some(&simpler) = standing.iter().find(|&&i| self.simpler(i, at) && !rejected.contains(&i)) {
             let p = test(&self.all[simpler], 3)?.p_value;
             if p <= alpha && p < p_value {
+                doubted = (p > clearly(alpha)).then_some((simpler, p));
                 break;
             }
             (at, p_value) = (simpler, p);
         }
-        Ok(Some(Best { at, p_value, failing }))
+        Ok(Some(Best { at, p_value, failing, doubted, rejected }))
     }
 
     /// Is one a part of the other with fewer unknowns, and hardly less likely?
@@ -128,8 +155,9 @@ impl Ranking {
             || likelier && self.gain(set).is_some_and(|gain| gain > 0.0)
     }
 
-    /// The chosen set and those that explain as well and are no more, and no less, of the same.
-    pub(crate) fn rivals<'a>(&'a self, chosen: &'a Candidate) -> Vec<&'a Candidate> {
+    /// The chosen set, a simpler one that is only doubted, and those that explain as well and are no more, and no less, of the same.
+    pub(crate) fn rivals(&self, best: &Best) -> Vec<&Candidate> {
+        let chosen = self.at(best.at);
         let as_well = |c: &&Candidate| {
             c.set != chosen.set
                 && !c.set.is_empty()
@@ -137,12 +165,15 @@ impl Ranking {
                 && !nested(chosen, c)
                 && !nested(c, chosen)
         };
-        let all: Vec<&Candidate> =
-            std::iter::once(chosen).chain(self.physical().map(|p| p.0).filter(as_well)).collect();
+        let standing = self.physical.iter().filter(|p| !best.rejected.contains(&p.0)).map(|p| &self.all[p.0]);
+        let all: Vec<&Candidate> = std::iter::once(chosen).chain(standing.filter(as_well)).collect();
         // One that only adds to another is no further answer.
         let adds = |c: &Candidate| {
             all.iter().any(|o| o.set != c.set && nested(o, c) && o.evidence > c.evidence - EARNED)
         };
-        all.iter().copied().filter(|c| !adds(c)).take(MOST_RIVALS).collect()
+        let mut rivals: Vec<&Candidate> = all.iter().copied().filter(|c| !adds(c)).collect();
+        rivals.splice(1..1, best.doubted.map(|(at, _)| self.at(at)));
+        rivals.truncate(MOST_RIVALS);
+        rivals
     }
 }

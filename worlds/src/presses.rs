@@ -169,7 +169,7 @@ impl SetUp for Press {
         let (what, place) = match which {
             0 => ("a dent that stays: the way back is another", None),
             1 => ("a ripple of the drive, periodic in depth", None),
-            _ => ("a membrane that slips at a depth", Some(self.deep())),
+            _ => ("a membrane that slips at a depth", Some(self.slipped())),
         };
         key.unlisted = Some(what.into());
         key.place = place;
@@ -271,6 +271,17 @@ impl Press {
 
     fn deep(&self) -> Place {
         Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
+    }
+
+    /// What has slipped stays so on the way back: then it is from a time on, not from a depth.
+    fn slipped(&self) -> Place {
+        let path = &self.world.runs[0].1;
+        let slips =
+            path.iter().find(|step| step.delta_m >= self.depth_m).filter(|_| path.iter().any(|s| !s.down));
+        slips.map_or_else(
+            || self.deep(),
+            |slips| Place { variable: "t_s".into(), from: slips.t_s, to: f64::INFINITY },
+        )
     }
 }
 
