@@ -18,9 +18,9 @@ const EARLIER: f64 = 1.2;
 /// An interval may hold a smooth departure of so many coefficients (a parabola along the variable).
 const SMOOTH: usize = 3;
 
-/// What `rows` pay for a variance at which they miss by `missed`, a sum of squares: twice the likelihood that the logarithm costs.
-fn larger_variance(rows: f64, missed: f64) -> f64 {
-    rows * (missed / rows).max(std::f64::consts::E).ln()
+/// What `rows` gain by a variance of their own, at which they miss by `missed`, a sum of squares: twice the log likelihood ratio.
+fn own_variance(rows: f64, missed: f64) -> f64 {
+    missed - rows - rows * (missed / rows).max(1.0).ln()
 }
 
 /// What one run's rows of a channel say, whitened as white noise: Gram matrices of own and shared columns, of the departure's, and of
@@ -95,19 +95,18 @@ impl Scan {
         best
     }
 
-    /// An interval holds the misfit if the baseline is right without its rows, or right up to a smooth departure there. Freed rows
-    /// pay what a larger variance of theirs costs, and at least what noise misses by twice over; a departure's coefficients pay as in
-    /// Schwarz's criterion.
+    /// An interval holds the misfit if the baseline is right without its rows, which then have a variance of their own, or right up to
+    /// a smooth departure there. The variance and the departure's coefficients pay as in Schwarz's criterion.
     fn judge(&self, bins: (usize, usize)) -> Option<Interval> {
         let dropped: f64 = self.rows[bins.0..bins.1].iter().sum();
         if dropped < 1.0 {
             return None;
         }
-        let gain = self.whole - self.outside(bins).0 - dropped;
-        let freed = Interval { worth: gain - larger_variance(dropped, gain + dropped), gain, bins };
+        let price = self.rows.iter().sum::<f64>().ln();
+        let missed = self.whole - self.outside(bins).0;
+        let freed = Interval { worth: own_variance(dropped, missed) - price, gain: missed - dropped, bins };
         let gain = self.whole - self.departing(bins);
-        let price = SMOOTH as f64 * self.rows.iter().sum::<f64>().ln();
-        let smooth = Interval { worth: gain - price, gain: gain - SMOOTH as f64, bins };
+        let smooth = Interval { worth: gain - SMOOTH as f64 * price, gain: gain - SMOOTH as f64, bins };
         Some(if smooth.worth > freed.worth { smooth } else { freed })
     }
 
