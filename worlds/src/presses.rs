@@ -330,6 +330,28 @@ mod tests {
     use super::*;
     use crate::set_up::tests::every_effect_shows;
 
+    /// An effect at a place moves the readings there and nowhere else.
+    #[test]
+    fn the_key_says_where_an_effect_acts() {
+        let mut ways_back = 0;
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let press = Press::drawn(seed % 2 == 0, false, false, &mut rng);
+            let rim = press.alone(3, press.bounds(3)[1]);
+            let slip = press.unlisted(2, 1.0, press.unlisted_bounds(2)[1]);
+            for (effects, place) in [(rim, press.deep()), (slip, press.slipped())] {
+                let in_time = place.variable == "t_s";
+                ways_back += u32::from(in_time);
+                let steps = press.world.runs.iter().flat_map(|(_, path)| path);
+                for (step, moved) in steps.zip(press.change(effects)) {
+                    let at = if in_time { step.t_s } else { step.delta_m };
+                    assert_eq!(moved != 0.0, at >= place.from && at <= place.to, "seed {seed}, {step:?}");
+                }
+            }
+        }
+        assert!(ways_back > 0);
+    }
+
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
         for seed in 0..3 {
