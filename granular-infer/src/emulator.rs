@@ -1,6 +1,6 @@
 //! What the statistics of a picture are on average, and how much they differ from pour to pour, learned from a campaign.
 //!
-//! The mean of each statistic is a polynomial of the fourth degree in friction, rolling friction, restitution and height, with
+//! The mean of each statistic is a polynomial of the fifth degree in friction, rolling friction, restitution and height, with
 //! terms of each effect beside those four and beside another effect; its coefficients are held back as far as pours that were
 //! left out are foretold best. Statistics that turn with the scene get terms that turn with the tilt. The variance is
 //! log-quadratic, and is that of pours left out; the correlation between statistics is the same everywhere.
@@ -72,6 +72,22 @@ impl Emulator {
     /// # Errors
     /// [`EmulatorError`].
     pub fn learn(ranges: &Ranges, samples: &[Sample]) -> Result<Self, EmulatorError> {
+        Self::learn_weighted(ranges, samples, |_| 1.0)
+    }
+
+    /// Learns from pictures of which each counts for so many; what counts for nothing (or for no finite number) is left aside. Means,
+    /// variances and correlations are best where pictures count for most.
+    ///
+    /// # Errors
+    /// [`EmulatorError`].
+    pub fn learn_weighted(
+        ranges: &Ranges,
+        samples: &[Sample],
+        count: impl Fn(&Sample) -> f64,
+    ) -> Result<Self, EmulatorError> {
+        let (samples, counts): (Vec<Sample>, Vec<f64>) =
+            samples.iter().map(|s| (s.clone(), count(s))).filter(|(_, c)| *c > 0.0 && c.is_finite()).unzip();
+        let (samples, counts) = (&samples[..], &counts[..]);
         let scaled: Vec<Scaled> =
             samples.iter().map(|s| Scaled::new(ranges, &s.conditions, s.blur_px2)).collect();
         let expected = scaled.first().map_or(1, |s| s.scalar().values.len());
@@ -83,14 +99,16 @@ impl Emulator {
         let firsts: Vec<usize> = (0..COUNT).filter(|k| !seconds(*k)).collect();
         let learned: Vec<Learned> = firsts
             .par_iter()
-            .map(|&k| learn(samples, &scaled, k..k + 1 + usize::from(seconds(k + 1))))
+            .map(|&k| learn(samples, counts, &scaled, k..k + 1 + usize::from(seconds(k + 1))))
             .collect();
         let parts = |l: &Learned| l.standard.len();
         let each = |of: fn(&Learned) -> &DVector<f64>| -> Vec<DVector<f64>> {
             learned.iter().flat_map(|l| std::iter::repeat_n(of(l).clone(), parts(l))).collect()
         };
         let columns: Vec<&Vec<f64>> = learned.iter().flat_map(|l| &l.standard).collect();
-        let standard = DMatrix::from_fn(samples.len(), COUNT, |i, k| columns[k][i]);
+        // An outlier counts as one of three sigmas.
+        let standard =
+            DMatrix::from_fn(samples.len(), COUNT, |i, k| counts[i].sqrt() * columns[k][i].clamp(-3.0, 3.0));
         Ok(Self {
             ranges: *ranges,
             mean: each(|l| &l.mean),
@@ -122,7 +140,7 @@ impl Emulator {
 }
 
 /// Mean and variance of the statistics `parts`, one alone or a pair.
-fn learn(samples: &[Sample], scaled: &[Scaled], parts: std::ops::Range<usize>) -> Learned {
+fn learn(samples: &[Sample], counts: &[f64], scaled: &[Scaled], parts: std::ops::Range<usize>) -> Learned {
     let n = samples.len();
     // Pictures of one pour are left out together.
     let mut group = vec![0; n];
@@ -139,7 +157,7 @@ fn learn(samples: &[Sample], scaled: &[Scaled], parts: std::ops::Range<usize>) -
     let all = parts.clone().flat_map(|k| samples.iter().map(move |s| s.statistics[k]));
     let values = DVector::from_iterator(terms.len(), all);
     let rows: Vec<DVector<f64>> = scaled.iter().map(|s| DVector::from_vec(s.spread())).collect();
-    let mut weights = DVector::from_element(values.len(), 1.0);
+    let mut weights = DVector::from_fn(values.len(), |i, _| counts[i % n]);
     let (mut mean, mut spread) = (DVector::zeros(0), DVector::zeros(0));
     let mut left = Vec::new();
     for _ in 0..ROUNDS {
@@ -148,11 +166,18 @@ fn learn(samples: &[Sample], scaled: &[Scaled], parts: std::ops::Range<usize>) -
         let squares: Vec<f64> = left.iter().map(|l| l * l).collect();
         let floor = 1e-6 * squares.iter().sum::<f64>() / squares.len() as f64 + 1e-300;
         let logs = squares.iter().map(|s| (s + floor).ln() - LOG_CHI2);
-        spread = least_squares(logs.enumerate().map(|(i, log)| (&rows[i % n], log)));
+        spread = least_squares(logs.enumerate().map(|(i, log)| (&rows[i % n], counts[i % n], log)));
         // Logs of squares are anything but normal: the level is set by the squares themselves.
-        let ratio = squares.iter().enumerate().map(|(i, s)| s / rows[i % n].dot(&spread).exp()).sum::<f64>();
-        spread[0] += (ratio / squares.len() as f64).max(1e-12).ln();
-        weights = DVector::from_fn(values.len(), |i, _| (spread[0] - rows[i % n].dot(&spread)).exp());
+        let ratio = squares
+            .iter()
+            .enumerate()
+            .map(|(i, s)| counts[i % n] * s / rows[i % n].dot(&spread).exp())
+            .sum::<f64>();
+        let all = parts.len() as f64 * counts.iter().sum::<f64>();
+        spread[0] += (ratio / all).max(1e-12).ln();
+        weights = DVector::from_fn(values.len(), |i, _| {
+            counts[i % n] * (spread[0] - rows[i % n].dot(&spread)).exp()
+        });
         weights /= weights.mean().max(1e-300);
     }
     let sigma = |i: usize| (0.5 * rows[i % n].dot(&spread)).exp();
@@ -162,23 +187,22 @@ fn learn(samples: &[Sample], scaled: &[Scaled], parts: std::ops::Range<usize>) -
 }
 
 /// Least squares with a faint pull towards zero.
-fn least_squares<'a>(rows: impl Iterator<Item = (&'a DVector<f64>, f64)>) -> DVector<f64> {
+fn least_squares<'a>(rows: impl Iterator<Item = (&'a DVector<f64>, f64, f64)>) -> DVector<f64> {
     let (mut normal, mut right) = (DMatrix::zeros(0, 0), DVector::zeros(0));
-    for (row, value) in rows {
+    for (row, weight, value) in rows {
         if right.is_empty() {
             (normal, right) = (DMatrix::identity(row.len(), row.len()) * RIDGE, DVector::zeros(row.len()));
         }
-        normal.ger(1.0, row, row, 1.0);
-        right.axpy(value, row, 1.0);
+        normal.ger(weight, row, row, 1.0);
+        right.axpy(weight * value, row, 1.0);
     }
     let zero = DVector::zeros(right.len());
     normal.cholesky().map_or(zero, |c| c.solve(&right))
 }
 
-/// Correlation of columns whose mean is zero; an outlier counts as one of three sigmas.
+/// Correlation of columns whose mean is zero.
 fn correlation(standard: &DMatrix<f64>) -> DMatrix<f64> {
-    let clipped = standard.map(|v| v.clamp(-3.0, 3.0));
-    let product = clipped.tr_mul(&clipped);
+    let product = standard.tr_mul(standard);
     DMatrix::from_fn(COUNT, COUNT, |i, j| {
         let scale = (product[(i, i)] * product[(j, j)]).sqrt();
         if i == j { 1.0 } else { 0.98 * product[(i, j)] / scale.max(1e-300) }

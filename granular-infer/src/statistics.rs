@@ -16,6 +16,8 @@ const RING_FLOOR: f64 = 0.01;
 const LEAST: f64 = 0.3;
 /// Heap and strays part here, in L.
 const FOOT: f64 = 1.0;
+/// Where grains lie one by one, in L: within it some stand on others.
+const STRAYS: f64 = 1.25;
 /// Where strays end, in L.
 const FAR: f64 = 3.0;
 /// Extent of the second moments, in L.
@@ -63,6 +65,15 @@ pub fn ring_heights(statistics: &[f64; COUNT]) -> [f64; RINGS.len() - 1] {
     std::array::from_fn(|k| statistics[3 + k].powi(2) - RING_FLOOR)
 }
 
+/// Volume under the heights within the outermost ring, of statistics, over that of `count` grains: above one, since what lies
+/// beneath a grain counts as filled; less where grains have left the picture.
+pub fn volume_in_sight(statistics: &[f64; COUNT], count: usize) -> f64 {
+    let heights = ring_heights(statistics);
+    // Rings are in L and heights in d, and L^2 d over N pi/6 d^3 is 6 / (pi N^(1/3)).
+    let sum: f64 = RINGS.windows(2).zip(heights).map(|(r, h)| (r[1] * r[1] - r[0] * r[0]) * h).sum();
+    6.0 * sum / (count as f64).cbrt()
+}
+
 /// The statistics of a picture of `count` grains of a mean diameter in m.
 pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT] {
     let length = diameter_m * (count as f64).cbrt();
@@ -94,7 +105,7 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
             second[0] += z * (x * x - y * y);
             second[1] += z * 2.0 * x * y;
         }
-        if (FOOT..FAR).contains(&r) && z > clear {
+        if (STRAYS..FAR).contains(&r) && z > clear {
             stray += z;
             square += z * z;
         }

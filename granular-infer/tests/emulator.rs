@@ -70,6 +70,35 @@ fn means_spreads_and_correlations_come_back() {
     }
 }
 
+/// A polynomial of the fifth degree cannot follow a wave over the whole range; where pictures count for more it does.
+#[test]
+fn means_are_nearest_where_pictures_count_for_most() {
+    let ranges = Ranges::default();
+    let wave = |c: &Conditions| (8.0 * c.sliding_friction.ln()).sin();
+    let samples: Vec<Sample> = (0..2000)
+        .map(|pour| {
+            let conditions = ranges.draw(2, pour);
+            Sample { conditions, blur_px2: 0.0, statistics: [wave(&conditions); COUNT] }
+        })
+        .collect();
+    let off = |c: &Conditions| (c.sliding_friction / 0.4).ln();
+    let whole = Emulator::learn(&ranges, &samples).unwrap();
+    let near =
+        Emulator::learn_weighted(&ranges, &samples, |s| (-0.5 * (off(&s.conditions) / 0.3).powi(2)).exp())
+            .unwrap();
+    let error = |emulator: &Emulator| {
+        let here: Vec<Conditions> =
+            (5000..5400).map(|pour| ranges.draw(2, pour)).filter(|c| off(c).abs() < 0.3).collect();
+        let squares = here.iter().map(|c| (emulator.mean(c, 0.0)[3] - wave(c)).powi(2));
+        (squares.sum::<f64>() / here.len() as f64).sqrt()
+    };
+    let [whole, near] = [error(&whole), error(&near)];
+    println!("error {whole:.4} of all alike, {near:.4} of those that count");
+    assert!(near < 0.5 * whole, "{near} and {whole}");
+    let none = Emulator::learn_weighted(&ranges, &samples, |_| 0.0);
+    assert!(matches!(none, Err(EmulatorError::TooFew { received: 0, .. })));
+}
+
 #[test]
 fn too_few_samples_are_an_error() {
     let ranges = Ranges::default();

@@ -11,7 +11,7 @@ const HALF_ADHESION: f64 = 0.05;
 const BASE: usize = 4;
 const EFFECTS: usize = 7;
 /// Highest degree in the four: alone, beside an effect, and of what turns with the tilt.
-const ALONE: usize = 4;
+const ALONE: usize = 5;
 const BESIDE: usize = 2;
 const TURNING: usize = 3;
 
@@ -86,6 +86,7 @@ impl Scaled {
                 5f64.sqrt() * (1.5 * square - 0.5),
                 7f64.sqrt() * x * (2.5 * square - 1.5),
                 3.0 * (square * (4.375 * square - 3.75) + 0.375),
+                11f64.sqrt() * x * (square * (7.875 * square - 8.75) + 1.875),
             ]
         });
         let mut terms = Terms::default();
@@ -154,6 +155,11 @@ impl Scaled {
         row.extend(self.base);
         row.extend(self.base.map(|b| b * b));
         row.extend(self.effects);
+        row.extend(self.effects.map(|e| e * e));
+        for (i, b) in self.base.iter().enumerate() {
+            row.extend(self.base[i + 1..].iter().map(|other| b * other));
+            row.extend(self.effects.map(|e| b * e));
+        }
         row
     }
 }

@@ -7,6 +7,7 @@ mod campaign;
 #[cfg(test)]
 mod codes;
 mod excess;
+mod learning;
 mod model;
 mod read;
 mod spec;

@@ -1,26 +1,22 @@
 //! The full model of pours: an emulator of what their pictures show.
 
 use std::collections::HashMap;
-use std::f64::consts::PI;
 
-use granular_infer::camera::Flaws;
-use granular_infer::campaign::{Conditions, Grains};
-use granular_infer::emulator::{Emulator, EmulatorError, Sample};
-use granular_infer::seeing::HeightMap;
+use granular_infer::campaign::Conditions;
+use granular_infer::emulator::{Emulator, EmulatorError};
 use granular_infer::statistics::{COUNT, STATISTICS, Symmetry, statistics};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::campaign::Campaign;
+use super::learning::{MOST_BLUR_PX, counts, in_sight, samples};
 use super::read::{Picture, Read};
 use super::spec::{Places, build};
 
-/// Most blur that pictures are made with, px.
-const MOST_BLUR_PX: f64 = 3.0;
 /// What the ground's level and slopes are known to beyond the pictures' noise: in m, and in rad.
 const LEVEL_M: f64 = 3e-5;
 const SLOPE: f64 = 5e-4;
@@ -28,9 +24,12 @@ const SLOPE: f64 = 5e-4;
 const RING_D: f64 = 2e-3;
 /// The first statistics, which are the ground's.
 const GROUND: usize = 3;
-/// What another simulator of the same grains, and the emulator's own error, add to the spread from pour to pour, as a part of it. The
-/// test `another_simulator` prints how far heaps of LIGGGHTS lie from the emulator.
+/// By how much the grains of nature, or of another simulator, and the emulator's own error move the mean of a statistic, in sigmas from
+/// pour to pour; and of what few strays decide. The test `another_simulator` prints how far heaps of LIGGGHTS lie from the emulator.
 const DISCREPANCY: f64 = 0.3;
+const STRAY_DISCREPANCY: f64 = 0.9;
+/// The same of the centroid and the ground's slope, along a tilt.
+const TILT_DISCREPANCY: f64 = 0.7;
 /// Draws and refinements of the search for where the spread is taken.
 const DRAWS: u64 = 3000;
 
@@ -66,78 +65,9 @@ pub(super) struct PourModel {
     /// Lengths of the recording over those of the campaign; work of adhesion likewise.
     scale: f64,
     adhesion_scale: f64,
+    /// Number of pictures in the recording.
+    pictures: usize,
     runs: HashMap<String, Shown>,
-}
-
-/// Pictures of a campaign's pours, as the recording's camera would have taken them.
-fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
-    let mut noises: Vec<f64> = read.pictures.iter().map(|p| p.map.noise_m).collect();
-    noises.sort_by(f64::total_cmp);
-    let noise = noises.get(noises.len() / 2).copied().unwrap_or(0.0);
-    let unit = read.camera.depth_unit_m;
-    // Rounding to counts adds its own part again.
-    let noise_m = (noise * noise - unit * unit / 12.0).max(0.0).sqrt();
-    let volume_m3 = read.rig.count as f64 * PI / 6.0 * read.rig.diameter_m.powi(3);
-    let flaws = missing(campaign, read, Flaws { noise_m, ..Flaws::default() });
-    let one = |(pour, grains): &(u32, Grains)| {
-        let conditions = campaign.ranges.draw(Campaign::SEED, u64::from(*pour));
-        let depth = read.camera.render(&scaled(grains, campaign.scale));
-        let mut rng = ChaCha8Rng::seed_from_u64(Campaign::SEED);
-        rng.set_stream(u64::from(*pour));
-        let blurred = MOST_BLUR_PX * rng.random::<f64>();
-        [0.0, blurred]
-            .into_iter()
-            .filter_map(move |blur_px| {
-                let counts = read.camera.expose(&depth, &Flaws { blur_px, ..flaws }, &mut rng);
-                let map = HeightMap::new(&read.camera, &counts, volume_m3).ok()?;
-                let seen = statistics(&map, read.rig.count, read.rig.diameter_m);
-                Some(Sample { conditions, blur_px2: blur_px * blur_px, statistics: seen })
-            })
-            .collect::<Vec<_>>()
-    };
-    campaign.pours.par_iter().flat_map_iter(one).collect()
-}
-
-fn scaled(grains: &Grains, scale: f64) -> Grains {
-    Grains {
-        positions_m: grains.positions_m.iter().map(|p| p.map(|v| scale * v)).collect(),
-        radii_m: grains.radii_m.iter().map(|r| scale * r).collect(),
-    }
-}
-
-/// Which pixels are missing: some everywhere, as far out, and more at edges, as in the heap.
-fn missing(campaign: &Campaign, read: &Read, flaws: Flaws) -> Flaws {
-    /// Pours over which edges are counted.
-    const POURS: usize = 30;
-    let edge_m = 0.5 * read.rig.diameter_m;
-    let length = read.rig.diameter_m * (read.rig.count as f64).cbrt();
-    let (mut inner, mut outer) = ([0usize; 2], [0usize; 2]);
-    for map in read.pictures.iter().map(|p| &p.map) {
-        for ([x, y], z) in map.places_m.iter().zip(&map.heights_m) {
-            let r = x.hypot(*y) / length;
-            let count = if r < 1.0 { &mut inner } else { &mut outer };
-            if !(1.0..=2.1).contains(&r) {
-                count[0] += usize::from(!z.is_finite());
-                count[1] += 1;
-            }
-        }
-    }
-    let share = |[part, all]: [usize; 2]| part as f64 / all.max(1) as f64;
-    let mut edges = [0usize; 2];
-    for (_, grains) in campaign.pours.iter().take(POURS) {
-        let depth = read.camera.render(&scaled(grains, campaign.scale));
-        for i in 0..depth.len() {
-            let [x, y] =
-                read.camera.place_m(i % read.camera.size_px[0], i / read.camera.size_px[0], depth[i]);
-            if x.hypot(y) < length {
-                edges[0] += usize::from(read.camera.is_edge(&depth, i, edge_m));
-                edges[1] += 1;
-            }
-        }
-    }
-    let missing = share(outer);
-    let missing_at_edges = ((share(inner) - missing) / share(edges).max(0.01)).clamp(0.0, 0.9);
-    Flaws { missing, missing_at_edges, edge_m, ..flaws }
 }
 
 impl View {
@@ -153,7 +83,9 @@ impl View {
 
 impl PourModel {
     pub(super) fn new(campaign: &Campaign, read: &Read) -> Result<Self, EmulatorError> {
-        let emulator = Emulator::learn(&campaign.ranges, &samples(campaign, read))?;
+        let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| shown_by(p, read)).collect();
+        let samples = in_sight(samples(campaign, read), &seen, read.rig.count);
+        let emulator = Emulator::learn(&campaign.ranges, &samples)?;
         let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / campaign.scale).collect();
         let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = heights.iter().copied().fold(0.0, f64::max);
@@ -165,9 +97,15 @@ impl PourModel {
             diameter_m: read.rig.diameter_m,
             scale: campaign.scale,
             adhesion_scale: density(&read.rig) / density(&campaign.rig),
+            pictures: read.pictures.len(),
             runs: HashMap::new(),
         };
-        let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| model.statistics(p, read)).collect();
+        // Grains like these count for more: a polynomial is nearer to the truth the smaller its range is.
+        let likely =
+            [Effects::Any, Effects::None].map(|e| model.nearest(&heights, &seen, campaign, e).conditions);
+        let ranges = &campaign.ranges;
+        model.emulator =
+            Emulator::learn_weighted(ranges, &samples, |s| counts(ranges, &s.conditions, &likely))?;
         let near = model.nearest(&heights, &seen, campaign, Effects::Any);
         let c = near.conditions;
         let start = [c.sliding_friction, c.rolling_friction, c.restitution];
@@ -176,10 +114,6 @@ impl PourModel {
             model.add(label, height, &near);
         }
         Ok(model)
-    }
-
-    fn statistics(&self, picture: &Picture, read: &Read) -> [f64; COUNT] {
-        statistics(&picture.map, read.rig.count, read.rig.diameter_m)
     }
 
     /// Adds a run at a height in m; the spread is that of `near`.
@@ -205,6 +139,7 @@ impl PourModel {
 
     /// Cholesky factor of the covariance of a picture's statistics.
     fn factor(&self, view: &View) -> DMatrix<f64> {
+        let pictures = self.pictures as f64;
         let mut sigma = self.emulator.sigma(&view.conditions, view.blur_px2);
         sigma[0] = sigma[0].hypot(LEVEL_M / self.diameter_m);
         sigma[1] = sigma[1].hypot(SLOPE);
@@ -217,13 +152,12 @@ impl PourModel {
             }
         }
         let correlation = self.emulator.correlation();
+        let own = discrepancy(&mean, &sigma);
         let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
-            // What vanishes by symmetry does so in every code.
-            let scalar = i == j && STATISTICS[i].1 == Symmetry::Scalar;
-            let own = if scalar { DISCREPANCY * DISCREPANCY } else { 0.0 };
             // Where the ground reads is the camera's, and says nothing of the grains.
             let tied = if i != j && i.min(j) < GROUND { 0.0 } else { correlation[(i, j)] };
-            sigma[i] * sigma[j] * (tied + own)
+            // A discrepancy is the same in all pictures, so that their mean has no less of it.
+            sigma[i] * sigma[j] * (tied + pictures * own[(i, j)])
         });
         covariance
             .cholesky()
@@ -299,7 +233,7 @@ impl PourModel {
     /// The likeliest baseline of a recording, at no height in particular.
     pub(super) fn nearest_baseline(&self, read: &Read, campaign: &Campaign) -> Conditions {
         let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / self.scale).collect();
-        let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| self.statistics(p, read)).collect();
+        let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| shown_by(p, read)).collect();
         self.nearest(&heights, &seen, campaign, Effects::None).conditions
     }
 
@@ -315,8 +249,8 @@ impl PourModel {
             .collect()
     }
 
-    /// Mean and scatter over the pictures of each statistic less its mean, in sigmas from pour to pour; the height of the
-    /// conditions is added to the pictures'.
+    /// Mean and scatter over the pictures of each statistic less its mean, in sigmas from pour to pour, what turns with the scene along
+    /// and across the tilt; the height of the conditions is added to the pictures'.
     #[cfg(test)]
     pub(super) fn distance(
         &self,
@@ -328,8 +262,19 @@ impl PourModel {
             let height_m = picture.height_m / self.scale + conditions.height_m;
             let at = Conditions { height_m, ..*conditions };
             let (mean, sigma) = (self.emulator.mean(&at, blur_px2), self.emulator.sigma(&at, blur_px2));
-            let seen = self.statistics(picture, read);
-            std::array::from_fn(|k| (seen[k] - mean[k]) / sigma[k])
+            let seen = shown_by(picture, read);
+            let left: [f64; COUNT] = std::array::from_fn(|k| (seen[k] - mean[k]) / sigma[k]);
+            // Along and across the tilt.
+            let azimuth = conditions.tilt_rad[1].atan2(conditions.tilt_rad[0]);
+            std::array::from_fn(|k| match STATISTICS[k].1 {
+                Symmetry::Scalar => left[k],
+                Symmetry::Vector => azimuth.cos() * left[k] + azimuth.sin() * left[k + 1],
+                Symmetry::Tensor => (2.0 * azimuth).cos() * left[k] + (2.0 * azimuth).sin() * left[k + 1],
+                Symmetry::Second if STATISTICS[k - 1].1 == Symmetry::Vector => {
+                    azimuth.cos() * left[k] - azimuth.sin() * left[k - 1]
+                }
+                Symmetry::Second => (2.0 * azimuth).cos() * left[k] - (2.0 * azimuth).sin() * left[k - 1],
+            })
         };
         let all: Vec<[f64; COUNT]> = read.pictures.iter().map(left).collect();
         let n = all.len() as f64;
@@ -342,14 +287,14 @@ impl PourModel {
     #[cfg(test)]
     pub(super) fn aside(&self, read: &Read) -> [f64; 2] {
         let at = |name| STATISTICS.iter().position(|s| s.0 == name).unwrap_or(0);
-        let mean = |k: usize| read.pictures.iter().map(|p| self.statistics(p, read)[k]).sum::<f64>();
+        let mean = |k: usize| read.pictures.iter().map(|p| shown_by(p, read)[k]).sum::<f64>();
         [mean(at("centroid_x")), mean(at("centroid_y"))]
     }
 
     /// What the engine is to see of a picture.
     pub(super) fn shown(&self, picture: &Picture, read: &Read) -> Vec<f64> {
         match self.runs.get(&picture.label) {
-            Some(shown) => whiten(shown, self.statistics(picture, read)),
+            Some(shown) => whiten(shown, shown_by(picture, read)),
             None => vec![f64::NAN; COUNT],
         }
     }
@@ -385,6 +330,34 @@ impl PourModel {
         }
         mean
     }
+}
+
+/// Covariance of the discrepancies, in sigmas from pour to pour.
+fn discrepancy(mean: &[f64; COUNT], sigma: &[f64; COUNT]) -> DMatrix<f64> {
+    let mut own = DMatrix::zeros(COUNT, COUNT);
+    for (k, (name, symmetry)) in STATISTICS.iter().enumerate() {
+        let part = match (name.as_str(), symmetry) {
+            ("stray_height", _) => STRAY_DISCREPANCY,
+            (_, Symmetry::Vector) => TILT_DISCREPANCY,
+            _ => DISCREPANCY,
+        };
+        match symmetry {
+            Symmetry::Scalar => own[(k, k)] = part * part,
+            // What vanishes by symmetry does so in every code: a pair is moved by too much or too little along where it is moved.
+            Symmetry::Vector | Symmetry::Tensor => {
+                let moved = Vector2::new(mean[k] / sigma[k], mean[k + 1] / sigma[k + 1]);
+                let along = moved * (part / (1.0 + moved.norm_squared()).sqrt());
+                own.fixed_view_mut::<2, 2>(k, k).copy_from(&(along * along.transpose()));
+            }
+            Symmetry::Second => {}
+        }
+    }
+    own
+}
+
+/// A picture's statistics.
+fn shown_by(picture: &Picture, read: &Read) -> [f64; COUNT] {
+    statistics(&picture.map, read.rig.count, read.rig.diameter_m)
 }
 
 /// Statistics less what is expected, independent and of variance one.
