@@ -135,17 +135,17 @@ impl HeightMap {
             let (height_m, unit_m) = (camera.height_m, camera.depth_unit_m);
             return Err(SeeError::Unit { depth_m: middle, height_m, unit_m });
         }
-        let plane = ground(camera, depths)?;
+        let rays: Vec<[f64; 2]> =
+            (0..depths.len()).map(|i| camera.place_m(i % width, i / width, 1.0)).collect();
+        let plane = ground(camera, depths, &rays)?;
         let mut places_m = Vec::with_capacity(depths.len());
         let mut heights_m = Vec::with_capacity(depths.len());
-        for v in 0..height {
-            for u in 0..width {
-                let z = plane.depth(camera, u, v) - depths[v * width + u];
-                // What the depth has in excess is the camera's; the ground lies where it was said to.
-                let seen = if z.is_finite() { camera.height_m - z } else { camera.height_m };
-                places_m.push(camera.place_m(u, v, seen));
-                heights_m.push(z);
-            }
+        for (ray, depth) in rays.iter().zip(depths) {
+            let z = plane.depth(*ray) - depth;
+            // What the depth has in excess is the camera's; the ground lies where it was said to.
+            let seen = if z.is_finite() { camera.height_m - z } else { camera.height_m };
+            places_m.push(ray.map(|r| r * seen));
+            heights_m.push(z);
         }
         let map = Self {
             size_px: camera.size_px,
@@ -180,22 +180,19 @@ struct Plane {
 }
 
 impl Plane {
-    /// Depth in m of the plane in a pixel.
-    fn depth(&self, camera: &Camera, u: usize, v: usize) -> f64 {
-        let [x, y] = camera.place_m(u, v, 1.0);
+    /// Depth in m of the plane along a pixel's ray, which passes x and y in m at a depth of 1 m.
+    fn depth(&self, [x, y]: [f64; 2]) -> f64 {
         self.level / (1.0 - self.slope[0] * x - self.slope[1] * y)
     }
 }
 
 /// The plane that most pixels lie on: from the commonest depth, least squares over what lies within 2.5 sigma, repeated.
-fn ground(camera: &Camera, depths: &[f64]) -> Result<Plane, SeeError> {
-    let width = camera.size_px[0];
+fn ground(camera: &Camera, depths: &[f64], rays: &[[f64; 2]]) -> Result<Plane, SeeError> {
     let mut plane = Plane { level: commonest(camera, depths), slope: [0.0; 2], noise: 0.0 };
     let finite = depths.iter().filter(|d| d.is_finite()).count();
     let mut within = 0;
     for round in 0..12 {
-        let left: Vec<f64> =
-            depths.iter().enumerate().map(|(i, d)| d - plane.depth(camera, i % width, i / width)).collect();
+        let left: Vec<f64> = depths.iter().zip(rays).map(|(d, ray)| d - plane.depth(*ray)).collect();
         // Deeper than the ground is only noise: its spread is the noise's.
         let deeper: Vec<f64> = left.iter().copied().filter(|r| *r > 0.0 && *r < MOST_NOISE).collect();
         plane.noise = (1.4826 * median(deeper)).max(0.3 * camera.depth_unit_m).min(MOST_NOISE);
@@ -203,8 +200,8 @@ fn ground(camera: &Camera, depths: &[f64]) -> Result<Plane, SeeError> {
         let mut normal = nalgebra::Matrix3::<f64>::zeros();
         let mut right = nalgebra::Vector3::<f64>::zeros();
         within = 0;
-        for (i, r) in left.iter().enumerate().filter(|(_, r)| r.abs() < band) {
-            let [x, y] = camera.place_m(i % width, i / width, camera.height_m);
+        for (r, ray) in left.iter().zip(rays).filter(|(r, _)| r.abs() < band) {
+            let [x, y] = ray.map(|v| v * camera.height_m);
             let row = nalgebra::Vector3::new(1.0, x, y);
             normal += row * row.transpose();
             right += row * *r;

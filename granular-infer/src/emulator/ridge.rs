@@ -27,22 +27,20 @@ pub(super) struct Fitted {
 impl Design {
     /// Coefficients of values with weights (one each on average), at the strength that foretells best what is left out.
     pub(super) fn fit(&self, values: &DVector<f64>, weights: &DVector<f64>) -> Fitted {
-        let normal = Normal::new(&self.rows, values, weights);
         let parts: Vec<(Vec<usize>, Normal)> = (0..FOLDS)
             .map(|fold| {
                 let own: Vec<usize> = (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
-                let without = normal.less(&Normal::new(
-                    &self.rows.select_rows(&own),
-                    &values.select_rows(&own),
-                    &weights.select_rows(&own),
-                ));
-                (own, without)
+                let rows = self.rows.select_rows(&own);
+                let normal = Normal::new(&rows, &values.select_rows(&own), &weights.select_rows(&own));
+                (own, normal)
             })
             .collect();
+        let mut normal = Normal::nothing(self.degrees.len());
+        parts.iter().for_each(|(_, part)| normal.add(part));
         let left_out = |strength: f64| {
             let mut left = vec![0.0; values.len()];
-            for (own, without) in &parts {
-                let coefficients = without.solve(&self.degrees, strength);
+            for (own, part) in &parts {
+                let coefficients = normal.less(part).solve(&self.degrees, strength);
                 for &i in own {
                     left[i] = values[i] - (self.rows.row(i) * &coefficients)[0];
                 }
@@ -69,12 +67,21 @@ struct Normal {
 }
 
 impl Normal {
+    fn nothing(width: usize) -> Self {
+        Self { matrix: DMatrix::zeros(width, width), right: DVector::zeros(width) }
+    }
+
     fn new(rows: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64>) -> Self {
-        let mut weighted = rows.clone();
-        for mut column in weighted.column_iter_mut() {
-            column.component_mul_assign(weights);
+        let mut weighted = rows.transpose();
+        for (mut column, weight) in weighted.column_iter_mut().zip(weights) {
+            column *= *weight;
         }
-        Self { matrix: weighted.tr_mul(rows), right: weighted.tr_mul(values) }
+        Self { matrix: &weighted * rows, right: weighted * values }
+    }
+
+    fn add(&mut self, part: &Self) {
+        self.matrix += &part.matrix;
+        self.right += &part.right;
     }
 
     fn less(&self, part: &Self) -> Self {

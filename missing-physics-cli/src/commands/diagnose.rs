@@ -46,14 +46,14 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
             )));
         }
     }
-    let (domain, loaded) = domains::load(&arguments.folder)?;
-    if arguments.model.is_some() && !domain.predicts() {
-        return Err(RepairError::NoChannels { domain: domain.id() }.into());
-    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads)
         .build()
         .map_err(|e| CommandError::Other(format!("{} threads cannot be had: {e}", arguments.threads)))?;
+    let (domain, loaded) = pool.install(|| domains::load(&arguments.folder))?;
+    if arguments.model.is_some() && !domain.predicts() {
+        return Err(RepairError::NoChannels { domain: domain.id() }.into());
+    }
     let mut diagnosis = pool.install(|| {
         run(&*loaded.model, &loaded.recording, &loaded.experiments, &arguments.options, observer)
     })?;
