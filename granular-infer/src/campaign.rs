@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::dem::{Clump, Coefficients, DemError, Funnel, Law, Pour};
+use crate::dem::{Clump, Coefficients, DemError, Funnel, Law, Pour, Poured};
 
 /// Young's modulus of the grains in campaigns, Pa. Softer than real grains: a pour takes a fifth of the time of one with 5 MPa
 /// and its heap is the same within the spread from pour to pour.
@@ -179,11 +179,8 @@ impl Rig {
         self.mass_kg / self.grain_volume_m3()
     }
 
-    /// Pours once; the same seed gives the same grains. Those that stick in the funnel go with it, far out of any picture.
-    ///
-    /// # Errors
-    /// [`DemError`] for conditions outside physics.
-    pub fn pour(&self, conditions: &Conditions, seed: u64) -> Result<Grains, DemError> {
+    /// The scene of a pour of spheres: from a funnel that opens at once over grains that do not touch yet.
+    pub fn scene(&self, conditions: &Conditions) -> Pour {
         let c = conditions;
         let grains = Coefficients {
             work_of_adhesion_j_m2: c.work_of_adhesion_j_m2,
@@ -192,7 +189,7 @@ impl Rig {
         let ground = Coefficients { sliding_friction: c.ground_ratio * c.sliding_friction, ..grains };
         let [x, y] = c.tilt_rad.map(f64::sin);
         let down = (1.0 - x * x - y * y).max(0.0).sqrt();
-        let pour = Pour {
+        Pour {
             count: self.count,
             diameter_m: self.diameter_m,
             size_variation: c.size_variation,
@@ -213,17 +210,29 @@ impl Rig {
             step_s: None,
             rest: None,
             most_s: 3.0,
-        };
-        let poured = if c.aspect_ratio > 1.0 {
-            pour.run_with(&Clump::rod(self.diameter_m, c.aspect_ratio)?, seed)?
+        }
+    }
+
+    /// Pours once; the same seed gives the same grains. Those that stick in the funnel go with it, far out of any picture.
+    ///
+    /// # Errors
+    /// [`DemError`] for conditions outside physics.
+    pub fn pour(&self, conditions: &Conditions, seed: u64) -> Result<Grains, DemError> {
+        let scene = self.scene(conditions);
+        let poured = if conditions.aspect_ratio > 1.0 {
+            scene.run_with(&Clump::rod(self.diameter_m, conditions.aspect_ratio)?, seed)?
         } else {
-            pour.run(seed)?
+            scene.run(seed)?
         };
-        let gone = [GONE_D * self.diameter_m, 0.0, 0.0];
-        let stays = |p: [f64; 3]| if p[2] < c.height_m { p } else { gone };
-        Ok(Grains {
-            positions_m: poured.positions_m.into_iter().map(stays).collect(),
-            radii_m: poured.radii_m,
-        })
+        Ok(Grains::lying(poured, &scene))
+    }
+}
+
+impl Grains {
+    /// What lies in a scene when its funnel is taken away, and what sticks in it.
+    pub fn lying(poured: Poured, scene: &Pour) -> Self {
+        let gone = [GONE_D * scene.diameter_m, 0.0, 0.0];
+        let stays = |p: [f64; 3]| if p[2] < scene.funnel.outlet_height_m { p } else { gone };
+        Self { positions_m: poured.positions_m.into_iter().map(stays).collect(), radii_m: poured.radii_m }
     }
 }

@@ -11,7 +11,7 @@ use crate::recording::ReadError;
 
 /// The rig of the pours that come with the tool, and the pours (`cargo run --release -p granular-infer --example campaign`).
 #[allow(clippy::approx_constant, reason = "the angle as recordings state it, to the bit")]
-const BUNDLED_RIG: Rig = Rig {
+pub(super) const BUNDLED_RIG: Rig = Rig {
     count: 1000,
     diameter_m: 4e-3,
     mass_kg: 4.356e-5,

@@ -5,10 +5,14 @@
 
 use std::path::{Path, PathBuf};
 
-use granular_infer::campaign::Conditions;
-use granular_infer::statistics::{COUNT, STATISTICS};
+use granular_infer::camera::Camera;
+use granular_infer::campaign::{Conditions, Grains, Ranges, Rig};
+use granular_infer::dem::Pour;
+use granular_infer::seeing::HeightMap;
+use granular_infer::statistics::{COUNT, STATISTICS, statistics};
+use rayon::prelude::*;
 
-use super::campaign::Campaign;
+use super::campaign::{BUNDLED_RIG, Campaign};
 use super::model::PourModel;
 use super::read::read;
 use crate::recording::Header;
@@ -94,5 +98,84 @@ fn another_simulator() {
             mean(&|d| d.at_best[k].powi(2) - d.scatter[k].powi(2) / d.pours),
             each.join(" ")
         );
+    }
+}
+
+/// Scenes tried, pours of each.
+const SCENES: u64 = 10;
+const POURS: u64 = 12;
+
+/// What a recording does not say of a pour: how the grains lay in the funnel, how they stop rolling.
+fn unsaid() -> [(&'static str, fn(&mut Pour)); 2] {
+    fn settled(scene: &mut Pour) {
+        scene.closed_s = 0.4;
+    }
+    fn springy(scene: &mut Pour) {
+        scene.grains.rolling_damping = 0.0;
+        scene.ground.rolling_damping = 0.0;
+    }
+    [("the funnel opens when the grains have settled", settled), ("rolling without a dashpot", springy)]
+}
+
+/// Statistics of pours of a scene, as a camera without flaws sees them.
+fn pictures(rig: &Rig, scene: &Pour) -> Vec<[f64; COUNT]> {
+    let camera = Camera {
+        focal_px: [250.0; 2],
+        centre_px: [119.5; 2],
+        height_m: 0.37,
+        depth_unit_m: 1e-4,
+        size_px: [240, 240],
+    };
+    let one = |seed: u64| {
+        let grains = Grains::lying(scene.run(seed).ok()?, scene);
+        let volume_m3 = rig.count as f64 * rig.grain_volume_m3();
+        let map = HeightMap::from_depths(&camera, &camera.render(&grains), volume_m3).ok()?;
+        Some(statistics(&map, rig.count, rig.diameter_m))
+    };
+    (0..POURS).into_par_iter().filter_map(one).collect()
+}
+
+/// By how much statistics move with what a recording does not say, in sigmas from pour to pour: mean over scenes of spheres with no
+/// effect on, and their standard deviation from scene to scene.
+#[test]
+#[ignore = "pours 360 heaps"]
+#[allow(clippy::print_stdout, reason = "a table for a person")]
+fn what_a_recording_does_not_say() {
+    let rig = BUNDLED_RIG;
+    let ranges = Ranges { rolling_friction: [0.07, 0.25], sliding_friction: [0.3, 0.8], ..Ranges::default() };
+    let baseline = ranges.baseline();
+    let mut moved = unsaid().map(|_| Vec::new());
+    for scene in 0..SCENES {
+        let drawn = ranges.draw(7, scene);
+        let conditions = Conditions {
+            sliding_friction: drawn.sliding_friction,
+            rolling_friction: drawn.rolling_friction,
+            restitution: drawn.restitution,
+            height_m: drawn.height_m,
+            ..baseline
+        };
+        let plain = pictures(&rig, &rig.scene(&conditions));
+        let mean = |all: &[[f64; COUNT]], k: usize| all.iter().map(|s| s[k]).sum::<f64>() / all.len() as f64;
+        let sigma = |k: usize| {
+            let square = plain.iter().map(|s| (s[k] - mean(&plain, k)).powi(2)).sum::<f64>();
+            (square / (plain.len() - 1) as f64).sqrt().max(1e-9)
+        };
+        for (moved, (_, change)) in moved.iter_mut().zip(unsaid()) {
+            let mut scene = rig.scene(&conditions);
+            change(&mut scene);
+            let other = pictures(&rig, &scene);
+            moved.push(std::array::from_fn::<f64, COUNT, _>(|k| {
+                (mean(&other, k) - mean(&plain, k)) / sigma(k)
+            }));
+        }
+    }
+    for ((name, _), moved) in unsaid().iter().zip(&moved) {
+        println!("{name}");
+        for (k, (statistic, _)) in STATISTICS.iter().enumerate() {
+            let n = moved.len() as f64;
+            let mean = moved.iter().map(|m| m[k]).sum::<f64>() / n;
+            let spread = (moved.iter().map(|m| (m[k] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            println!("  {statistic:24} {mean:6.2} {spread:6.2}");
+        }
     }
 }

@@ -6,6 +6,7 @@
 mod campaign;
 #[cfg(test)]
 mod codes;
+mod discrepancy;
 mod excess;
 mod learning;
 mod model;

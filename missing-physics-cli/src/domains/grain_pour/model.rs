@@ -4,15 +4,16 @@ use std::collections::HashMap;
 
 use granular_infer::campaign::Conditions;
 use granular_infer::emulator::{Emulator, EmulatorError};
-use granular_infer::statistics::{COUNT, STATISTICS, Symmetry, statistics};
+use granular_infer::statistics::{COUNT, STATISTICS, statistics};
 use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::campaign::Campaign;
+use super::discrepancy::discrepancy;
 use super::learning::{MOST_BLUR_PX, counts, in_sight, samples};
 use super::read::{Picture, Read};
 use super::spec::{Places, build};
@@ -24,12 +25,6 @@ const SLOPE: f64 = 5e-4;
 const RING_D: f64 = 2e-3;
 /// The first statistics, which are the ground's.
 const GROUND: usize = 3;
-/// By how much the grains of nature, or of another simulator, and the emulator's own error move the mean of a statistic, in sigmas from
-/// pour to pour; and of what few strays decide. The test `another_simulator` prints how far heaps of LIGGGHTS lie from the emulator.
-const DISCREPANCY: f64 = 0.3;
-const STRAY_DISCREPANCY: f64 = 0.9;
-/// The same of the centroid and the ground's slope, along a tilt.
-const TILT_DISCREPANCY: f64 = 0.7;
 /// Draws and refinements of the search for where the spread is taken.
 const DRAWS: u64 = 3000;
 
@@ -258,6 +253,7 @@ impl PourModel {
         conditions: &Conditions,
         blur_px2: f64,
     ) -> ([f64; COUNT], [f64; COUNT]) {
+        use granular_infer::statistics::Symmetry;
         let left = |picture: &Picture| {
             let height_m = picture.height_m / self.scale + conditions.height_m;
             let at = Conditions { height_m, ..*conditions };
@@ -330,29 +326,6 @@ impl PourModel {
         }
         mean
     }
-}
-
-/// Covariance of the discrepancies, in sigmas from pour to pour.
-fn discrepancy(mean: &[f64; COUNT], sigma: &[f64; COUNT]) -> DMatrix<f64> {
-    let mut own = DMatrix::zeros(COUNT, COUNT);
-    for (k, (name, symmetry)) in STATISTICS.iter().enumerate() {
-        let part = match (name.as_str(), symmetry) {
-            ("stray_height", _) => STRAY_DISCREPANCY,
-            (_, Symmetry::Vector) => TILT_DISCREPANCY,
-            _ => DISCREPANCY,
-        };
-        match symmetry {
-            Symmetry::Scalar => own[(k, k)] = part * part,
-            // What vanishes by symmetry does so in every code: a pair is moved by too much or too little along where it is moved.
-            Symmetry::Vector | Symmetry::Tensor => {
-                let moved = Vector2::new(mean[k] / sigma[k], mean[k + 1] / sigma[k + 1]);
-                let along = moved * (part / (1.0 + moved.norm_squared()).sqrt());
-                own.fixed_view_mut::<2, 2>(k, k).copy_from(&(along * along.transpose()));
-            }
-            Symmetry::Second => {}
-        }
-    }
-    own
 }
 
 /// A picture's statistics.
