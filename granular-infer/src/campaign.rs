@@ -40,6 +40,8 @@ pub struct Conditions {
     pub rolling_friction: f64,
     /// Restitution.
     pub restitution: f64,
+    /// Share of critical damping of the rolling spring.
+    pub rolling_damping: f64,
     /// Height of the outlet above the ground in m.
     pub height_m: f64,
     /// Work of adhesion in J/m2.
@@ -65,6 +67,8 @@ pub struct Ranges {
     pub rolling_friction: [f64; 2],
     /// Restitution.
     pub restitution: [f64; 2],
+    /// Largest share of critical damping of the rolling spring.
+    pub rolling_damping: f64,
     /// Height of the outlet in m.
     pub height_m: [f64; 2],
     /// Largest work of adhesion in J/m2.
@@ -87,6 +91,7 @@ impl Default for Ranges {
             sliding_friction: [0.15, 1.0],
             rolling_friction: [0.04, 0.4],
             restitution: [0.2, 0.8],
+            rolling_damping: 0.6,
             height_m: [0.025, 0.14],
             work_of_adhesion_j_m2: 0.25,
             ground_ratio: 4.0,
@@ -109,6 +114,7 @@ impl Ranges {
             sliding_friction: middle(self.sliding_friction.map(f64::ln)).exp(),
             rolling_friction: middle(self.rolling_friction.map(f64::ln)).exp(),
             restitution: middle(self.restitution),
+            rolling_damping: Coefficients::ROLLING_DAMPING,
             height_m: middle(self.height_m),
             work_of_adhesion_j_m2: 0.0,
             ground_ratio: 1.0,
@@ -120,7 +126,7 @@ impl Ranges {
     }
 
     /// The conditions of a pour: a third of the pours has no effect on, the others have one or two. Only pours of even number may be
-    /// of rods.
+    /// of rods, and every other one of odd number has another rolling damping than [`Coefficients::ROLLING_DAMPING`].
     pub fn draw(&self, seed: u64, pour: u64) -> Conditions {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(pour);
@@ -155,6 +161,10 @@ impl Ranges {
                 _ => {}
             }
         }
+        if pour % 4 == 3 {
+            // Little damping matters most.
+            conditions.rolling_damping = self.rolling_damping * unit().powi(2);
+        }
         conditions
     }
 }
@@ -184,6 +194,7 @@ impl Rig {
         let c = conditions;
         let grains = Coefficients {
             work_of_adhesion_j_m2: c.work_of_adhesion_j_m2,
+            rolling_damping: c.rolling_damping,
             ..Coefficients::dry(c.restitution, c.sliding_friction, c.rolling_friction)
         };
         let ground = Coefficients { sliding_friction: c.ground_ratio * c.sliding_friction, ..grains };

@@ -16,7 +16,8 @@ fn law(c: &Conditions, k: usize) -> f64 {
     match STATISTICS[k].1 {
         Symmetry::Scalar => {
             let rods = 0.4 * (c.aspect_ratio - 1.0) * c.restitution;
-            base + c.size_variation.powi(2) * 3.0 - 0.5 * c.ground_ratio.ln() - rods
+            let damped = 0.5 * (-8.0 * c.rolling_damping).exp();
+            base + c.size_variation.powi(2) * 3.0 - 0.5 * c.ground_ratio.ln() - rods + damped
         }
         Symmetry::Vector => turning * x,
         Symmetry::Tensor => turning * (x * x - y * y),

@@ -42,13 +42,16 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
-    /// Dry grains with a rolling spring damped at 0.3 of critical.
+    /// Damping of the rolling spring where nothing else is said (Ai et al. 2011, doi:10.1016/j.powtec.2010.09.030).
+    pub const ROLLING_DAMPING: f64 = 0.3;
+
+    /// Dry grains with a rolling spring damped at [`Self::ROLLING_DAMPING`].
     pub fn dry(restitution: f64, sliding_friction: f64, rolling_friction: f64) -> Self {
         Self {
             restitution,
             sliding_friction,
             rolling_friction,
-            rolling_damping: 0.3,
+            rolling_damping: Self::ROLLING_DAMPING,
             work_of_adhesion_j_m2: 0.0,
         }
     }

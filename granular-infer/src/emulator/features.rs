@@ -1,15 +1,18 @@
 //! What the statistics of a picture are a sum of.
 
 use crate::campaign::{Conditions, Ranges};
+use crate::dem::Coefficients;
 use crate::statistics::{STATISTICS, Symmetry};
 
 /// Blur variance (px^2) at which half of its effect is there.
 const HALF_BLUR: f64 = 1.0;
 /// Work of adhesion (J/m2) likewise.
 const HALF_ADHESION: f64 = 0.05;
+/// Rolling damping likewise.
+const HALF_DAMPING: f64 = 0.1;
 /// Friction, rolling friction, restitution, height.
 const BASE: usize = 4;
-const EFFECTS: usize = 7;
+const EFFECTS: usize = 8;
 /// Highest degree in the four: alone, beside an effect, and of what turns with the tilt.
 const ALONE: usize = 5;
 const BESIDE: usize = 2;
@@ -40,7 +43,8 @@ impl Terms {
 pub(super) struct Scaled {
     /// Friction, rolling friction, restitution and height, -1 to 1.
     base: [f64; BASE],
-    /// Effects, about 0 to 1 (or -1 to 1): adhesion, ground, variance of sizes, square of the tilt, drag, blur, length.
+    /// Effects, about 0 to 1 (or -1 to 1): adhesion, ground, variance of sizes, square of the tilt, drag, blur, length, damping of
+    /// rolling.
     effects: [f64; EFFECTS],
     tilt: [f64; 2],
     /// s^2 / (1 + s^2), s the slope over the rolling friction.
@@ -54,6 +58,7 @@ impl Scaled {
         let tilt = c.tilt_rad.map(|t| t / ranges.tilt_rad);
         let w = c.work_of_adhesion_j_m2;
         let slope = c.tilt_rad[0].hypot(c.tilt_rad[1]);
+        let damped = |eta: f64| eta / (eta + HALF_DAMPING);
         Self {
             base: [
                 log(ranges.sliding_friction, c.sliding_friction),
@@ -69,6 +74,7 @@ impl Scaled {
                 c.drag_per_m / ranges.drag_per_m,
                 blur_px2 / (blur_px2 + HALF_BLUR),
                 (c.aspect_ratio - 1.0) / (ranges.aspect_ratio - 1.0),
+                damped(c.rolling_damping) - damped(Coefficients::ROLLING_DAMPING),
             ],
             tilt,
             rolling: slope * slope / (slope * slope + c.rolling_friction.powi(2)).max(1e-12),

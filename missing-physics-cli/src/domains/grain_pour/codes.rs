@@ -33,6 +33,8 @@ fn truth(key: &serde_json::Value, campaign: &Campaign, aside: [f64; 2]) -> Optio
         sliding_friction: truth("friction")?,
         rolling_friction: truth("rolling")?,
         restitution: truth("restitution")?,
+        // LIGGGHTS's epsd2 has no dashpot.
+        rolling_damping: 0.0,
         height_m: 0.0,
         ..campaign.ranges.baseline()
     };
@@ -105,8 +107,11 @@ fn another_simulator() {
 const SCENES: u64 = 10;
 const POURS: u64 = 12;
 
+/// What is done to a scene.
+type Change = fn(&mut Pour);
+
 /// What a recording does not say of a pour: how the grains lay in the funnel, how they stop rolling.
-fn unsaid() -> [(&'static str, fn(&mut Pour)); 2] {
+fn unsaid() -> [(&'static str, Change); 2] {
     fn settled(scene: &mut Pour) {
         scene.closed_s = 0.4;
     }

@@ -103,7 +103,7 @@ impl PourModel {
             Emulator::learn_weighted(ranges, &samples, |s| counts(ranges, &s.conditions, &likely))?;
         let near = model.nearest(&heights, &seen, campaign, Effects::Any);
         let c = near.conditions;
-        let start = [c.sliding_friction, c.rolling_friction, c.restitution];
+        let start = [c.sliding_friction, c.rolling_friction, c.restitution, c.rolling_damping];
         (model.spec, model.places) = build(&campaign.ranges, start, lowest, highest);
         for (label, height) in read.pictures.iter().map(|p| (p.label.clone(), p.height_m)) {
             model.add(label, height, &near);
@@ -205,6 +205,8 @@ impl PourModel {
                     c.sliding_friction = clamp(c.sliding_friction * step().exp(), ranges.sliding_friction);
                     c.rolling_friction = clamp(c.rolling_friction * step().exp(), ranges.rolling_friction);
                     c.restitution = clamp(c.restitution + 0.4 * step(), ranges.restitution);
+                    c.rolling_damping =
+                        clamp(c.rolling_damping + 0.4 * step(), [0.0, ranges.rolling_damping]);
                     c.work_of_adhesion_j_m2 *= step().exp();
                     c.work_of_adhesion_j_m2 = c.work_of_adhesion_j_m2.min(ranges.work_of_adhesion_j_m2);
                     c.size_variation = (c.size_variation * step().exp()).min(ranges.size_variation);
@@ -303,6 +305,7 @@ impl PourModel {
             sliding_friction: at(p.friction),
             rolling_friction: at(p.rolling),
             restitution: at(p.restitution),
+            rolling_damping: at(p.rolling_damping),
             height_m: height_m / self.scale + at(p.funnel_offset),
             work_of_adhesion_j_m2: at(p.adhesion) / self.adhesion_scale,
             ground_ratio: at(p.ground_ratio),
@@ -362,5 +365,5 @@ impl Model for PourModel {
 /// A camera for the specification of no recording in particular.
 pub(super) fn any_spec() -> Spec {
     let ranges = granular_infer::campaign::Ranges::default();
-    build(&ranges, [0.4, 0.1, 0.5], 0.04, 0.12).0
+    build(&ranges, [0.4, 0.1, 0.5, 0.3], 0.04, 0.12).0
 }

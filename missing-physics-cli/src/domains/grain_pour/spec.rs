@@ -13,6 +13,7 @@ pub(super) struct Places {
     pub(super) friction: At,
     pub(super) rolling: At,
     pub(super) restitution: At,
+    pub(super) rolling_damping: At,
     pub(super) adhesion: At,
     pub(super) ground_ratio: At,
     pub(super) size_variance: At,
@@ -30,17 +31,20 @@ pub(super) struct Places {
 }
 
 /// The specification; where baseline fits begin, and by how much the funnel may be off, m.
-pub(super) fn build(ranges: &Ranges, start: [f64; 3], lowest_m: f64, highest_m: f64) -> (Spec, Places) {
+pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: f64) -> (Spec, Places) {
     let mut b = Builder::default();
     let mut p = Places::default();
     b.spec.baseline =
-        "equal rigid spheres with sliding friction, rolling friction and restitution, poured onto level ground".into();
+        "equal rigid spheres with sliding friction, (damped) rolling friction and restitution, poured onto level ground"
+            .into();
     let within = |[low, high]: [f64; 2], v: f64| v.clamp(low, high);
     p.friction =
         b.shared("mu_s", "", within(ranges.sliding_friction, start[0]), ranges.sliding_friction, 0.1);
     p.rolling =
         b.shared("mu_r", "", within(ranges.rolling_friction, start[1]), ranges.rolling_friction, 0.03);
     p.restitution = b.shared("e", "", within(ranges.restitution, start[2]), ranges.restitution, 0.1);
+    let damping = [0.0, ranges.rolling_damping];
+    p.rolling_damping = b.shared("eta_r", "", within(damping, start[3]), damping, 0.1);
     grains(&mut b, &mut p, ranges);
     scene(&mut b, &mut p, ranges, lowest_m, highest_m);
     camera(&mut b, &mut p);
