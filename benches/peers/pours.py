@@ -255,19 +255,19 @@ def outcome(key, answer):
 
 
 def strengths(key, answer):
-    """Hidden parameters beside what was found."""
+    """Hidden parameters beside what was found, and whether the interval holds them."""
     wanted = key["accepted"][0]
     found = {p["name"]: p for m in answer["mechanisms"] for p in m["parameters"] if m["id"] in wanted}
     for mechanism in key["mechanisms"]:
         for name, value in mechanism["parameters"].items():
             if name in found:
                 low, high = found[name]["ci95"]
-                yield f"{name} {value:g}: {found[name]['value']:.4g} [{low:.4g}, {high:.4g}]"
+                yield f"{name} {value:g}: {found[name]['value']:.4g} [{low:.4g}, {high:.4g}]", low <= value <= high
 
 
 def score(folder, program):
     """Diagnoses every world below a folder: verdict, names, strengths beside the key's; then mechanism by answer."""
-    table, tally = {}, {}
+    table, tally, held = {}, {}, []
     for at in sorted(p.parent for p in folder.glob("**/key.json")):
         key = json.loads((at / "key.json").read_text())
         begun = time.monotonic()
@@ -281,9 +281,12 @@ def score(folder, program):
         answers = table.setdefault(hidden, {})
         answers[said] = answers.get(said, 0) + 1
         tally[result] = tally.get(result, 0) + 1
+        sizes = list(strengths(key, answer))
+        if said == hidden:
+            held += [holds for _, holds in sizes]
         print(
             f"{at.name:18} {answer['verdict']:12} {said:32} p {answer['p_value']:<8.2g} "
-            f"{result:16} {time.monotonic() - begun:4.0f} s  {'; '.join(strengths(key, answer))}"
+            f"{result:16} {time.monotonic() - begun:4.0f} s  {'; '.join(text for text, _ in sizes)}"
             + (f"  (or {', '.join(others)})" if others else ""),
             flush=True,
         )
@@ -292,6 +295,7 @@ def score(folder, program):
         each = ", ".join(f"{said} {n}" for said, n in sorted(answers.items(), key=lambda a: -a[1]))
         print(f"| {hidden} | {sum(answers.values())} | {each} |")
     print("\n" + ", ".join(f"{name} {count}" for name, count in sorted(tally.items())))
+    print(f"{sum(held)} of {len(held)} intervals of what is named hold the key's")
 
 
 def main():
