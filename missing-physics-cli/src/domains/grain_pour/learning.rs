@@ -34,7 +34,7 @@ pub(super) fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
     let flaws = missing(campaign, read, Flaws { noise_m, ..Flaws::default() });
     let one = |(pour, grains): &(u32, Grains)| {
         let conditions = campaign.ranges.draw(Campaign::SEED, u64::from(*pour));
-        let depth = read.camera.render(&scaled(grains, campaign.scale));
+        let depth = read.camera.render(&scaled(grains, campaign.scale.length));
         let mut rng = ChaCha8Rng::seed_from_u64(Campaign::SEED);
         rng.set_stream(u64::from(*pour));
         let blurred = MOST_BLUR_PX * rng.random::<f64>();
@@ -102,7 +102,7 @@ fn missing(campaign: &Campaign, read: &Read, flaws: Flaws) -> Flaws {
     let share = |[part, all]: [usize; 2]| part as f64 / all.max(1) as f64;
     let mut edges = [0usize; 2];
     for (_, grains) in campaign.pours.iter().take(POURS) {
-        let depth = read.camera.render(&scaled(grains, campaign.scale));
+        let depth = read.camera.render(&scaled(grains, campaign.scale.length));
         for i in 0..depth.len() {
             let [x, y] =
                 read.camera.place_m(i % read.camera.size_px[0], i / read.camera.size_px[0], depth[i]);

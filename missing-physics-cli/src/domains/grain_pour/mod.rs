@@ -3,6 +3,7 @@
 //! Every picture becomes two dozen statistics. Their means and their spread from pour to pour are learned from a campaign of
 //! simulated pours, each seen by the recording's own camera; the engine gets the statistics independent and of variance one.
 
+mod cache;
 mod campaign;
 #[cfg(test)]
 mod codes;
@@ -90,8 +91,8 @@ impl Domain for GrainPour {
         let experiments = [0.6 * range[0], 1.15 * range[1]]
             .map(|height| {
                 height.clamp(
-                    1.02 * campaign.scale * campaign.ranges.height_m[0],
-                    0.98 * campaign.scale * campaign.ranges.height_m[1],
+                    1.02 * campaign.scale.length * campaign.ranges.height_m[0],
+                    0.98 * campaign.scale.length * campaign.ranges.height_m[1],
                 )
             })
             .map(|height| propose(&mut model, height));

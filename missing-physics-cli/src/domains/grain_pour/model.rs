@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::campaign::Campaign;
+use super::campaign::{Campaign, Scale};
 use super::discrepancy::discrepancy;
 use super::learning::{MOST_BLUR_PX, counts, in_sight, samples};
 use super::read::{Picture, Read};
@@ -57,9 +57,7 @@ pub(super) struct PourModel {
     spec: Spec,
     places: Places,
     diameter_m: f64,
-    /// Lengths of the recording over those of the campaign; work of adhesion likewise.
-    scale: f64,
-    adhesion_scale: f64,
+    scale: Scale,
     /// Number of pictures in the recording.
     pictures: usize,
     runs: HashMap<String, Shown>,
@@ -81,17 +79,15 @@ impl PourModel {
         let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| shown_by(p, read)).collect();
         let samples = in_sight(samples(campaign, read), &seen, read.rig.count);
         let emulator = Emulator::learn(&campaign.ranges, &samples)?;
-        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / campaign.scale).collect();
-        let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
-        let highest = heights.iter().copied().fold(0.0, f64::max);
-        let density = |rig: &granular_infer::campaign::Rig| rig.density_kg_m3() * rig.diameter_m.powi(2);
+        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / campaign.scale.length).collect();
+        let lowest = read.pictures.iter().map(|p| p.height_m).fold(f64::INFINITY, f64::min);
+        let highest = read.pictures.iter().map(|p| p.height_m).fold(0.0, f64::max);
         let mut model = Self {
             emulator,
             spec: Spec::default(),
             places: Places::default(),
             diameter_m: read.rig.diameter_m,
             scale: campaign.scale,
-            adhesion_scale: density(&read.rig) / density(&campaign.rig),
             pictures: read.pictures.len(),
             runs: HashMap::new(),
         };
@@ -104,7 +100,7 @@ impl PourModel {
         let near = model.nearest(&heights, &seen, campaign, Effects::Any);
         let c = near.conditions;
         let start = [c.sliding_friction, c.rolling_friction, c.restitution, c.rolling_damping];
-        (model.spec, model.places) = build(&campaign.ranges, start, lowest, highest);
+        (model.spec, model.places) = build(&campaign.scale.up(&campaign.ranges), start, lowest, highest);
         for (label, height) in read.pictures.iter().map(|p| (p.label.clone(), p.height_m)) {
             model.add(label, height, &near);
         }
@@ -114,7 +110,7 @@ impl PourModel {
     /// Adds a run at a height in m; the spread is that of `near`.
     fn add(&mut self, label: String, height_m: f64, near: &View) {
         let mut view = *near;
-        view.conditions.height_m = height_m / self.scale;
+        view.conditions.height_m = height_m / self.scale.length;
         let factor = self.factor(&view);
         let centre = self.emulator.mean(&view.conditions, view.blur_px2);
         self.runs.insert(label, Shown { height_m, centre, factor });
@@ -229,7 +225,7 @@ impl PourModel {
 
     /// The likeliest baseline of a recording, at no height in particular.
     pub(super) fn nearest_baseline(&self, read: &Read, campaign: &Campaign) -> Conditions {
-        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / self.scale).collect();
+        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m / self.scale.length).collect();
         let seen: Vec<[f64; COUNT]> = read.pictures.iter().map(|p| shown_by(p, read)).collect();
         self.nearest(&heights, &seen, campaign, Effects::None).conditions
     }
@@ -240,7 +236,7 @@ impl PourModel {
         read.pictures
             .iter()
             .map(|p| {
-                let conditions = Conditions { height_m: p.height_m / self.scale, ..near };
+                let conditions = Conditions { height_m: p.height_m / self.scale.length, ..near };
                 self.emulator.mean(&conditions, 0.0)
             })
             .collect()
@@ -257,7 +253,7 @@ impl PourModel {
     ) -> ([f64; COUNT], [f64; COUNT]) {
         use granular_infer::statistics::Symmetry;
         let left = |picture: &Picture| {
-            let height_m = picture.height_m / self.scale + conditions.height_m;
+            let height_m = picture.height_m / self.scale.length + conditions.height_m;
             let at = Conditions { height_m, ..*conditions };
             let (mean, sigma) = (self.emulator.mean(&at, blur_px2), self.emulator.sigma(&at, blur_px2));
             let seen = shown_by(picture, read);
@@ -306,15 +302,15 @@ impl PourModel {
             rolling_friction: at(p.rolling),
             restitution: at(p.restitution),
             rolling_damping: at(p.rolling_damping),
-            height_m: height_m / self.scale + at(p.funnel_offset),
-            work_of_adhesion_j_m2: at(p.adhesion) / self.adhesion_scale,
+            height_m: height_m + at(p.funnel_offset),
+            work_of_adhesion_j_m2: at(p.adhesion),
             ground_ratio: at(p.ground_ratio),
             size_variation: at(p.size_variance).max(0.0).sqrt(),
             tilt_rad: p.tilt.map(at),
-            drag_per_m: at(p.drag) * self.scale,
+            drag_per_m: at(p.drag),
             aspect_ratio: at(p.aspect),
         };
-        let mut mean = self.emulator.mean(&conditions, at(p.blur_px2));
+        let mut mean = self.emulator.mean(&self.scale.down(&conditions), at(p.blur_px2));
         mean[0] += at(p.depth_offset) / self.diameter_m;
         for (k, (name, _)) in STATISTICS.iter().enumerate() {
             match name.as_str() {

@@ -55,7 +55,7 @@ pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: 
 /// What the grains may be.
 fn grains(b: &mut Builder, p: &mut Places, ranges: &Ranges) {
     let most = ranges.work_of_adhesion_j_m2;
-    p.adhesion = b.shared("work_of_adhesion_j_m2", "J/m2", 0.0, [0.0, most], 0.02);
+    p.adhesion = b.shared("work_of_adhesion_j_m2", "J/m2", 0.0, [0.0, most], 0.08 * most);
     b.mechanism(
         "cohesion",
         &[p.adhesion],
@@ -141,7 +141,8 @@ fn scene(b: &mut Builder, p: &mut Places, ranges: &Ranges, lowest_m: f64, highes
         value: Arc::new(move |shared| shared[slots[0]].hypot(shared[slots[1]])),
     });
     let room = [ranges.height_m[0] - lowest_m, ranges.height_m[1] - highest_m];
-    p.funnel_offset = b.shared("offset_m", "m", 0.0, [room[0].min(0.0), room[1].max(0.0)], 5e-3);
+    p.funnel_offset =
+        b.shared("offset_m", "m", 0.0, [room[0].min(0.0), room[1].max(0.0)], ranges.height_m[1] / 28.0);
     b.mechanism(
         "funnel-offset",
         &[p.funnel_offset],
@@ -153,7 +154,8 @@ fn scene(b: &mut Builder, p: &mut Places, ranges: &Ranges, lowest_m: f64, highes
         ],
         &["air-drag"],
     );
-    p.drag = b.shared("k_per_m", "1/m", 0.0, [0.0, ranges.drag_per_m], 0.3);
+    let most = ranges.drag_per_m;
+    p.drag = b.shared("k_per_m", "1/m", 0.0, [0.0, most], 0.05 * most);
     b.mechanism(
         "air-drag",
         &[p.drag],
