@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Recordings of the domain grain-pour by another simulator, with a key: worlds on which the domain was not made.
 
-    benches/peers/pours.py make FOLDER [--seed 1] [--kinds NAME ...]     LIGGGHTS pours, a camera looks
-    benches/peers/pours.py score FOLDER MISSING_PHYSICS                  diagnoses each, and says how it did
+    benches/peers/pours.py make FOLDER [--seed 1] [--kinds NAME ...] [--count 1000]     LIGGGHTS pours, a camera looks
+    benches/peers/pours.py score FOLDER MISSING_PHYSICS                                 diagnoses each, and says how it did
 
 Needs numpy. A world of four pours takes some 35 CPU s (rods: 90). Debian: apt install liggghts.
 """
@@ -24,7 +24,7 @@ import grains
 from grains import Scene
 
 HEIGHTS = (0.04, 0.06, 0.09, 0.12)
-COUNT, RADIUS, DENSITY = 1000, 2e-3, 1300.0
+RADIUS, DENSITY = 2e-3, 1300.0
 
 
 def rod(aspect):
@@ -179,7 +179,7 @@ def png(path, counts):
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + body)
 
 
-def make(folder, kind, seed):
+def make(folder, kind, seed, count):
     """One world: pours, pictures, recording, key."""
     name = f"{kind}-{seed}"
     folder = folder / name
@@ -199,7 +199,7 @@ def make(folder, kind, seed):
     rows, cpu = ["run,funnel_height_m,depth_image"], 0.0
     for run, height in enumerate(dice.sample(HEIGHTS, len(HEIGHTS)), start=1):
         scene = Scene(
-            count=COUNT, height=height + camera["funnel"], duration=2.0, step=6e-5, modulus=1.5e6, **truth, **hidden
+            count=count, height=height + camera["funnel"], duration=2.0, step=6e-5, modulus=1.5e6, **truth, **hidden
         )
         at, fill = folder / "pours" / str(run), dice.randrange(10**6)
         if not (at / "end.txt").exists():
@@ -228,7 +228,7 @@ depth_unit_m = 0.0001
 [rig]
 grain_diameter_m = {2 * RADIUS}
 grain_mass_kg = {mass:.4e}
-grain_count = {COUNT}
+grain_count = {count}
 funnel = {{ outlet_radius_m = {grains.OUTLET}, cone_half_angle_rad = {math.pi / 4:.4f}, tube_radius_m = {grains.TUBE} }}
 """)
     key = {
@@ -305,6 +305,7 @@ def main():
     making.add_argument("folder", type=pathlib.Path)
     making.add_argument("--seed", type=int, default=1)
     making.add_argument("--kinds", nargs="*", default=list(KINDS), choices=list(KINDS))
+    making.add_argument("--count", type=int, default=1000, help="grains: of others than 1000 the tool makes its own pours first")
     scoring = commands.add_parser("score")
     scoring.add_argument("folder", type=pathlib.Path)
     scoring.add_argument("program")
@@ -315,7 +316,7 @@ def main():
         sys.exit("liggghts is not installed: these worlds are poured by it (Debian: apt install liggghts)")
     for kind in options.kinds:
         try:
-            make(options.folder, kind, options.seed)
+            make(options.folder, kind, options.seed, options.count)
         except RuntimeError as error:
             print(f"{kind}: {error}", file=sys.stderr)
 

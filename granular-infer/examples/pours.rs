@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p granular-infer --example pours -- grains 2000 SHARD OF FILE    prior over the grains, from 12 cm
-//! cargo run --release -p granular-infer --example pours -- heights 200 SHARD OF FILE     couscous from 1 to 13 cm
+//! cargo run --release -p granular-infer --example pours -- heights 800 SHARD OF FILE     couscous from 1 to 13 cm
 //! ```
 //! Run again with the same arguments it goes on where it was stopped. SHARD counts from 0.
 #![allow(clippy::print_stdout, reason = "says how far it is")]

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! for k in $(seq 0 39); do cargo run --release -p granular-infer --example pours -- grains 2000 $k 40 g$k.txt; done
-//! cargo run --release -p granular-infer --example pours -- heights 200 0 1 h.txt
+//! cargo run --release -p granular-infer --example pours -- heights 800 0 1 h.txt
 //! cargo run --release -p granular-infer --example study -- granular-infer pours.npz g*.txt h.txt
 //! ```
 //! Every tenth pour is held out; `posterior.json.gz` and `heights.json.gz` are written into the folder. `pours.npz` has `theta` (`mu_s, mu_r, e`), `statistics` and `centres_m` for Python.
