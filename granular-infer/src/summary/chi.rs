@@ -1,5 +1,7 @@
 //! A shifted and scaled chi distribution, fitted by maximum likelihood.
 
+use argmin::core::{CostFunction, Error, Executor, State as _};
+use argmin::solver::brent::BrentOpt;
 use statrs::function::gamma::{digamma, ln_gamma};
 
 use super::SummaryError;
@@ -8,8 +10,8 @@ use super::SummaryError;
 const DEGREES: [f64; 2] = [1.0, 100.0];
 /// Shifts that are tried first.
 const GRID: usize = 24;
-/// Halvings (by the golden ratio) about the best of them.
-const HALVINGS: usize = 30;
+/// To which the best is found between its neighbours, as a part of the range.
+const TOLERANCE: f64 = 1e-6;
 
 /// A bound at which a fit ended: the likelihood rises beyond it, and the three numbers are only as good as the bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +44,7 @@ pub struct ChiFit {
 /// Fits a chi distribution to values that are zero or more by maximum likelihood.
 ///
 /// With the shift given, `(r - b)^2` follows a gamma distribution, whose shape solves one equation and whose scale is a mean;
-/// so only the shift is searched for, on a grid and then by golden sections.
+/// so only the shift is searched for, on a grid and then by Brent's method.
 ///
 /// # Errors
 /// [`SummaryError::TooFew`] below 20 values, [`SummaryError::NotFinite`], [`SummaryError::NoSpread`] where all are equal.
@@ -62,32 +64,19 @@ pub fn fit_chi(values: &[f64]) -> Result<ChiFit, SummaryError> {
     // A value at the shift itself has no logarithm.
     let least = -high.abs();
     let most = low - 1e-6 * spread;
-    let at = |k: f64| least + (most - least) * k;
-    let (mut best, mut fit) = (0.0, given_shift(values, at(0.0)));
+    let shifts = Shifts { values, least, most };
+    let (mut best, mut fit) = (0.0, shifts.fit(0.0));
     let step = 1.0 / GRID as f64;
     for k in 1..=GRID {
-        let other = given_shift(values, at(k as f64 * step));
+        let other = shifts.fit(k as f64 * step);
         if other.ln_density > fit.ln_density {
             (best, fit) = (k as f64 * step, other);
         }
     }
-    let (mut a, mut b) = ((best - step).max(0.0), (best + step).min(1.0));
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let inner = |a: f64, b: f64| (b - golden * (b - a), a + golden * (b - a));
-    let (c, d) = inner(a, b);
-    let (mut at_c, mut at_d) = (given_shift(values, at(c)), given_shift(values, at(d)));
-    for _ in 0..HALVINGS {
-        if at_c.ln_density > at_d.ln_density {
-            b = a + golden * (b - a);
-            at_d = at_c;
-            at_c = given_shift(values, at(inner(a, b).0));
-        } else {
-            a = b - golden * (b - a);
-            at_c = at_d;
-            at_d = given_shift(values, at(inner(a, b).1));
-        }
-    }
-    for other in [at_c, at_d] {
+    let solver = BrentOpt::new((best - step).max(0.0), (best + step).min(1.0)).set_tolerance(0.0, TOLERANCE);
+    let found = Executor::new(shifts, solver).configure(|state| state.max_iters(60)).run();
+    if let Some(k) = found.ok().and_then(|f| f.state().get_best_param().copied()) {
+        let other = shifts.fit(k);
         if other.ln_density > fit.ln_density {
             fit = other;
         }
@@ -102,6 +91,30 @@ pub fn fit_chi(values: &[f64]) -> Result<ChiFit, SummaryError> {
     };
     fit.bound = fit.bound.or(shift);
     Ok(fit)
+}
+
+/// Values whose shift lies between two, 0 and 1.
+#[derive(Clone, Copy)]
+struct Shifts<'a> {
+    values: &'a [f64],
+    least: f64,
+    most: f64,
+}
+
+impl Shifts<'_> {
+    /// The best fit at a part of the way from the least shift to the most.
+    fn fit(&self, part: f64) -> ChiFit {
+        given_shift(self.values, self.least + (self.most - self.least) * part)
+    }
+}
+
+impl CostFunction for Shifts<'_> {
+    type Param = f64;
+    type Output = f64;
+
+    fn cost(&self, part: &f64) -> Result<f64, Error> {
+        Ok(-self.fit(*part).ln_density)
+    }
 }
 
 /// The best fit with a shift below all values.

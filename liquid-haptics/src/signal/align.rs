@@ -1,3 +1,5 @@
+use argmin::core::{CostFunction, Error, Executor, State as _};
+use argmin::solver::brent::BrentOpt;
 use hw_traits::clock::Stamped;
 
 use super::SignalError;
@@ -6,8 +8,8 @@ use super::SignalError;
 const ALIKE: f64 = 0.5;
 /// Trial shifts on each side of zero, in the coarse search.
 const SHIFTS: i32 = 200;
-/// Golden sections of the fine search.
-const SECTIONS: usize = 60;
+/// To which a shift is found, s.
+const TOLERANCE_S: f64 = 1e-9;
 
 /// Times of one clock from times of another: `offset_s + rate t`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,18 +74,33 @@ pub fn align_at(
     let score = |shift: f64| correlation(first, second, shift);
     let grid = |k: i32| most_s * f64::from(k) / f64::from(SHIFTS);
     let best = (-SHIFTS..=SHIFTS).max_by(|a, b| score(grid(*a)).total_cmp(&score(grid(*b)))).unwrap_or(0);
-    let (mut low, mut high) = (grid(best - 1), grid(best + 1));
-    let golden = 0.5 * (5f64.sqrt() - 1.0);
-    for _ in 0..SECTIONS {
-        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-        if score(a) > score(b) { high = b } else { low = a }
-    }
-    let offset_s = 0.5 * (low + high);
-    let got = score(offset_s);
+    let solver =
+        BrentOpt::new(grid(best - 1), grid(best + 1)).set_tolerance(f64::EPSILON.sqrt(), TOLERANCE_S);
+    let found =
+        Executor::new(Shifted { first, second }, solver).configure(|state| state.max_iters(100)).run();
+    // Brent's method does not try the grid's own shift.
+    let coarse = (grid(best), score(grid(best)));
+    let fine = found.ok().and_then(|f| Some((*f.state().get_best_param()?, -f.state().get_best_cost())));
+    let (offset_s, got) = fine.filter(|f| f.1 > coarse.1).unwrap_or(coarse);
     if !(got >= ALIKE) {
         return Err(SignalError::NotAlike { got, least: ALIKE });
     }
     Ok(ClockMap { offset_s, rate: 1.0 })
+}
+
+/// Two streams, the second to be shifted until they are alike.
+struct Shifted<'a> {
+    first: &'a [Stamped<f64>],
+    second: &'a [Stamped<f64>],
+}
+
+impl CostFunction for Shifted<'_> {
+    type Param = f64;
+    type Output = f64;
+
+    fn cost(&self, shift: &f64) -> Result<f64, Error> {
+        Ok(-correlation(self.first, self.second, *shift))
+    }
 }
 
 fn rising(name: &'static str, stream: &[Stamped<f64>]) -> Result<(), SignalError> {

@@ -7,6 +7,7 @@ pub mod dough_roll;
 mod dual;
 pub mod grain_pour;
 pub mod indentation;
+mod kept;
 pub mod liquid_tilt;
 mod reading;
 pub mod slosh;

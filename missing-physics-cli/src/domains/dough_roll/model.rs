@@ -1,8 +1,11 @@
 //! The full model of a rolled dough: learned dynamics, and what may have become of the response since.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::convert::Infallible;
+use std::sync::{Arc, OnceLock};
 
+use argmin::core::{CostFunction, Error, Executor, State as _};
+use argmin::solver::brent::BrentOpt;
 use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::{Dynamics, Roll};
 use dough_mbrl::filter::{Beside, Fresh, Step as Followed, follow};
@@ -13,6 +16,7 @@ use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Spec};
 use nalgebra::{DVector, Vector3};
 
+use super::super::kept::{Kept, bits};
 use super::forces::Forces;
 use super::read::{RunOfRolls, Step};
 use super::spec::{Effects, Places, build};
@@ -36,7 +40,7 @@ struct Dough {
 }
 
 /// The errors of a block, by the bits of the shared parameters.
-type Errors = Mutex<HashMap<(usize, Vec<u64>), Arc<DVector<f64>>>>;
+type Errors = Kept<(usize, Vec<u64>), Arc<DVector<f64>>>;
 /// Errors that are kept.
 const MOST_KEPT: usize = 256;
 /// Forces below which a band may slip that are looked at, and those from which a fit begins.
@@ -78,7 +82,7 @@ impl DoughModel {
         let scale = std::array::from_fn(|c| {
             (noise.measured[usize::from(c < 3)][c % 3] + noise.process[c % 3]).sqrt()
         });
-        let (blocks, runs, kept, slips) = (Vec::new(), HashMap::new(), Mutex::default(), OnceLock::new());
+        let (blocks, runs, kept, slips) = (Vec::new(), HashMap::new(), Kept::new(MOST_KEPT), OnceLock::new());
         Self { band, dynamics, forces, spec, places, blocks, shown: None, runs, kept, slips, scale }
     }
 
@@ -217,17 +221,8 @@ impl DoughModel {
 
     /// The same, kept for the other runs of the block.
     fn kept_errors(&self, block: usize, shared: &[f64]) -> Arc<DVector<f64>> {
-        let key = (block, shared.iter().map(|v| v.to_bits()).collect::<Vec<u64>>());
-        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(errors) = lock().get(&key) {
-            return Arc::clone(errors);
-        }
-        let errors = Arc::new(self.errors(&self.blocks[block], &self.places.effects(shared)));
-        let mut kept = lock();
-        if kept.len() >= MOST_KEPT {
-            kept.clear();
-        }
-        kept.insert(key, Arc::clone(&errors));
+        let make = || Arc::new(self.errors(&self.blocks[block], &self.places.effects(shared)));
+        let Ok(errors) = self.kept.get_or((block, bits(shared)), || Ok::<_, Infallible>(make()));
         errors
     }
 
@@ -262,14 +257,23 @@ impl DoughModel {
     }
 }
 
-/// Where a function of one variable is least, by golden sections (Kiefer 1953, doi:10.1090/S0002-9939-1953-0055639-3).
-fn least([mut low, mut high]: [f64; 2], cost: impl Fn(f64) -> f64) -> f64 {
-    const PART: f64 = 0.618_033_988_749_894_8;
-    for _ in 0..20 {
-        let (a, b) = (high - PART * (high - low), low + PART * (high - low));
-        if cost(a) < cost(b) { high = b } else { low = a }
+/// A cost of one variable, as argmin takes it.
+struct OneVariable<F>(F);
+
+impl<F: Fn(f64) -> f64> CostFunction for OneVariable<F> {
+    type Param = f64;
+    type Output = f64;
+
+    fn cost(&self, at: &f64) -> Result<f64, Error> {
+        Ok((self.0)(*at))
     }
-    0.5 * (low + high)
+}
+
+/// Where a function of one variable is least, to a ten thousandth of the range, by Brent's method.
+fn least([low, high]: [f64; 2], cost: impl Fn(f64) -> f64) -> f64 {
+    let solver = BrentOpt::new(low, high).set_tolerance(0.0, 1e-4 * (high - low));
+    let found = Executor::new(OneVariable(cost), solver).configure(|state| state.max_iters(40)).run();
+    found.ok().and_then(|f| f.state().get_best_param().copied()).unwrap_or(0.5 * (low + high))
 }
 
 impl Model for DoughModel {

@@ -1,7 +1,6 @@
 //! The full model of a tilt sweep: physics from `liquid-haptics`, and all parameters.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use liquid_haptics::container::mesh::{MeshContainer, PlannedMesh};
 use liquid_haptics::container::{Container, Cylinder};
@@ -10,6 +9,7 @@ use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Scope, Spec};
 
 use crate::domains::builder::{At, Builder};
+use crate::domains::kept::Kept;
 
 /// The container, by its outer surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +105,7 @@ struct Places {
 pub struct LiquidTiltModel {
     setup: Setup,
     /// Cavities by the thickness of their wall (its bits), where making one takes long.
-    cavities: Mutex<HashMap<u64, Cavity>>,
+    cavities: Kept<u64, Cavity>,
     spec: Spec,
     places: Places,
     slip: usize,
@@ -122,24 +122,14 @@ impl LiquidTiltModel {
     pub fn new(setup: Setup, rows: usize) -> Self {
         let (spec, places) = build(&setup, rows);
         let slip = spec.mechanisms.iter().position(|m| m.id == "grasp-slip").unwrap_or(usize::MAX);
-        Self { setup, cavities: Mutex::default(), spec, places, slip }
+        Self { setup, cavities: Kept::new(MOST_WALLS), spec, places, slip }
     }
 
     fn cavity(&self, wall_m: f64) -> Result<Cavity, String> {
         if matches!(self.setup.vessel, Vessel::Cylinder { .. }) {
             return self.setup.vessel.cavity(wall_m);
         }
-        let lock = || self.cavities.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cavity) = lock().get(&wall_m.to_bits()) {
-            return Ok(Arc::clone(cavity));
-        }
-        let cavity = self.setup.vessel.cavity(wall_m)?;
-        let mut cavities = lock();
-        if cavities.len() >= MOST_WALLS {
-            cavities.clear();
-        }
-        cavities.insert(wall_m.to_bits(), Arc::clone(&cavity));
-        Ok(cavity)
+        self.cavities.get_or(wall_m.to_bits(), || self.setup.vessel.cavity(wall_m))
     }
 
     /// What is known of the set-up.
