@@ -17,13 +17,23 @@ use super::model::PourModel;
 use super::read::read;
 use crate::recording::Header;
 
-/// A recording's statistics less the emulator's, in sigmas: mean and scatter over its pours at the truth, mean at the likeliest
-/// baseline.
+/// A recording's statistics less the emulator's, in sigmas, picture by picture: at the truth, and at the likeliest baseline.
 struct Distance {
-    at_truth: [f64; COUNT],
-    scatter: [f64; COUNT],
-    at_best: [f64; COUNT],
-    pours: f64,
+    heights_m: Vec<f64>,
+    at_truth: Vec<[f64; COUNT]>,
+    at_best: Vec<[f64; COUNT]>,
+}
+
+/// Mean over pictures of a statistic.
+fn mean(all: &[[f64; COUNT]], k: usize) -> f64 {
+    all.iter().map(|l| l[k]).sum::<f64>() / all.len() as f64
+}
+
+/// Mean over all pairs of different pictures of a recording of the product of their distances.
+fn common(all: &[[f64; COUNT]], k: usize) -> f64 {
+    let n = all.len() as f64;
+    let own = all.iter().map(|l| l[k] * l[k]).sum::<f64>();
+    ((n * mean(all, k)).powi(2) - own) / (n * (n - 1.0))
 }
 
 /// What the key says was poured; the azimuth of a tilt is that of the heap's centroid.
@@ -65,11 +75,11 @@ fn distance(folder: &Path) -> Result<Distance, Box<dyn std::error::Error>> {
     let model = PourModel::new(&campaign, &read)?;
     let aside = model.aside(&read);
     let (conditions, blur_px2) = truth(&key, &campaign, aside).ok_or("a key without a truth")?;
-    let (at_truth, scatter) = model.distance(&read, &conditions, blur_px2);
+    let at_truth = model.distances(&read, &conditions, blur_px2);
     let best = Conditions { height_m: 0.0, ..model.nearest_baseline(&read, &campaign) };
-    let at_best = model.distance(&read, &best, 0.0).0;
+    let at_best = model.distances(&read, &best, 0.0);
     println!("{} truth {conditions:?}\n   best {best:?}", folder.display());
-    Ok(Distance { at_truth, scatter, at_best, pours: heights.len() as f64 })
+    Ok(Distance { heights_m: heights, at_truth, at_best })
 }
 
 #[test]
@@ -83,26 +93,49 @@ fn another_simulator() {
     let found: Vec<Distance> = worlds.iter().map(|w| distance(w).unwrap()).collect();
     assert!(!found.is_empty());
     println!(
-        "root mean square over {} recordings, in sigmas from pour to pour (means: beyond what chance leaves)",
+        "mean squares over {} recordings, in those from pour to pour: of a picture, common to two pictures of a recording, and of two",
         found.len()
     );
-    println!("{:24} {:>9} {:>9} {:>9}   each at truth", "statistic", "at truth", "scatter", "at best");
+    println!(
+        "whose heights differ by a factor below and above {APART}; common at the likeliest baseline; each recording's mean at truth"
+    );
+    println!(
+        "{:24} {:>7} {:>7} {:>7} {:>7} {:>7}",
+        "statistic", "picture", "common", "near", "apart", "at best"
+    );
     for (k, (name, _)) in STATISTICS.iter().enumerate() {
-        let mean = |of: &dyn Fn(&Distance) -> f64| {
-            let square = found.iter().map(of).sum::<f64>() / found.len() as f64;
-            square.signum() * square.abs().sqrt()
+        let over = |of: &dyn Fn(&Distance) -> f64| found.iter().map(of).sum::<f64>() / found.len() as f64;
+        let own =
+            |d: &Distance| d.at_truth.iter().map(|l| l[k] * l[k]).sum::<f64>() / d.at_truth.len() as f64;
+        let pairs = |apart: bool| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            for d in &found {
+                for i in 0..d.heights_m.len() {
+                    for j in 0..i {
+                        if ((d.heights_m[i] / d.heights_m[j]).ln().abs() > APART.ln()) == apart {
+                            sum += d.at_truth[i][k] * d.at_truth[j][k];
+                            n += 1.0;
+                        }
+                    }
+                }
+            }
+            sum / n
         };
-        let each: Vec<String> = found.iter().map(|d| format!("{:5.1}", d.at_truth[k])).collect();
+        let each: Vec<String> = found.iter().map(|d| format!("{:5.1}", mean(&d.at_truth, k))).collect();
         println!(
-            "{name:24} {:9.2} {:9.2} {:9.2}   {}",
-            mean(&|d| d.at_truth[k].powi(2) - d.scatter[k].powi(2) / d.pours),
-            mean(&|d| d.scatter[k].powi(2)),
-            mean(&|d| d.at_best[k].powi(2) - d.scatter[k].powi(2) / d.pours),
+            "{name:24} {:7.2} {:7.2} {:7.2} {:7.2} {:7.2}   {}",
+            over(&own),
+            over(&|d| common(&d.at_truth, k)),
+            pairs(false),
+            pairs(true),
+            over(&|d| common(&d.at_best, k)),
             each.join(" ")
         );
     }
 }
 
+/// Heights that differ by more than this factor are far apart.
+const APART: f64 = 1.8;
 /// Scenes tried, pours of each.
 const SCENES: u64 = 10;
 const POURS: u64 = 12;
@@ -160,7 +193,6 @@ fn what_a_recording_does_not_say() {
             ..baseline
         };
         let plain = pictures(&rig, &rig.scene(&conditions));
-        let mean = |all: &[[f64; COUNT]], k: usize| all.iter().map(|s| s[k]).sum::<f64>() / all.len() as f64;
         let sigma = |k: usize| {
             let square = plain.iter().map(|s| (s[k] - mean(&plain, k)).powi(2)).sum::<f64>();
             (square / (plain.len() - 1) as f64).sqrt().max(1e-9)

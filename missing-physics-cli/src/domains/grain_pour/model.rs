@@ -242,15 +242,10 @@ impl PourModel {
             .collect()
     }
 
-    /// Mean and scatter over the pictures of each statistic less its mean, in sigmas from pour to pour, what turns with the scene along
-    /// and across the tilt; the height of the conditions is added to the pictures'.
+    /// Each picture's statistics less their mean, in sigmas from pour to pour, what turns with the scene along and across the tilt; the
+    /// height of the conditions is added to the pictures'.
     #[cfg(test)]
-    pub(super) fn distance(
-        &self,
-        read: &Read,
-        conditions: &Conditions,
-        blur_px2: f64,
-    ) -> ([f64; COUNT], [f64; COUNT]) {
+    pub(super) fn distances(&self, read: &Read, conditions: &Conditions, blur_px2: f64) -> Vec<[f64; COUNT]> {
         use granular_infer::statistics::Symmetry;
         let left = |picture: &Picture| {
             let height_m = picture.height_m / self.scale.length + conditions.height_m;
@@ -270,11 +265,7 @@ impl PourModel {
                 Symmetry::Second => (2.0 * azimuth).cos() * left[k] - (2.0 * azimuth).sin() * left[k - 1],
             })
         };
-        let all: Vec<[f64; COUNT]> = read.pictures.iter().map(left).collect();
-        let n = all.len() as f64;
-        let mean: [f64; COUNT] = std::array::from_fn(|k| all.iter().map(|l| l[k]).sum::<f64>() / n);
-        let square = |k: usize| all.iter().map(|l| (l[k] - mean[k]).powi(2)).sum::<f64>();
-        (mean, std::array::from_fn(|k| (square(k) / (n - 1.0)).sqrt()))
+        read.pictures.iter().map(left).collect()
     }
 
     /// Where the pictures' centroids lie.
