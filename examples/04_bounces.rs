@@ -60,7 +60,7 @@ fn diagnosed(world: &BounceWorld, seed: u64) -> Result<Diagnosis, String> {
     for (name, text) in ["recording.toml", "data.csv"].iter().zip(world.files(seed)) {
         std::fs::write(folder.path().join(name), text).map_err(|e| e.to_string())?;
     }
-    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    let (_, loaded) = missing_physics_domains::load(folder.path()).map_err(|e| e.to_string())?;
     let options = Options { seed, replicates: 499, ..Options::default() };
     diagnose(&*loaded.model, &loaded.recording, &[], &options, &Silent).map_err(|e| e.to_string())
 }

@@ -408,7 +408,7 @@ fn mishaps() -> Outcome<()> {
         let folder = tempfile::tempdir()?;
         std::fs::write(folder.path().join("recording.toml"), header)?;
         std::fs::write(folder.path().join("data.csv"), rows)?;
-        let (_, loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+        let (_, loaded) = missing_physics_domains::load(folder.path()).map_err(|e| e.to_string())?;
         let options = Options { seed: 1, replicates: 499, ..Options::default() };
         let answer = diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?;
         println!("diagnosis, {name}: {} {:?}", answer.verdict.word(), answer.chosen);

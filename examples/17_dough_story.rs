@@ -228,7 +228,7 @@ fn ask(
     std::fs::write(folder.path().join("recording.toml"), header)?;
     std::fs::write(folder.path().join("training.csv"), table(training)?)?;
     std::fs::write(folder.path().join("data.csv"), table(doughs)?)?;
-    let (_, loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    let (_, loaded) = missing_physics_domains::load(folder.path()).map_err(|e| e.to_string())?;
     let options = Options { seed, replicates, ..Options::default() };
     Ok(diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?)
 }

@@ -72,7 +72,7 @@ fn ask<R: Rig>(rows: &str, seed: u64) -> Outcome<Diagnosis> {
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("recording.toml"), R::header())?;
     std::fs::write(folder.path().join("data.csv"), format!("{}\n{rows}", R::COLUMNS))?;
-    let (_, mut loaded) = missing_physics_cli::domains::load(folder.path()).map_err(|e| e.to_string())?;
+    let (_, mut loaded) = missing_physics_domains::load(folder.path()).map_err(|e| e.to_string())?;
     loaded.experiments.retain(|e| proposed::<R>(&e.action).is_some());
     let options = Options { seed, replicates: 199, ..Options::default() };
     Ok(diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)?)

@@ -1,7 +1,7 @@
 //! The targets feed one file of a sound recording, which the test `mutilated` of the tool mutilates as well.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a fuzz target stops where it fails, and says what it saw")]
 
-#[path = "../../missing-physics-cli/tests/kinds/mod.rs"]
+#[path = "../../missing-physics/cli/tests/kinds/mod.rs"]
 pub mod kinds;
 
 /// Writes what the fuzzer begins with into the folder that the environment names as `SOUND`: a sound file of each kind.

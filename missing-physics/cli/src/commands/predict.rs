@@ -1,0 +1,63 @@
+//! `predict`: a repaired model and a recording in, simulated channels out.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::{CommandError, write_whole};
+use missing_physics_domains::repair::Repair;
+
+/// Half the width of a 95 % interval of a normal law, in sigmas.
+const SIGMAS: f64 = 1.959_963_984_540_054;
+
+/// Predicts a recording and returns a table, or writes it to a file and says so.
+///
+/// Columns: `run`, the inputs, and for each channel its simulated value, one sigma of that, and the bounds between which a
+/// reading lies with 95 %.
+///
+/// # Errors
+/// [`CommandError`]; nothing is written then.
+pub fn predict(model: &Path, folder: &Path, csv: Option<&Path>) -> Result<String, CommandError> {
+    let repair = Repair::read(model)?;
+    let predicted = repair.predict(folder)?;
+    let recording = &predicted.recording;
+    let mut text = String::from("run");
+    // Writing to a string cannot fail.
+    for variable in &recording.variables {
+        let _ = write!(text, ",{}", variable.name);
+    }
+    for channel in &recording.channels {
+        let n = &channel.name;
+        let _ = write!(text, ",{n},{n}_sigma,{n}_low95,{n}_high95");
+    }
+    text.push('\n');
+    for (run, said) in recording.runs.iter().zip(&predicted.runs) {
+        for row in 0..run.len() {
+            text.push_str(&cell(&run.label));
+            for input in &run.inputs {
+                let _ = write!(text, ",{}", input[row]);
+            }
+            for ((value, sigma), noise) in said.channels.iter().zip(&said.sigma).zip(&repair.model.noise) {
+                let (value, sigma) = (value[row], sigma[row]);
+                let half = SIGMAS * sigma.hypot(noise.sigma);
+                let _ = write!(text, ",{value:.9e},{sigma:.3e},{:.9e},{:.9e}", value - half, value + half);
+            }
+            text.push('\n');
+        }
+    }
+    match csv {
+        None => Ok(text),
+        Some(path) => {
+            write_whole(path, &text)?;
+            Ok(format!("{}: {} runs predicted\n", path.display(), predicted.runs.len()))
+        }
+    }
+}
+
+/// A label as a cell of a CSV.
+fn cell(label: &str) -> String {
+    if label.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", label.replace('"', "\"\""))
+    } else {
+        label.to_owned()
+    }
+}

@@ -1,0 +1,196 @@
+//! Anybody's simulator: one that answers, ones that fail in every way, and columns that one has written.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+fn diagnose(folder: &Path) -> Result<Value, String> {
+    let out = tempfile::tempdir().unwrap();
+    let json = out.path().join("a.json");
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output = Command::new(tool).arg("diagnose").arg(folder).arg("--json").arg(&json).output().unwrap();
+    match output.status.code() {
+        Some(0) => Ok(serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap()),
+        Some(2) => {
+            assert!(!json.exists(), "half a report");
+            let said = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(said.lines().count(), 1, "{said}");
+            Err(said.trim().strip_prefix("missing-physics: ").unwrap().to_owned())
+        }
+        other => panic!("{other:?}: {output:?}"),
+    }
+}
+
+/// A recording of a straight line, with the lines of a header added.
+fn line(extra: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut csv = String::from("run,t_s,y_m\n");
+    for run in ["a", "b"] {
+        for i in 0..12 {
+            csv.push_str(&format!("{run},{i},{}\n", f64::from(i) + 0.01 * f64::from(i * i * 7 % 11)));
+        }
+    }
+    let header = "format = 1\ndomain = \"custom\"\ndata = \"data.csv\"\n";
+    let columns = "[[input]]\nname = \"t_s\"\nunit = \"s\"\n[[channel]]\nname = \"y_m\"\nunit = \"m\"\n";
+    std::fs::write(folder.path().join("data.csv"), csv).unwrap();
+    std::fs::write(folder.path().join("recording.toml"), format!("{header}{columns}{extra}")).unwrap();
+    folder
+}
+
+/// What the tool says of a simulator that is the given shell script.
+fn said_of(script: &str) -> String {
+    let parameter = "[[parameter]]\nname = \"slope\"\nstart = 1.0\nscale = 0.1\n";
+    let simulator = format!("[simulator]\ncommand = [\"sh\", \"-c\", '''{script}''']\n");
+    diagnose(line(&format!("{simulator}timeout_s = 0.3\n{parameter}")).path()).unwrap_err()
+}
+
+#[test]
+fn a_simulator_that_fails_is_quoted() {
+    let cases = [
+        (
+            "echo hello; cat",
+            "the simulator answered \"hello\\n\", expected {\"id\": 1, \"channels\": {…}} on one line",
+        ),
+        (
+            "read l; echo broken pipe fitting >&2; exit 3",
+            "the simulator ended (exit status: 3) before it answered; its last words: \"broken pipe fitting\"",
+        ),
+        (
+            "read l; echo '{\"id\": 1, \"error\": \"slope too steep\"}'; cat",
+            "the simulator says \"slope too steep\"",
+        ),
+        (
+            "read l; echo '{\"id\": 1, \"channels\": {\"y_m\": [1.0]}}'; cat",
+            "the simulator answered 1 values of y_m, expected 12, one for each row",
+        ),
+        (
+            "read l; echo '{\"id\": 1, \"channels\": {\"z_m\": [1.0]}}'; cat",
+            "the simulator answered the channels z_m, expected y_m",
+        ),
+        (
+            "read l; echo '{\"id\": 7, \"channels\": {}}'; cat",
+            "the simulator answered question 7, expected question 1",
+        ),
+        (
+            "read l; echo '{\"id\": 1, \"channels\": {\"y_m\": [0,1,2,NaN,4,5,6,7,8,9,10,11]}}'; cat",
+            "the simulator answered no finite number for y_m at row 3",
+        ),
+        ("printf '\\377\\376\\n'; cat", "which is no text"),
+    ];
+    for (script, expected) in cases {
+        let said = said_of(script);
+        assert!(said.contains(expected), "{script}:\n{said}\n{expected}");
+    }
+}
+
+#[test]
+fn a_simulator_that_hangs_is_stopped_in_time() {
+    // The first answer may take half a minute longer than the others: a program starts. This one hangs at the second.
+    let script =
+        "read l; echo '{\"id\": 1, \"channels\": {\"y_m\": [0,1,2,3,4,5,6,7,8,9,10,11]}}'; sleep 1000";
+    let begin = std::time::Instant::now();
+    assert!(said_of(script).contains("the simulator gave no answer within 0.3 s"));
+    assert!(begin.elapsed().as_secs() < 30);
+}
+
+#[test]
+fn a_program_that_is_not_there_is_named() {
+    let said = diagnose(line("[simulator]\ncommand = [\"no-such-simulator\"]\n").path()).unwrap_err();
+    assert!(said.contains("the simulator \"no-such-simulator\" cannot be started"), "{said}");
+}
+
+#[test]
+fn what_is_declared_wrong_is_named() {
+    let command = "[simulator]\ncommand = [\"cat\"]\n";
+    let parameter = "[[parameter]]\nname = \"a\"\nstart = 0\nscale = 1\n";
+    let mechanism = "[[mechanism]]\nid = \"bend\"\n";
+    let own = "[[mechanism.parameter]]\nname = \"b\"\nscale = 1\n";
+    let cases = [
+        (String::new(), "column sim_y_m is missing, expected the simulation's prediction, or a program"),
+        (parameter.into(), "key simulator.command is absent, expected a program, for the parameters"),
+        (
+            format!("{command}{parameter}{parameter}"),
+            "key parameter[1].name is \"a\", expected a name, unlike",
+        ),
+        (format!("{command}[[parameter]]\nname = \"a\"\nscale = 1\n"), "key parameter[0].start is missing"),
+        (format!("{command}[[parameter]]\nname = \"a\"\nstart = 1\n"), "key parameter[0].scale is missing"),
+        (
+            format!("{command}[[parameter]]\nname = \"a\"\nstart = 1\nscale = 1\nlower = 2\nupper = 1\n"),
+            "key parameter[0].upper is 1, expected a number from 2",
+        ),
+        (format!("{command}{mechanism}"), "key mechanism[0].parameter is absent, expected at least one"),
+        (format!("{command}{mechanism}{own}{mechanism}{own}"), "key mechanism[1].id is \"bend\", expected"),
+        (format!("{command}{mechanism}colour = 3\n{own}"), "unknown key mechanism[0].colour"),
+        (format!("{command}[[channel]]\nname = \"y_m\"\n"), "key channel[1].name is \"y_m\", expected"),
+        (format!("{command}processes = 1.5\n"), "key simulator.processes is 1.5, expected a whole number"),
+    ];
+    for (extra, expected) in cases {
+        let said = diagnose(line(&extra).path()).unwrap_err();
+        assert!(said.contains(expected), "{extra}\n{said}\n{expected}");
+    }
+}
+
+#[test]
+fn columns_of_a_simulation_give_a_law() {
+    // The template: a swing that loses exp(-0.06 t) of its amplitude beside one that loses nothing.
+    let folder = tempfile::tempdir().unwrap();
+    missing_physics_cli::commands::new("custom", &folder.path().join("swing")).unwrap();
+    let answer = diagnose(&folder.path().join("swing")).unwrap();
+    assert_eq!(answer["verdict"], "unexplained");
+    let law = &answer["law"];
+    let formula = law["formula"].as_str().unwrap();
+    let terms: Vec<Vec<&str>> = formula.split(" + ").map(|t| t.split(" * ").skip(1).collect()).collect();
+    // Let go at rest, a pendulum with friction lags behind one without by c / omega^2, some milliseconds.
+    assert_eq!(terms, [vec!["t_s", "sim_angle_rad"], vec!["d(sim_angle_rad)/d(t_s)"]], "{formula}");
+    assert_eq!(law["coefficients"][0]["unit"], "1/s");
+    let ci: Vec<f64> =
+        law["coefficients"][0]["ci95"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    // The mean slope of exp(-0.06 t) over three seconds, weighted with t^2.
+    assert!(ci[0] > -0.060 && ci[1] < -0.049, "{ci:?}");
+}
+
+#[test]
+fn a_simulation_that_is_right_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    missing_physics_cli::commands::new("custom", &folder.path().join("same")).unwrap();
+    let data = folder.path().join("same/data.csv");
+    // The measured column is the simulated one with an error of its own.
+    let csv = std::fs::read_to_string(&data).unwrap();
+    let mut lines = csv.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let mut text = lines.next().unwrap().join(",") + "\n";
+    let mut state = 12345u64;
+    for mut cells in lines {
+        let mut error = -6.0;
+        for _ in 0..12 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            error += (state >> 33) as f64 / (1u64 << 31) as f64;
+        }
+        cells[2] = format!("{:.5}", cells[3].parse::<f64>().unwrap() + 0.002 * error);
+        text += &(cells.join(",") + "\n");
+    }
+    std::fs::write(&data, text).unwrap();
+    let answer = diagnose(&folder.path().join("same")).unwrap();
+    assert_eq!(answer["verdict"], "adequate", "{}", answer["p_value"]);
+}
+
+#[test]
+fn a_program_is_asked_and_its_missing_friction_named() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        println!("NOT TESTED: python3 is not there");
+        return;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recordings/swing");
+    let answer = diagnose(&folder).unwrap();
+    assert_eq!(answer["verdict"], "explained");
+    assert_eq!(answer["chosen"], serde_json::json!(["dry-friction"]));
+    let friction = &answer["mechanisms"][0]["parameters"][0]["ci95"];
+    // 0.04 rad/s^2 is hidden.
+    assert!(friction[0].as_f64().unwrap() < 0.04 && friction[1].as_f64().unwrap() > 0.04, "{friction}");
+}

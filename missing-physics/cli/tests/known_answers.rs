@@ -1,0 +1,263 @@
+//! The tool on recordings whose answer is known: practice cases with their keys, and measured drops.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test stops where it fails, and says what it saw"
+)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+/// The folder of the shared recordings, which lies beside the workspace; says loudly where it is not there.
+fn shared() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("NOT TESTED: {} is not there", folder.display());
+    None
+}
+
+/// The tool's JSON on a folder; its page must be whole.
+fn answer(folder: &Path, threads: &str) -> Value {
+    let out = tempfile::tempdir().unwrap();
+    let (json, html) = (out.path().join("a.json"), out.path().join("a.html"));
+    let output = Command::new(env!("CARGO_BIN_EXE_missing-physics"))
+        .arg("diagnose")
+        .arg(folder)
+        .arg("--json")
+        .arg(&json)
+        .arg("--html")
+        .arg(&html)
+        .args(["--threads", threads])
+        .output()
+        .unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let page = std::fs::read_to_string(html).unwrap();
+    assert!(page.ends_with("</body></html>\n") && !page.contains("NaN"));
+    serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap()
+}
+
+fn ids(value: &Value) -> Vec<String> {
+    let mut ids: Vec<String> =
+        value.as_array().unwrap().iter().map(|v| v.as_str().unwrap().to_owned()).collect();
+    ids.sort();
+    ids
+}
+
+/// The verdicts of the practice cases' keys; where a key names look-alikes, the truth must be among the rivals.
+fn practice_cases_get_the_verdicts_of_their_keys(domain: &str) {
+    let Some(shared) = shared() else { return };
+    let mut seen = 0;
+    for entry in std::fs::read_dir(shared.join("practice").join(domain)).unwrap() {
+        let folder = entry.unwrap().path();
+        let key: Value =
+            serde_json::from_str(&std::fs::read_to_string(folder.join("key.json")).unwrap()).unwrap();
+        let answer = answer(&folder, "2");
+        seen += 1;
+        let alike = key["confusable"].as_array().is_some_and(|c| !c.is_empty());
+        let expected = match key["kind"].as_str().unwrap() {
+            "null" => "adequate",
+            "unlisted" => "unexplained",
+            _ if alike => "ambiguous",
+            _ => "explained",
+        };
+        assert_eq!(answer["verdict"], expected, "{}", folder.display());
+        let accepted: Vec<Vec<String>> = key["accepted"].as_array().unwrap().iter().map(ids).collect();
+        let mut said = vec![ids(&answer["chosen"])];
+        if alike {
+            said.extend(answer["confused_with"].as_array().unwrap().iter().map(ids));
+        }
+        assert!(said.iter().any(|s| accepted.contains(s)), "{}: {said:?}", folder.display());
+        assert_eq!(answer["where"].as_array().unwrap().is_empty(), expected == "adequate");
+    }
+    assert!(seen >= 4);
+}
+
+#[test]
+fn practice_flights() {
+    practice_cases_get_the_verdicts_of_their_keys("trajectory");
+}
+
+#[test]
+fn practice_sweeps() {
+    practice_cases_get_the_verdicts_of_their_keys("liquid-tilt");
+}
+
+#[test]
+fn practice_curves() {
+    practice_cases_get_the_verdicts_of_their_keys("indentation");
+}
+
+#[test]
+fn practice_waves() {
+    practice_cases_get_the_verdicts_of_their_keys("slosh");
+}
+
+#[test]
+fn practice_bounces() {
+    practice_cases_get_the_verdicts_of_their_keys("bounce");
+}
+
+#[test]
+fn practice_sounds() {
+    practice_cases_get_the_verdicts_of_their_keys("bounce-audio");
+}
+
+/// What is said of the ping-pong ball (Erickson 2020, doi:10.5951/MTLT.2019.0042), printed: the sets that are named, in order, and the
+/// times' error on what was fitted and on the end that was left out, before and after, s.
+fn ball(what: &str, folder: &Path) -> (Vec<Vec<String>>, [[f64; 2]; 2], Value) {
+    let answer = answer(folder, "0");
+    let mut sets = vec![ids(&answer["chosen"])];
+    sets.extend(answer["confused_with"].as_array().unwrap().iter().map(ids));
+    sets.sort();
+    let of =
+        |error: &str| ["before", "after"].map(|when| answer["fit"][when]["t_s"][error].as_f64().unwrap());
+    let errors = [of("rmse"), of("heldout_rmse")];
+    let [fit, end] = errors.map(|[before, after]| format!("{:.2} -> {:.2} ms", 1e3 * before, 1e3 * after));
+    println!(
+        "{what}: {} (p {}), {sets:?}; all times {fit}, the end left out {end}",
+        answer["verdict"], answer["p_value"]
+    );
+    for m in answer["mechanisms"].as_array().unwrap() {
+        if sets.iter().any(|s| *s == [m["id"].as_str().unwrap()]) {
+            let left_out = 1e3 * m["heldout_rmse"]["t_s"].as_f64().unwrap();
+            println!("  {}: {left_out:.2} ms on the end left out", m["id"]);
+            for p in m["parameters"].as_array().unwrap() {
+                let [value, low, high] =
+                    [&p["value"], &p["ci95"][0], &p["ci95"][1]].map(|v| v.as_f64().unwrap());
+                println!("    {} = {value:.4} ({low:.4} to {high:.4})", p["name"]);
+            }
+        }
+    }
+    (sets, errors, answer)
+}
+
+/// The 95 % interval of the drag that is found, 1/m.
+fn drag_per_m(answer: &Value) -> [f64; 2] {
+    let drag = answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == "air-drag").unwrap();
+    let k = drag["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "k_per_m").unwrap();
+    [0, 1].map(|i| k["ci95"][i].as_f64().unwrap())
+}
+
+/// One microphone, one ball, 43 impacts: drag, or a restitution that depends on the speed, and the end of the drop is foretold.
+#[test]
+fn a_measured_sound_of_a_bouncing_ball() {
+    let Some(shared) = shared() else { return };
+    let folder = shared.join("recordings/real/bounce/erickson-pingpong-audio");
+    let (sets, [_, [before, after]], answer) = ball("the sound", &folder);
+    assert_eq!(answer["verdict"], "ambiguous");
+    assert_eq!(sets, [["air-drag"], ["velocity-dependent-restitution"]]);
+    assert!(after < 1e-3 && before > 5.0 * after);
+    assert!(answer["impacts"].as_array().unwrap().len() >= 30);
+    assert!(drag_per_m(&answer)[0] > 0.0);
+}
+
+/// The author's own marks of the first 30 of them, "read to 1 ms". They lie 0.1 to 4.2 ms after the onsets, neighbours alike. The same two
+/// sets are named, as they are and with that noise stated.
+#[test]
+fn the_author_s_times_of_the_same_ball() {
+    let Some(shared) = shared() else { return };
+    let folder = shared.join("recordings/real/bounce/erickson-pingpong-times");
+    let both = [["air-drag"], ["velocity-dependent-restitution"]];
+    let found = |what: &str, folder: &Path| {
+        let (sets, errors, answer) = ball(what, folder);
+        assert_eq!(answer["verdict"], "ambiguous");
+        assert_eq!(sets, both);
+        let [low, high] = drag_per_m(&answer);
+        // rho Cd A / (2 m) of a sphere of 40 mm and 2.7 g, Cd 0.47.
+        assert!(low > 0.0 && low < 0.131 && high > 0.131, "{low} {high}");
+        // Plain least squares takes the root mean square from 1.47 to 1.08 ms, with a drag of 0.10 1/m.
+        let [[before, after], _] = errors;
+        assert!(after < 0.8 * before, "{before} {after}");
+        errors
+    };
+    found("the author's times", &folder);
+
+    let stated = tempfile::tempdir().unwrap();
+    let header = std::fs::read_to_string(folder.join("recording.toml")).unwrap();
+    std::fs::write(stated.path().join("recording.toml"), header + "\n[noise]\nt_s = 0.001\n").unwrap();
+    std::fs::copy(folder.join("data.csv"), stated.path().join("data.csv")).unwrap();
+    let [_, [end_before, end_after]] =
+        found("the author's times, with a noise of 1 ms stated", stated.path());
+    assert!(end_after < end_before, "{end_before} {end_after}");
+}
+
+/// Where the response is half the learned one (c05), the right mechanism is closest, its factor is right, and it is not said to
+/// explain: something of the width is left.
+#[test]
+fn practice_doughs() {
+    practice_cases_get_the_verdicts_of_their_keys("dough-roll");
+}
+
+#[test]
+fn practice_pours() {
+    practice_cases_get_the_verdicts_of_their_keys("grain-pour");
+}
+
+/// Measured drops: drag where there is drag, and no other set; the golf ball proves nothing.
+#[test]
+fn measured_drops_are_drag_or_nothing() {
+    let Some(shared) = shared() else { return };
+    let drops = shared.join("recordings/real/trajectory");
+    for name in ["desilva-tennis-ball", "desilva-volleyball", "desilva-whiffle-ball-1"] {
+        let answer = answer(&drops.join(name), "0");
+        let mut named = ids(&answer["chosen"]);
+        named.extend(answer["confused_with"].as_array().unwrap().iter().flat_map(ids));
+        assert!(!named.is_empty() && named.iter().all(|id| id.ends_with("-drag")), "{name}: {named:?}");
+        for m in answer["mechanisms"].as_array().unwrap() {
+            if named.iter().any(|id| m["id"] == id.as_str()) {
+                assert!(
+                    m["parameters"].as_array().unwrap().iter().all(|p| p["value"].as_f64().unwrap() > 0.0)
+                );
+            }
+        }
+        if name.contains("whiffle") {
+            let error = |when: &str| answer["fit"][when]["z_m"]["heldout_rmse"].as_f64().unwrap();
+            assert!(error("before") > 5.0 * error("after"), "{} and {}", error("before"), error("after"));
+        }
+    }
+    let golf = answer(&drops.join("desilva-golf-ball"), "0");
+    assert_eq!(golf["verdict"], "adequate");
+    assert!(ids(&golf["chosen"]).is_empty());
+}
+
+/// The measured decay of a wave: four effects at once, two of them outside the list (an arm that rings at two frequencies, a sensor
+/// whose rest value moved; `liquid-haptics/tests/measured_slosh.rs` takes it apart). The tool does not say that what it knows explains
+/// it, and of what it knows the frequency that falls with the amplitude is part of the closest set.
+#[test]
+fn a_measured_wave_is_not_explained_by_one_effect() {
+    let Some(shared) = shared() else { return };
+    let answer = answer(&shared.join("recordings/real/slosh/antisloshing-torque"), "0");
+    assert_eq!(answer["verdict"], "unexplained");
+    assert!(ids(&answer["chosen"]).is_empty());
+    let named =
+        |id: &str| answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == id).unwrap().clone();
+    let bends = named("nonlinear-frequency");
+    assert!(bends["probability"].as_f64().unwrap() > 0.99);
+    let parameters = bends["parameters"].as_array().unwrap();
+    let coefficient = parameters.iter().find(|p| p["name"] == "coefficient").unwrap();
+    let coefficient = coefficient["value"].as_f64().unwrap();
+    assert!((-0.02..-0.01).contains(&coefficient), "{coefficient}");
+    assert!(named("quadratic-damping")["probability"].as_f64().unwrap() < 0.01);
+}
+
+#[test]
+fn bundled_recordings_get_the_answer_that_is_hidden_in_them() {
+    let recordings = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recordings");
+    for (name, verdict, chosen) in [
+        ("dropped-ball", "explained", vec!["quadratic-drag"]),
+        ("thrown-ball", "explained", vec!["camera-tilt", "quadratic-drag"]),
+        ("steel-ball", "adequate", vec![]),
+    ] {
+        let (one, three) = (answer(&recordings.join(name), "1"), answer(&recordings.join(name), "3"));
+        assert_eq!(
+            (one["verdict"].as_str(), ids(&one["chosen"])),
+            (Some(verdict), chosen.iter().map(|s| (*s).to_owned()).collect())
+        );
+        assert_eq!(one, three, "the answer depends on the number of threads");
+    }
+}

@@ -1,0 +1,186 @@
+//! From drops that were read to a recording with its model.
+
+use bounce_audio::missed::{typical_restitution, unheard};
+use missing_physics::data::Recording;
+use missing_physics::model::Quantity;
+
+use super::array::Microphones;
+use super::drop::{Drop, Effects};
+use super::experiments::{experiments, of_times};
+use super::model::{BounceModel, COPIES, Setup};
+use super::read::{Heard, Rig};
+use super::spread::{Known, judge, released};
+use super::times::TimesModel;
+use crate::Loaded;
+use crate::reading::resolution;
+
+/// A ball that keeps all its speed cannot be, but clocks err.
+const LIKELY_RESTITUTION: [f64; 2] = [0.05, 1.2];
+
+/// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
+pub(super) fn assemble(
+    mut heard: Vec<Heard>,
+    rig: &Rig,
+    known: Known,
+    microphones: &Microphones,
+) -> Result<Loaded, (usize, String)> {
+    let (restitution, missed) = listen(&mut heard, rig);
+    let setup = Setup {
+        gravity_m_s2: rig.gravity_m_s2,
+        drag_unit: rig.drag_unit,
+        placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
+        dropped: rig.drop_height_m.is_some(),
+        released: released(heard.len()),
+        listened: heard.iter().any(|h| !h.drop.loudness.is_empty()),
+        unheard: [missed, heard.len()],
+        microphones: microphones.places_m.len(),
+    };
+    if setup.placed {
+        placed(&heard, setup, restitution, known, microphones)
+    } else {
+        Ok(timed(&heard, rig, setup, restitution, known))
+    }
+}
+
+/// The typical restitution, and in how many drops an impact went unheard; where it did is marked in them.
+fn listen(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
+    let durations: Vec<Vec<f64>> =
+        heard.iter().map(|h| h.drop.times_s.windows(2).map(|w| w[1] - w[0]).collect()).collect();
+    let of_drop = rig.drop_height_m.map(|h| (8.0 * h / rig.gravity_m_s2).sqrt());
+    let restitution = typical_restitution(durations.iter().map(Vec::as_slice))
+        .or_else(|| Some(durations.first()?.first()? / of_drop?))
+        .unwrap_or(0.8)
+        .clamp(LIKELY_RESTITUTION[0], LIKELY_RESTITUTION[1]);
+    let mut missed = 0;
+    for (h, durations) in heard.iter_mut().zip(&durations) {
+        for (found, m) in h.drop.unheard.iter_mut().skip(1).zip(unheard(durations, restitution, None)) {
+            *found = (*found).max(m);
+        }
+        missed += usize::from(h.drop.unheard != h.drop.known);
+    }
+    (restitution, missed)
+}
+
+/// Times and places: impact by impact.
+fn placed(
+    heard: &[Heard],
+    setup: Setup,
+    restitution: f64,
+    known: Known,
+    microphones: &Microphones,
+) -> Result<Loaded, (usize, String)> {
+    let mut nominal = Effects::none(setup.gravity_m_s2, restitution);
+    let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
+    expect_first(&mut drops, &mut nominal);
+    let senseless = |h: &Heard| {
+        let label = crate::recording::quoted(&h.label);
+        (h.row, format!("times and places of a bouncing ball in run {label}"))
+    };
+    let judged =
+        judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
+    let kappa = judged.spread.kappa;
+    (nominal.heads, nominal.outwards_per_m) = (judged.heads, judged.outwards_per_m);
+    let mut model = BounceModel::new(setup, nominal, (judged.spread, judged.plausible), microphones.clone());
+    let mut runs = Vec::new();
+    for (h, linear) in heard.iter().zip(judged.drops) {
+        runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, COPIES).ok_or_else(|| senseless(h))?);
+    }
+    let mut channels = vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")];
+    channels.extend((0..microphones.spare()).map(|k| {
+        let name =
+            if microphones.spare() == 1 { "arrival_s".to_owned() } else { format!("arrival_{}_s", k + 1) };
+        Quantity::new(name, "s")
+    }));
+    let mut calibration = vec![None; channels.len()];
+    // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
+    calibration[0] = known.time_s;
+    let recording = Recording {
+        resolution: vec![0.0; channels.len()],
+        calibration,
+        channels,
+        variables: vec![
+            Quantity::new("bounce", ""),
+            Quantity::new("speed_m_s", "m/s"),
+            Quantity::new("x_m", "m"),
+            Quantity::new("y_m", "m"),
+        ],
+        runs,
+        noise_along: Some(0),
+    };
+    let mut undetermined = vec![format!(
+        "how a direction was scattered and how a place was misheard are told apart by the lengths of the flights alone \
+         (here: kappa about {:.0})",
+        kappa
+    )];
+    if !setup.dropped {
+        undetermined.push(UNTIED.into());
+    }
+    let experiments = experiments(&mut model);
+    Ok(Loaded {
+        recording,
+        model: Box::new(model),
+        experiments,
+        undetermined,
+        additions: serde_json::Map::new(),
+    })
+}
+
+/// Where balls are expected to land, and to head where their fall is not known: a tilted table, or a hand, may send all of them one
+/// way.
+fn expect_first(drops: &mut [Drop], nominal: &mut Effects) {
+    let headings: Vec<[f64; 2]> = drops.iter().map(|d| d.heading(0, nominal)).collect();
+    let places: Vec<[f64; 2]> = drops.iter().map(|d| d.places_m[0]).collect();
+    let mean =
+        |all: &[[f64; 2]]| [0, 1].map(|k| all.iter().map(|v| v[k]).sum::<f64>() / all.len().max(1) as f64);
+    let (usual, middle) = (mean(&headings), mean(&places));
+    if drops.iter().all(|d| d.height_m.is_none()) {
+        nominal.heads = usual;
+    }
+    let (mut together, mut square) = (0.0, 0.0);
+    for (heading, place) in headings.iter().zip(&places) {
+        for k in 0..2 {
+            together += (heading[k] - usual[k]) * (place[k] - middle[k]);
+            square += (place[k] - middle[k]).powi(2);
+        }
+    }
+    // A beginning: places are measured with errors, which makes it too small.
+    nominal.outwards_per_m = if released(drops.len()) && square > 0.0 { together / square } else { 0.0 };
+    for drop in drops {
+        drop.middle_m = middle;
+    }
+}
+
+const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
+
+/// Times alone.
+fn timed(heard: &[Heard], rig: &Rig, setup: Setup, restitution: f64, known: Known) -> Loaded {
+    let model = TimesModel::new(setup, restitution, rig.drop_height_m, known.time_s.is_some());
+    let times: Vec<f64> = heard.iter().flat_map(|h| h.drop.times_s.iter().copied()).collect();
+    // Directions scatter the times beyond the clock's noise, so that a calibrated clock is the least there is.
+    let least = known.time_s.map_or(0.0, |sigma| sigma * 12f64.sqrt());
+    let recording = Recording {
+        channels: vec![Quantity::new("t_s", "s")],
+        variables: vec![
+            Quantity::new("bounce", ""),
+            Quantity::new("known_gaps", ""),
+            Quantity::new("found_gaps", ""),
+        ],
+        runs: heard.iter().map(|h| TimesModel::run(&h.label, &h.drop, &h.numbers)).collect(),
+        noise_along: Some(0),
+        calibration: vec![None],
+        resolution: vec![resolution(&times).max(least)],
+    };
+    let mut undetermined = vec![
+        "times alone say nothing of where the ball went: a tilt, friction and the scale of places are not seen".into(),
+    ];
+    if !setup.dropped {
+        undetermined.push(UNTIED.into());
+    }
+    if heard.len() == 1 {
+        undetermined.push(
+            "in a single drop, an error that wanders along it would look like physics: drop it again".into(),
+        );
+    }
+    let experiments = of_times(&model, restitution, setup.gravity_m_s2);
+    Loaded { recording, model: Box::new(model), experiments, undetermined, additions: serde_json::Map::new() }
+}

@@ -1,0 +1,149 @@
+//! Drops that come as sound: one WAV file a run.
+
+use std::path::Path;
+
+use bounce_audio::hear::{HearSettings, Impact, hear, hear_times};
+use bounce_audio::missed::{extra, typical_restitution};
+use bounce_audio::wav::Sound;
+
+use super::array::Microphones;
+use super::drop::{Drop, Relative};
+use super::read::{Heard, Rig};
+use serde_json::{Value, json};
+
+use crate::recording::{Header, ReadError, inside};
+
+/// What was heard, and with which microphones.
+pub(super) struct Listened {
+    pub(super) heard: Vec<Heard>,
+    pub(super) microphones: Microphones,
+    /// What the ear says of its own errors: sigma of a typical time and place.
+    pub(super) said: Option<[f64; 2]>,
+    /// Sounds that were taken for none of the ball's, in words.
+    pub(super) strays: Vec<String>,
+}
+
+/// Listens to the files of a recording; `None` where it has no sound.
+///
+/// # Errors
+/// [`ReadError`].
+pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, ReadError> {
+    let audio = header.section("audio")?;
+    let microphones = audio.points("microphones_m")?;
+    let temperature = audio.number("temperature_k", 100.0, 1e3)?;
+    let stated = audio.number("speed_of_sound_m_s", 100.0, 1e4)?;
+    let speed = stated.or_else(|| temperature.map(|t| 331.3 * (t / 273.15).sqrt())).unwrap_or(343.0);
+    let Some(files) = audio.texts("files")? else { return Ok(None) };
+    let mut all = Vec::new();
+    for name in files {
+        let path = inside(&header.folder, &header.file, "audio.files", name)?;
+        all.push(impacts_in(&path, microphones.as_deref(), speed, rig)?);
+    }
+    let strays = take_out(&mut all);
+    let mut heard: Vec<Heard> =
+        all.iter().enumerate().map(|(run, impacts)| drop_of(run, impacts, rig)).collect();
+    let microphones = Microphones { places_m: microphones.unwrap_or_default(), speed_of_sound_m_s: speed };
+    let said = weigh(&mut heard, &all);
+    Ok(Some(Listened { heard, microphones, said, strays }))
+}
+
+/// The impacts in a file, in the order of time.
+fn impacts_in(
+    path: &Path,
+    microphones: Option<&[[f64; 3]]>,
+    speed_m_s: f64,
+    rig: &Rig,
+) -> Result<Vec<Impact>, ReadError> {
+    let open = |why: String| ReadError::Open { file: path.display().to_string(), why };
+    let sound = Sound::read(path).map_err(|e| open(e.fault.to_string()))?;
+    let settings = HearSettings::default();
+    let found = match microphones {
+        Some(places) => hear(&sound, places, speed_m_s, &settings),
+        None => hear_times(&sound, &settings),
+    };
+    let mut impacts = found.map_err(|e| open(e.to_string()))?.impacts;
+    impacts.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    let fewest = rig.fewest();
+    if impacts.len() < fewest {
+        return Err(ReadError::TooFewRows {
+            file: path.display().to_string(),
+            what: "the sound".into(),
+            got: impacts.len(),
+            expected: format!("at least {fewest} impacts"),
+        });
+    }
+    Ok(impacts)
+}
+
+/// Takes out sounds that fit no bounce, and says which.
+fn take_out(all: &mut [Vec<Impact>]) -> Vec<String> {
+    let times = |impacts: &[Impact]| impacts.iter().map(|i| i.t_s).collect::<Vec<f64>>();
+    let flights: Vec<Vec<f64>> =
+        all.iter().map(|run| times(run).windows(2).map(|w| w[1] - w[0]).collect()).collect();
+    let Some(restitution) = typical_restitution(flights.iter().map(Vec::as_slice)) else { return Vec::new() };
+    let mut strays = Vec::new();
+    for (run, impacts) in all.iter_mut().enumerate() {
+        while let Some(which) = extra(&times(impacts), restitution) {
+            let t_s = impacts.remove(which).t_s;
+            strays.push(format!(
+                "a sound {t_s:.3} s into run {} fits no bounce: taken for one from elsewhere",
+                run + 1
+            ));
+        }
+    }
+    strays
+}
+
+/// What was heard in a file; runs are counted from 1, in the order of the files.
+fn drop_of(run: usize, impacts: &[Impact], rig: &Rig) -> Heard {
+    let drop = Drop {
+        times_s: impacts.iter().map(|i| i.t_s).collect(),
+        places_m: impacts.iter().filter_map(|i| i.location.map(|l| [l.x_m, l.y_m])).collect(),
+        height_m: rig.drop_height_m,
+        arrivals_s: impacts.iter().map(|i| i.arrivals_s.clone()).collect(),
+        loudness: impacts.iter().map(|i| i.amplitude_sigmas.max(1.0).ln()).collect(),
+        unheard: vec![0; impacts.len()],
+        known: vec![0; impacts.len()],
+        ..Drop::default()
+    };
+    let numbers = (1..=impacts.len()).map(|n| n as f64).collect();
+    Heard { label: (run + 1).to_string(), row: 0, drop, numbers }
+}
+
+/// Gives each impact its part of what the ear says of its own errors, and the sizes of typical ones; nothing where there are no
+/// places.
+fn weigh(heard: &mut [Heard], impacts: &[Vec<Impact>]) -> Option<[f64; 2]> {
+    let root = |impact: &Impact| {
+        let [[xx, xy], [_, yy]] = impact.location?.covariance_m2;
+        let (a, b) = (xx.sqrt(), xy / xx.sqrt());
+        let c = (yy - b * b).sqrt();
+        [impact.t_sigma_s, a, c].iter().all(|v| v.is_normal()).then_some([[a, 0.0], [b, c]])
+    };
+    let roots: Option<Vec<Vec<[[f64; 2]; 2]>>> =
+        impacts.iter().map(|run| run.iter().map(root).collect()).collect();
+    let roots = roots?;
+    let mean = |logs: Vec<f64>| (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
+    let time_s = mean(impacts.iter().flatten().map(|i| i.t_sigma_s.ln()).collect());
+    let place_m = mean(roots.iter().flatten().map(|r| 0.5 * (r[0][0] * r[1][1]).ln()).collect());
+    for ((heard, impacts), roots) in heard.iter_mut().zip(impacts).zip(roots) {
+        let relative = |(impact, root): (&Impact, [[f64; 2]; 2])| Relative {
+            time: impact.t_sigma_s / time_s,
+            place: root.map(|row| row.map(|v| v / place_m)),
+        };
+        heard.drop.relative = impacts.iter().zip(roots).map(relative).collect();
+    }
+    Some([time_s, place_m])
+}
+
+/// The impacts, as they were heard, as the answer's `impacts`.
+pub(super) fn impacts(heard: &[Heard]) -> Value {
+    let of_run = |h: &Heard| {
+        let place = |i: usize| h.drop.places_m.get(i).copied();
+        let impact = |(i, t_s): (usize, &f64)| match place(i) {
+            Some([x, y]) => json!({"run": h.label, "t_s": t_s, "x_m": x, "y_m": y}),
+            None => json!({"run": h.label, "t_s": t_s}),
+        };
+        h.drop.times_s.iter().enumerate().map(impact).collect::<Vec<Value>>()
+    };
+    heard.iter().flat_map(of_run).collect()
+}

@@ -1,0 +1,233 @@
+//! Parameters and mechanisms of a bouncing ball.
+
+use std::sync::Arc;
+
+use missing_physics::model::{Derived, Quantity, Term};
+
+use super::drop::Effects;
+use super::model::Setup;
+use crate::builder::{At, Builder};
+
+/// Where each parameter stands; `None` where the data cannot show it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Places {
+    pub(super) restitution: At,
+    pub(super) slope: At,
+    pub(super) drag: At,
+    pub(super) table: Option<[At; 2]>,
+    pub(super) friction: Option<At>,
+    /// Where balls head on average when they first come to the table, and how much farther out for each metre that they land
+    /// farther out.
+    pub(super) hand: Option<[At; 3]>,
+    pub(super) clock: Option<At>,
+    pub(super) position: Option<At>,
+    pub(super) unheard: Option<At>,
+    /// By how much later a louder sound is heard.
+    pub(super) walk: Option<At>,
+    /// Offsets along x and y of a microphone, and which it is.
+    pub(super) microphone: Option<[At; 3]>,
+    /// Candidate terms of an unknown law: linear in x and y, and in the speed squared.
+    pub(super) terms: Option<[At; 2]>,
+    pub(super) squared: At,
+}
+
+/// The specification of a set-up, the restitution starting at a value.
+pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
+    let mut b = Builder::default();
+    b.spec.baseline = "ballistic flight from impact to impact, a constant restitution, a level table".into();
+    let mut p = Places {
+        restitution: b.shared("restitution", "", restitution, [1e-2, 2.0], 0.02),
+        ..Places::default()
+    };
+    air_and_speed(&mut b, &mut p, setup);
+    if setup.placed {
+        table(&mut b, &mut p);
+    }
+    if setup.placed || setup.dropped {
+        let rate = b.shared("rate", "", 0.0, [-0.2, 0.2], 0.005);
+        b.mechanism(
+            "clock-rate",
+            &[rate],
+            [
+                "clock rate",
+                "The clock runs fast or slow.",
+                "t_recorded = (1 + rate) t",
+                "Olson 2010, doi:10.1109/IROS.2010.5650579 (clocks of sensors)",
+            ],
+            &["position-scale", "air-drag"],
+        );
+        p.clock = Some(rate);
+    }
+    if setup.placed {
+        let scale = b.shared("scale", "", 0.0, [-0.3, 0.3], 0.01);
+        b.mechanism(
+            "position-scale",
+            &[scale],
+            [
+                "scale of the places",
+                "All distances on the table are too long or too short, as by a wrong speed of sound.",
+                "x_recorded = (1 + scale) x",
+                "thesis, section 4.3; Cramer 1993, doi:10.1121/1.405827 (speed of sound)",
+            ],
+            &["clock-rate", "table-tilt"],
+        );
+        p.position = Some(scale);
+    }
+    if setup.placed && setup.microphones > 3 {
+        microphone(&mut b, &mut p, setup.microphones);
+    }
+    let [missed, runs] = setup.unheard;
+    if missed > 0 {
+        let unheard = b.shared("unheard", "", 0.0, [0.0, 2.0], 0.1);
+        let mechanism = b.mechanism(
+            "missed-impact",
+            &[],
+            [
+                "impacts that were not heard",
+                "In some runs two flights were taken for one, because the impact between them went unheard.",
+                "a flight of (1 + e) T is one of T and one of e T",
+                "thesis, section 4.3",
+            ],
+            &["velocity-dependent-restitution"],
+        );
+        mechanism.companions = vec![unheard.index];
+        let fraction = missed as f64 / runs.max(1) as f64;
+        mechanism.derived.push(Derived {
+            name: "fraction".into(),
+            unit: String::new(),
+            value: Arc::new(move |_| fraction),
+        });
+        p.unheard = Some(unheard);
+    }
+    terms(&mut b, &mut p, setup.placed);
+    (b, p)
+}
+
+/// How a hand lets go of balls whose height is known: nobody states that it gives them no velocity of its own.
+pub(super) fn hand(b: &mut Builder, nominal: &Effects) -> [At; 3] {
+    let [x, y] = nominal.heads;
+    [
+        b.shared("heads_x_rad", "rad", x, [-1.0, 1.0], 0.005),
+        b.shared("heads_y_rad", "rad", y, [-1.0, 1.0], 0.005),
+        b.shared("outwards_rad_m", "rad/m", nominal.outwards_per_m, [-50.0, 50.0], 0.1),
+    ]
+}
+
+fn air_and_speed(b: &mut Builder, p: &mut Places, setup: &Setup) {
+    p.drag = match setup.drag_unit {
+        Some(_) => b.shared("drag_coefficient", "", 0.0, [0.0, 10.0], 0.1),
+        None => b.shared("k_per_m", "1/m", 0.0, [0.0, 2.0], 0.02),
+    };
+    let mechanism = b.mechanism(
+        "air-drag",
+        &[p.drag],
+        [
+            "air drag",
+            "The air slows the ball between its impacts.",
+            "a = -k |v| v, k = rho Cd A / (2 m)",
+            "Hoerner 1965, Fluid-Dynamic Drag, ch. 3",
+        ],
+        &["velocity-dependent-restitution"],
+    );
+    if let Some(unit) = setup.drag_unit {
+        let drag = p.drag;
+        mechanism.derived.push(Derived {
+            name: "k_per_m".into(),
+            unit: "1/m".into(),
+            value: Arc::new(move |shared| unit * shared[drag.slot]),
+        });
+    }
+    p.slope = b.shared("slope_s_m", "s/m", 0.0, [-0.5, 0.5], 5e-3);
+    let restitution = p.restitution;
+    let mechanism = b.mechanism(
+        "velocity-dependent-restitution",
+        &[p.slope],
+        [
+            "restitution that depends on the speed",
+            "A faster impact gives back a smaller (or larger) part of the speed.",
+            "e = e1 - slope (v - 1 m/s)",
+            "Johnson 1985, Contact Mechanics, section 11.5, doi:10.1017/CBO9781139171731",
+        ],
+        &["air-drag"],
+    );
+    mechanism.derived.push(Derived {
+        name: "e_at_1_m_s".into(),
+        unit: String::new(),
+        value: Arc::new(move |shared| shared[restitution.slot]),
+    });
+}
+
+fn table(b: &mut Builder, p: &mut Places) {
+    let slopes = ["slope_x", "slope_y"].map(|name| b.shared(name, "", 0.0, [-0.6, 0.6], 0.01));
+    let mechanism = b.mechanism(
+        "table-tilt",
+        &slopes,
+        [
+            "tilt of the table",
+            "The table is not level.",
+            "z = slope_x x + slope_y y; the velocity is mirrored at the tilted plane",
+            "thesis, section 4.4",
+        ],
+        &["tangential-friction"],
+    );
+    mechanism.derived.push(Derived {
+        name: "angle_rad".into(),
+        unit: "rad".into(),
+        value: Arc::new(move |shared| shared[slopes[0].slot].hypot(shared[slopes[1].slot]).atan()),
+    });
+    p.table = Some(slopes);
+    let friction = b.shared("fraction", "", 0.0, [0.0, 1.0], 0.05);
+    b.mechanism(
+        "tangential-friction",
+        &[friction],
+        [
+            "friction along the table",
+            "Each impact takes a part of the speed along the table, beyond the restitution.",
+            "v_along -> (1 - fraction) v_along before the restitution",
+            "Cross 2002, doi:10.1119/1.1450571",
+        ],
+        &["table-tilt"],
+    );
+    p.friction = Some(friction);
+}
+
+fn microphone(b: &mut Builder, p: &mut Places, count: usize) {
+    let [x, y] = ["offset_x_m", "offset_y_m"].map(|name| b.shared(name, "m", 0.0, [-0.3, 0.3], 0.005));
+    let which = b.shared("microphone", "", -1.0, [-1.0, count as f64 - 1.0], 1.0);
+    let mechanism = b.mechanism(
+        "microphone-offset",
+        &[x, y, which],
+        [
+            "a microphone that stands elsewhere",
+            "One microphone is not where it is stated to be.",
+            "true place = stated place + offset (microphones counted from 0)",
+            "Plinge et al. 2016, doi:10.1109/MSP.2016.2555198",
+        ],
+        &["position-scale"],
+    );
+    mechanism.places = vec![which.index];
+    mechanism.derived.push(Derived {
+        name: "offset_m".into(),
+        unit: "m".into(),
+        value: Arc::new(move |shared| shared[x.slot].hypot(shared[y.slot])),
+    });
+    p.microphone = Some([x, y, which]);
+}
+
+/// What the logarithm of the restitution could depend on, should no mechanism hold.
+fn terms(b: &mut Builder, p: &mut Places, placed: bool) {
+    let mut term = |name: &str, unit: &str, scale: f64, formula: &str, variable: &str| {
+        let at = b.shared(name, unit, 0.0, [-1e3 * scale, 1e3 * scale], scale);
+        b.spec.terms.push(Term {
+            parameter: at.index,
+            formula: formula.into(),
+            adds_to: Quantity::new("ln(restitution)", ""),
+            variables: vec![variable.into()],
+        });
+        at
+    };
+    p.squared = term("per_v2_s2_m2", "s^2/m^2", 1e-3, "v^2", "v");
+    if placed {
+        p.terms = Some([term("per_x_m", "1/m", 0.02, "x", "x_m"), term("per_y_m", "1/m", 0.02, "y", "y_m")]);
+    }
+}

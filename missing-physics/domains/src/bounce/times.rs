@@ -1,0 +1,159 @@
+//! The full model where only times were measured: when each impact is heard.
+//!
+//! Where the ball heads is not seen. A direction that scatters shortens its flights a little, which adds up along a drop: the
+//! errors of times are correlated, and the engine finds by how much where there are drops enough.
+
+use missing_physics::data::Run;
+use missing_physics::model::{Model, PredictError, Scope, Spec};
+
+use bounce_audio::impact::{rebound, speed_after_drop};
+
+use super::drop::Drop;
+use super::model::Setup;
+use super::spec::{Places, build};
+use crate::builder::{ANY, At};
+
+/// The model of times alone.
+#[derive(Debug)]
+pub(super) struct TimesModel {
+    setup: Setup,
+    spec: Spec,
+    places: Places,
+    begins: At,
+    leaves: Option<At>,
+    height_m: Option<f64>,
+    longest_noise: f64,
+}
+
+/// Impacts over which errors may hang together where there is one drop: heard ones, by their fading loudness, and any whose size is
+/// stated ...
+const LONGEST_IN_ONE: f64 = 3.0;
+/// ... and those that were marked one by one, of a size that is not known: neighbours alike by a third (exp(-1)).
+const LONGEST_MARKED: f64 = 1.0;
+
+/// Inputs of a row: the impact's number, and how many impacts went unheard before it in its run: known ones, all.
+const KNOWN: usize = 1;
+const FOUND: usize = 2;
+
+impl TimesModel {
+    /// `stated`: whether the clock's sigma is.
+    pub(super) fn new(setup: Setup, restitution: f64, height_m: Option<f64>, stated: bool) -> Self {
+        let (spec, places, begins, leaves) = build_times(&setup, restitution);
+        let longest_noise = match setup.unheard[1] {
+            2.. => f64::INFINITY,
+            _ if setup.listened || stated => LONGEST_IN_ONE,
+            _ => LONGEST_MARKED,
+        };
+        Self { setup, spec, places, begins, leaves, height_m, longest_noise }
+    }
+
+    /// The run of a drop.
+    pub(super) fn run(label: &str, drop: &Drop, numbers: &[f64]) -> Run {
+        let sum = |hidden: &[usize]| {
+            let before = hidden.iter().scan(0, |all, h| {
+                *all += h;
+                Some(*all as f64)
+            });
+            before.take(drop.times_s.len()).collect::<Vec<f64>>()
+        };
+        let inputs = vec![numbers.to_vec(), sum(&drop.known), sum(&drop.unheard)];
+        Run { label: label.into(), inputs, outputs: vec![drop.times_s.clone()], kind: 0 }
+    }
+
+    /// Own parameters of a drop that begins at t = 0 and leaves the table at a speed.
+    pub(super) fn own(&self, leaves_m_s: f64) -> Vec<f64> {
+        let mut own = vec![0.0; self.spec.count(Scope::PerRun)];
+        if let Some(at) = self.leaves {
+            own[at.slot] = leaves_m_s;
+        }
+        own
+    }
+
+    /// Times of the impacts that are heard, of all that there are.
+    fn times(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        own: &[f64],
+        hidden: usize,
+        out: &mut [f64],
+    ) -> Result<(), String> {
+        let p = &self.places;
+        let drag = shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0);
+        let squared = shared[p.squared.slot];
+        let restitution = |speed: f64| {
+            let e = shared[p.restitution.slot] - shared[p.slope.slot] * (speed - 1.0);
+            e.max(1e-3) * (squared * speed * speed).exp()
+        };
+        let rate = p.clock.map_or(0.0, |at| shared[at.slot]);
+        let gravity = self.setup.gravity_m_s2;
+        let mut leaves = match (self.leaves, self.height_m) {
+            (Some(at), _) => own[at.slot],
+            (None, Some(height)) => {
+                let fell = speed_after_drop(height, gravity, drag);
+                restitution(fell) * fell
+            }
+            (None, None) => return Err("neither a height nor a speed is known".into()),
+        };
+        let mut elapsed = 0.0;
+        let mut impact = 0.0;
+        for (i, time) in out.iter_mut().enumerate() {
+            let wanted = i as f64 + run.inputs[hidden][i];
+            while impact < wanted {
+                let (duration, lands) = rebound(leaves, gravity, drag);
+                elapsed += duration;
+                leaves = restitution(lands) * lands;
+                impact += 1.0;
+            }
+            *time = own[self.begins.slot] + (1.0 + rate) * elapsed;
+        }
+        Ok(())
+    }
+
+    fn fill(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
+        if run.inputs.len() <= FOUND {
+            return Err("its impacts are not numbered".into());
+        }
+        self.times(run, shared, own, KNOWN, out)?;
+        let split = self.places.unheard.map_or(0.0, |at| shared[at.slot]);
+        if split != 0.0 {
+            let mut apart = vec![0.0; out.len()];
+            self.times(run, shared, own, FOUND, &mut apart)?;
+            out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
+        }
+        Ok(())
+    }
+}
+
+fn build_times(setup: &Setup, restitution: f64) -> (Spec, Places, At, Option<At>) {
+    let (mut b, places) = build(setup, restitution);
+    let begins = b.own("first_impact_s", "s", ANY, 0.1);
+    let leaves = (!setup.dropped).then(|| b.own("leaves_m_s", "m/s", [0.0, 1e3], 0.5));
+    (b.spec, places, begins, leaves)
+}
+
+impl Model for TimesModel {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
+    fn longest_noise(&self) -> f64 {
+        self.longest_noise
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        self.fill(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+    }
+
+    fn start(&self, run: &Run, own: &mut [f64]) {
+        let heard: Vec<(usize, f64)> =
+            run.outputs[0].iter().copied().enumerate().filter(|(_, t)| t.is_finite()).collect();
+        let [(first, t0), (second, t1), ..] = heard.as_slice() else { return };
+        own[self.begins.slot] = *t0;
+        if let Some(at) = self.leaves {
+            let flights = (run.inputs[FOUND][*second] - run.inputs[FOUND][*first]) + (second - first) as f64;
+            own[at.slot] = 0.5 * self.setup.gravity_m_s2 * (t1 - t0) / flights;
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! The domain `custom`: anybody's simulator, as a program that is asked or as columns that it has written.
+
+mod declare;
+mod model;
+mod process;
+mod terms;
+
+use std::collections::HashMap;
+
+use missing_physics::data::{Recording, Run};
+use missing_physics::model::{Experiment, Quantity, Scope, Spec};
+
+use super::builder::Builder;
+use super::reading::{calibration, check_runs, number, resolution};
+use crate::recording::{Column, Header, ReadError, Table, quoted};
+use crate::{Domain, Loaded, Template};
+use model::{Asked, CustomModel, Simulation};
+use process::Pool;
+pub use process::{Failure, read_answer};
+use terms::Sizes;
+
+/// A run with fewer rows says nothing of a curve.
+const FEWEST_ROWS: usize = 3;
+/// Where the file does not say what the simulation is.
+const BASELINE: &str = "the simulation as it came with the recording";
+
+/// The domain.
+#[derive(Debug, Clone, Copy)]
+pub struct Custom;
+
+impl Domain for Custom {
+    fn id(&self) -> &'static str {
+        "custom"
+    }
+
+    fn summary(&self) -> &'static str {
+        "anybody's simulator: a program that answers JSON lines, or columns sim_<channel> that it has written"
+    }
+
+    fn reads(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("run, the inputs, the channels", "one row a measurement; names as in [[input]] and [[channel]]"),
+            ("sim_<channel>", "what the simulation says of each channel, where no program is named"),
+            ("[[input]] name, unit", "known exactly; noise may be correlated along the first, if it rises"),
+            ("[[channel]] name, unit", "measured"),
+            ("baseline", "optional: what the simulation is, in a sentence"),
+            (
+                "[simulator] command",
+                "a list of texts: the program and its arguments, run in the recording's folder",
+            ),
+            (
+                "[simulator] timeout_s, processes, step",
+                "optional: 60 s an answer, 1 at once, 1e-3 scales for derivatives",
+            ),
+            ("[[parameter]] name, unit, start, lower, upper, scale, per_run", "free in the baseline"),
+            (
+                "[[mechanism]] id, name, explanation, equation, reference, confused_with",
+                "what may have been left out",
+            ),
+            ("[[mechanism.parameter]] name, unit, off, lower, upper, scale, per_run", "off at `off` (0)"),
+            (
+                "experiments",
+                "optional, with a program: a CSV of runs that could be recorded next, inputs only",
+            ),
+            ("[noise] a channel's name", "optional: one sigma from a calibration"),
+        ]
+    }
+
+    fn spec(&self) -> Spec {
+        Spec { baseline: BASELINE.into(), ..Spec::default() }
+    }
+
+    fn template(&self) -> Template {
+        Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
+    }
+
+    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+        let inputs = quantities(header, "input")?;
+        let channels = quantities(header, "channel")?;
+        let (program, relative_step) = declare::program(header)?;
+        let mut b = Builder::default();
+        let parameters = declare::declare(header, &mut b)?;
+        b.spec.baseline = header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE).into();
+        let channel_names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
+        let calibration = calibration(header, &channel_names)?;
+
+        let simulated: Vec<String> = channels.iter().map(|c| format!("sim_{}", c.name)).collect();
+        let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
+        known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
+        known.extend(channels.iter().map(|q| number(&q.name, "a measured channel")));
+        if program.is_none() {
+            known.extend(simulated.iter().map(|n| number(n, "the simulation's prediction of a channel")));
+        }
+        let table = header.table("data", &known)?;
+        let runs = runs(&table, &inputs, &channels)?;
+        let rises = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
+        let along = runs.iter().all(rises);
+        let sizes = |quantities: &[Quantity], column: fn(&Run, usize) -> &[f64]| -> Vec<(Quantity, f64)> {
+            let size = |k| root_mean_square(runs.iter().flat_map(|r| column(r, k).iter().copied()));
+            quantities.iter().enumerate().map(|(k, q)| (q.clone(), size(k))).collect()
+        };
+        let extent = || {
+            let spans = runs.iter().map(|r| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0][0]);
+            spans.fold(0.0, f64::max)
+        };
+        let terms = terms::add(
+            &mut b,
+            &Sizes {
+                inputs: &sizes(&inputs, |run, k| &run.inputs[k]),
+                channels: &sizes(&channels, |run, k| &run.outputs[k]),
+                extent: along.then(extent),
+            },
+        );
+        let experiments = experiments(header, &inputs, channels.len(), &b.spec, program.is_some())?;
+        let simulation = match program {
+            Some(start) => Simulation::Asked(Box::new(Asked {
+                pool: Pool::new(start),
+                inputs: inputs.iter().map(|q| q.name.clone()).collect(),
+                channels: channels.iter().map(|q| q.name.clone()).collect(),
+                parameters,
+                kept: Default::default(),
+            })),
+            None if !parameters.is_empty() => {
+                let expected = "a program, for the parameters and mechanisms that are declared";
+                return Err(header.section("simulator")?.unfit("command", "absent", expected));
+            }
+            None => Simulation::Made(made(&table, &simulated)?),
+        };
+        let resolution = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution)).collect();
+        let recording = Recording {
+            channels,
+            variables: inputs,
+            runs,
+            noise_along: along.then_some(0),
+            calibration,
+            resolution,
+        };
+        let model = CustomModel { spec: b.spec, simulation, terms, relative_step };
+        Ok(Loaded {
+            recording,
+            model: Box::new(model),
+            experiments,
+            undetermined: Vec::new(),
+            additions: serde_json::Map::new(),
+        })
+    }
+}
+
+/// The declared inputs or channels.
+fn quantities(header: &Header, kind: &str) -> Result<Vec<Quantity>, ReadError> {
+    let mut all: Vec<Quantity> = Vec::new();
+    let expected = "the name of a column, with its unit as a suffix, unlike the others'";
+    for section in header.root().sections(kind)? {
+        let name = section.text("name", expected)?;
+        let taken = name == "run" || name.starts_with("sim_") || all.iter().any(|q| q.name == name);
+        if name.is_empty() || taken {
+            return Err(section.unfit("name", quoted(name), expected));
+        }
+        let unit = section.optional_text("unit", "a unit, such as \"rad\"")?.unwrap_or_default();
+        all.push(Quantity::new(name, unit));
+    }
+    if all.is_empty() {
+        let missing = format!("at least one [[{kind}]] with the name of a column");
+        return Err(header.root().unfit(kind, "absent", missing));
+    }
+    Ok(all)
+}
+
+fn columns<'t>(
+    table: &'t Table<'_>,
+    names: impl Iterator<Item = &'t str>,
+) -> Result<Vec<&'t [f64]>, ReadError> {
+    names.map(|n| table.numbers(n).ok_or_else(|| table.missing(n, "a column of that name"))).collect()
+}
+
+/// The runs of a table, with channels where there are any.
+fn runs(table: &Table<'_>, inputs: &[Quantity], channels: &[Quantity]) -> Result<Vec<Run>, ReadError> {
+    let labels = table.labels("run", "the label of each row's run")?;
+    let known = columns(table, inputs.iter().map(|q| q.name.as_str()))?;
+    let measured = columns(table, channels.iter().map(|q| q.name.as_str()))?;
+    let by_run = check_runs(
+        table,
+        labels,
+        FEWEST_ROWS,
+        inputs.first().map(|q| q.name.as_str()).filter(|n| *n == "t_s"),
+    )?;
+    let run = |(label, rows): (String, Vec<usize>)| {
+        let pick = |all: &[&[f64]]| -> Vec<Vec<f64>> {
+            all.iter().map(|column| rows.iter().map(|&r| column[r]).collect()).collect()
+        };
+        Run { label, inputs: pick(&known), outputs: pick(&measured), kind: 0 }
+    };
+    Ok(by_run.into_iter().map(run).collect())
+}
+
+/// What was simulated before, by run.
+fn made(table: &Table<'_>, simulated: &[String]) -> Result<HashMap<String, Vec<f64>>, ReadError> {
+    let expected = "the simulation's prediction, or a program in [simulator] command";
+    let labels = table.labels("run", "the label of each row's run")?;
+    let columns: Vec<&[f64]> = simulated
+        .iter()
+        .map(|n| table.numbers(n).ok_or_else(|| table.missing(n, expected)))
+        .collect::<Result<_, _>>()?;
+    let one = |rows: Vec<usize>| columns.iter().flat_map(|c| rows.iter().map(|&r| c[r])).collect();
+    Ok(Table::by_run(labels).into_iter().map(|(label, rows)| (label, one(rows))).collect())
+}
+
+/// Runs that could be recorded next.
+fn experiments(
+    header: &Header,
+    inputs: &[Quantity],
+    channels: usize,
+    spec: &Spec,
+    program: bool,
+) -> Result<Vec<Experiment>, ReadError> {
+    let expected = "the name of a CSV file with the inputs of runs that could be recorded";
+    let Some(name) = header.root().optional_text("experiments", expected)? else { return Ok(Vec::new()) };
+    if !program {
+        return Err(header.root().unfit("experiments", quoted(name), "no experiments without a program"));
+    }
+    let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
+    known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
+    let table = header.table("experiments", &known)?;
+    let own: Vec<f64> =
+        spec.parameters.iter().filter(|p| p.scope == Scope::PerRun).map(|p| p.start).collect();
+    let experiment = |mut run: Run| {
+        run.outputs = vec![vec![0.0; run.len()]; channels];
+        let constant = |column: &[f64]| column.windows(2).all(|w| w[0] == w[1]);
+        let action = inputs.iter().zip(&run.inputs).filter(|(_, c)| constant(c));
+        let action = action.map(|(q, c)| (q.name.clone(), c[0])).collect();
+        let words = format!("record the run {} of {name}", quoted(&run.label));
+        // Not to be taken for a run that was recorded.
+        run.label = format!("next: {}", run.label);
+        Experiment { action, words, runs: vec![run], own: vec![own.clone()] }
+    };
+    Ok(runs(&table, inputs, &[])?.into_iter().map(experiment).collect())
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0usize), |(sum, n), v| (sum + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
+}

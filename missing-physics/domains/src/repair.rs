@@ -1,0 +1,134 @@
+//! The repaired model in a file: written by a diagnosis, used by whoever wants to simulate with what was found.
+//!
+//! ```no_run
+//! use missing_physics_domains::repair::Repair;
+//!
+//! let repair = Repair::read("model.json".as_ref())?;
+//! let predicted = repair.predict("next-recording".as_ref())?;
+//! println!("{:?} +- {:?}", predicted.runs[0].channels[0], predicted.runs[0].sigma[0]);
+//! # Ok::<(), missing_physics_domains::repair::RepairError>(())
+//! ```
+
+use std::path::Path;
+
+use missing_physics::data::Recording;
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::repaired::{PredictedRun, Repaired, RepairedError};
+use serde::{Deserialize, Serialize};
+
+use crate::Domain;
+use crate::recording::{ReadError, one_line, read_text};
+
+/// A repaired model of a domain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Repair {
+    /// Format of the file: 1.
+    pub format: u32,
+    /// The domain whose simulation it repairs.
+    pub domain: String,
+    /// What is on, and by how much.
+    pub model: Repaired,
+}
+
+/// A recording and what a repaired model says of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predicted {
+    /// The recording; NaN where nothing was measured.
+    pub recording: Recording,
+    /// What the model says, run by run.
+    pub runs: Vec<PredictedRun>,
+}
+
+/// Why there is no repaired model, or no prediction.
+#[derive(Debug, thiserror::Error)]
+pub enum RepairError {
+    /// A file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file is no repaired model.
+    #[error("{file}: no repaired model of format 1 ({why})")]
+    NotAModel {
+        /// The file.
+        file: String,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The recording is of another domain.
+    #[error("{folder}: a recording of the domain {got}, expected {expected} as in the model")]
+    OtherDomain {
+        /// The recording's folder.
+        folder: String,
+        /// Its domain.
+        got: &'static str,
+        /// The model's domain.
+        expected: String,
+    },
+    /// The domain has no channels to predict.
+    #[error(
+        "the domain {domain} judges errors that it has whitened, not channels: its repaired model predicts none"
+    )]
+    NoChannels {
+        /// The domain.
+        domain: &'static str,
+    },
+    /// The model and the recording do not fit.
+    #[error("{folder}: {error}")]
+    Model {
+        /// The recording's folder.
+        folder: String,
+        /// Why.
+        error: RepairedError,
+    },
+}
+
+impl Repair {
+    /// The model that a diagnosis ended with.
+    pub fn new(domain: &dyn Domain, diagnosis: &Diagnosis) -> Self {
+        Self { format: 1, domain: domain.id().into(), model: diagnosis.repaired.clone() }
+    }
+
+    /// The model as JSON.
+    pub fn to_json(&self) -> String {
+        // Numbers, texts and lists always serialise.
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// Reads a model.
+    ///
+    /// # Errors
+    /// [`RepairError::Read`], [`RepairError::NotAModel`].
+    pub fn read(path: &Path) -> Result<Self, RepairError> {
+        let text = read_text(path)?;
+        let not = |why: String| RepairError::NotAModel { file: path.display().to_string(), why };
+        let repair: Self = serde_json::from_str(&text).map_err(|e| not(one_line(&e.to_string())))?;
+        if repair.format != 1 {
+            return Err(not(format!("its format is {}", repair.format)));
+        }
+        Ok(repair)
+    }
+
+    /// Predicts the recording in a folder, whose cells may be empty where nothing was measured: the shared parameters are the
+    /// model's, what each run has for itself (where it began) is fitted to its measured rows.
+    ///
+    /// # Errors
+    /// [`RepairError`].
+    pub fn predict(&self, folder: &Path) -> Result<Predicted, RepairError> {
+        let (domain, loaded) = crate::load_with_gaps(folder)?;
+        let name = || folder.display().to_string();
+        if domain.id() != self.domain {
+            let (got, expected) = (domain.id(), self.domain.clone());
+            return Err(RepairError::OtherDomain { folder: name(), got, expected });
+        }
+        if !domain.predicts() {
+            return Err(RepairError::NoChannels { domain: domain.id() });
+        }
+        let runs = self
+            .model
+            .predict(&*loaded.model, &loaded.recording)
+            .map_err(|error| RepairError::Model { folder: name(), error })?;
+        Ok(Predicted { recording: loaded.recording, runs })
+    }
+}

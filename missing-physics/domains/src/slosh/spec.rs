@@ -1,0 +1,276 @@
+//! The parameters and mechanisms of a decaying wave.
+
+use std::sync::Arc;
+
+use liquid_haptics::slosh::{Decay, Effects, UprightCylinder};
+use missing_physics::model::{Derived, DerivedPerRun, Over, Spec};
+
+use super::model::Setup;
+use crate::builder::{ANY, At, Builder};
+
+/// Where each parameter stands.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Places {
+    pub(super) viscosity: At,
+    pub(super) tension: At,
+    pub(super) frequency: At,
+    pub(super) friction: At,
+    pub(super) quadratic: At,
+    pub(super) second_omega: At,
+    pub(super) second_damping: At,
+    pub(super) arm_omega: At,
+    pub(super) arm_damping: At,
+    pub(super) lag: At,
+    pub(super) cos: At,
+    pub(super) sin: At,
+    pub(super) second_cos: At,
+    pub(super) second_sin: At,
+    pub(super) arm_cos: At,
+    pub(super) arm_sin: At,
+    pub(super) transient: At,
+}
+
+/// Where the second mode's frequency may lie, rad/s: surface tension raises it above that of gravity alone.
+pub(super) fn second_band(cylinder: &UprightCylinder) -> [f64; 2] {
+    let omega = cylinder.angular_frequency_rad_s(1, 0.0);
+    [0.97 * omega, 1.06 * omega]
+}
+
+/// Bounds of the arm's frequency, rad/s.
+pub(super) const ARM_RAD_S: [f64; 2] = [1.0, 1000.0];
+
+/// All parameters, and where each stands: amplitudes and viscosity start from what the runs show.
+pub(super) fn build(
+    setup: &Setup,
+    cylinder: &UprightCylinder,
+    largest: f64,
+    viscosity: f64,
+) -> (Spec, Places) {
+    let mut b = Builder::default();
+    let mut p = Places::default();
+    let (unit, suffix) = (setup.channel.unit(), setup.channel.suffix());
+    let amplitude = 0.1 * largest;
+    b.spec.baseline = "the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase".into();
+    p.viscosity = b.shared(
+        "kinematic_viscosity_m2_s",
+        "m^2/s",
+        viscosity,
+        [1e-12, cylinder.kinematic_viscosity_m2_s(0.9)],
+        viscosity,
+    );
+    p.cos = b.own(&format!("cos_{suffix}"), unit, ANY, largest);
+    p.sin = b.own(&format!("sin_{suffix}"), unit, ANY, largest);
+    let (omega, at_rest) = (cylinder.angular_frequency_rad_s(0, 0.0), 0.02);
+    // Liquids near room temperature have 0.015 to 0.073 N/m, liquid metals up to 0.6.
+    let strongest = if setup.density_kg_m3 > 5000.0 { 0.7 } else { 0.09 };
+    p.tension = b.shared("surface_tension_n_m", "N/m", 0.0, [0.0, strongest], 0.03);
+    b.mechanism(
+        "surface-tension",
+        &[p.tension],
+        [
+            "surface tension",
+            "The surface's tension stiffens the wave, more so in narrow containers.",
+            "omega^2 = (g k + sigma k^3 / rho) tanh(k h), k = 1.841 / R",
+            "Ibrahim 2005, Liquid Sloshing Dynamics, doi:10.1017/CBO9780511536656, ch. 1",
+        ],
+        &["nonlinear-frequency"],
+    );
+    let square = largest * largest;
+    p.frequency = b.shared(
+        &format!("coefficient_per_{suffix}2"),
+        &format!("1/({unit})^2"),
+        0.0,
+        [-0.3 / square, 0.3 / square],
+        0.01 / square,
+    );
+    let mechanism = b.mechanism(
+        "nonlinear-frequency",
+        &[p.frequency],
+        [
+            "frequency that depends on the amplitude",
+            "High waves are slower or faster than low ones.",
+            "omega (1 + c A^2 / A_max^2), A_max the largest amplitude of a run",
+            "Miles 1984, doi:10.1017/S0022112084002834",
+        ],
+        &["surface-tension"],
+    );
+    // The start says how high the wave is only together with the spring: the change is that of its motion.
+    let (cos, sin, frequency) = (p.cos.slot, p.sin.slot, p.frequency.slot);
+    let shift = move |shared: &[f64], own: &[f64]| {
+        let effects =
+            Effects { frequency_change: shared[frequency], largest_amplitude: 1.0, ..Effects::default() };
+        Decay { omega_rad_s: omega, damping_ratio: 0.0, effects }.frequency_shift([own[cos], own[sin]])
+    };
+    mechanism.derived_per_run = vec![DerivedPerRun {
+        name: "coefficient".into(),
+        unit: String::new(),
+        over: Over::Largest,
+        value: Arc::new(shift),
+    }];
+    p.friction = b.shared(&format!("friction_{suffix}"), unit, 0.0, [0.0, largest], at_rest * largest);
+    b.mechanism(
+        "contact-line-friction",
+        &[p.friction],
+        [
+            "friction of the contact line",
+            "The edge of the surface sticks to the wall: the amplitude falls in a straight line and stops.",
+            "x'' + 2 gamma omega x' + omega^2 (x + f sign x') = 0; a cycle loses 4 f",
+            "Hocking 1987, doi:10.1017/S0022112087001514; Cocciaro, Faetti and Festa 1993, doi:10.1017/S0022112093000035",
+        ],
+        &["quadratic-damping"],
+    );
+    p.quadratic = b.shared(
+        &format!("coefficient_per_{suffix}"),
+        &format!("1/({unit})"),
+        0.0,
+        [0.0, 10.0 / largest],
+        0.02 / largest,
+    );
+    b.mechanism(
+        "quadratic-damping",
+        &[p.quadratic],
+        [
+            "quadratic damping",
+            "Eddies and breaking take more from high waves than from low ones.",
+            "x'' + 2 gamma omega x' + c |x'| x' + omega^2 x = 0",
+            "Faltinsen and Timokha 2009, Sloshing, ISBN 978-0-521-88111-1, ch. 6",
+        ],
+        &["contact-line-friction"],
+    );
+    p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3, 100.0], 1.0 / omega);
+    p.transient = b.own(&format!("transient_{suffix}"), unit, ANY, amplitude);
+    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
+    let mechanism = b.mechanism(
+        "sensor-lag",
+        &[p.lag],
+        [
+            "lag of the sensor",
+            "The sensor follows the load with a delay; what is left of its reading at t = 0 dies away.",
+            "tau y' + y = x: the same mode at another amplitude and phase, plus c exp(-t / tau)",
+            "Doebelin 2003, Measurement Systems, ISBN 978-0-07-243886-3, ch. 3",
+        ],
+        &["arm-compliance"],
+    );
+    mechanism.companions = vec![p.transient.index];
+    mechanism.shapes = vec![p.lag.index];
+    unlagged(&mut b, &p, omega, (unit, suffix));
+    (b.spec, p)
+}
+
+/// What a reading is of the wave itself: a sensor that lags, where it does, shows less of it.
+fn unlagged(b: &mut Builder, p: &Places, omega: f64, (unit, suffix): (&str, &str)) {
+    let off = b.spec.parameters[p.lag.index].start;
+    for (id, name, unit, at, power) in [
+        ("contact-line-friction", format!("friction_{suffix}"), unit.to_owned(), p.friction, 1),
+        ("quadratic-damping", format!("coefficient_per_{suffix}"), format!("1/({unit})"), p.quadratic, -1),
+    ] {
+        let (at, lag) = (at.slot, p.lag.slot);
+        let value = move |shared: &[f64]| {
+            let lags = if shared[lag] == off { 0.0 } else { omega * shared[lag] };
+            shared[at] * lags.hypot(1.0).powi(power)
+        };
+        if let Some(mechanism) = b.spec.mechanisms.iter_mut().find(|m| m.id == id) {
+            mechanism.derived.push(Derived { name, unit, value: Arc::new(value) });
+        }
+    }
+}
+
+fn modes(
+    b: &mut Builder,
+    p: &mut Places,
+    cylinder: &UprightCylinder,
+    (unit, suffix): (&str, &str),
+    amplitude: f64,
+) {
+    let [low, high] = second_band(cylinder);
+    p.second_omega =
+        b.shared("omega_rad_s", "rad/s", cylinder.angular_frequency_rad_s(1, 0.0), [low, high], 0.3);
+    p.second_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.5], 0.01);
+    p.second_cos = b.own(&format!("second_cos_{suffix}"), unit, ANY, amplitude);
+    p.second_sin = b.own(&format!("second_sin_{suffix}"), unit, ANY, amplitude);
+    let second = b.mechanism(
+        "second-mode",
+        &[p.second_omega, p.second_damping],
+        [
+            "second slosh mode",
+            "A second antisymmetric wave is on the surface, at the frequency that theory gives it.",
+            "+ A2 exp(-gamma2 omega2 t) cos(omega2 t + phi2), omega2^2 = g k2 tanh(k2 h), k2 = 5.331 / R",
+            "Ibrahim 2005, Liquid Sloshing Dynamics, doi:10.1017/CBO9780511536656, ch. 1",
+        ],
+        &["arm-compliance", "sensor-lag"],
+    );
+    second.companions = vec![p.second_cos.index, p.second_sin.index];
+    second.derived_per_run =
+        vec![amplitude_of(p, [p.second_omega, p.second_cos, p.second_sin], suffix, unit)];
+    second.shapes = vec![p.second_omega.index, p.second_damping.index];
+    p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
+    p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
+    p.arm_cos = b.own(&format!("arm_cos_{suffix}"), unit, ANY, amplitude);
+    p.arm_sin = b.own(&format!("arm_sin_{suffix}"), unit, ANY, amplitude);
+    let arm = b.mechanism(
+        "arm-compliance",
+        &[p.arm_omega, p.arm_damping],
+        [
+            "compliance of the arm",
+            "Arm and gripper ring at a frequency of their own.",
+            "+ A exp(-gamma omega t) cos(omega t + phi)",
+            "Siciliano et al. 2009, Robotics, doi:10.1007/978-1-84628-642-1, ch. 7",
+        ],
+        &["second-mode"],
+    );
+    arm.companions = vec![p.arm_cos.index, p.arm_sin.index];
+    arm.derived_per_run = vec![amplitude_of(p, [p.arm_omega, p.arm_cos, p.arm_sin], suffix, unit)];
+    arm.shapes = vec![p.arm_omega.index, p.arm_damping.index];
+}
+
+/// The amplitude at t = 0 of a wave that each run has in two parts. A sensor that lags (its reading has a transient) shows less of it.
+fn amplitude_of(p: &Places, [omega, cos, sin]: [At; 3], suffix: &str, unit: &str) -> DerivedPerRun {
+    let (omega, cos, sin, lag, transient) = (omega.slot, cos.slot, sin.slot, p.lag.slot, p.transient.slot);
+    DerivedPerRun {
+        name: format!("amplitude_{suffix}"),
+        unit: unit.into(),
+        over: Over::Mean,
+        value: Arc::new(move |shared, own| {
+            let lags = if own[transient] == 0.0 { 0.0 } else { shared[omega] * shared[lag] };
+            own[cos].hypot(own[sin]) * lags.hypot(1.0)
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use missing_physics::model::Scope;
+
+    use super::super::model::Channel;
+    use super::*;
+
+    /// A first-order lag shows a wave of omega at 1 / sqrt(1 + (omega tau)^2) of its height, and the reading at which it sticks likewise.
+    #[test]
+    fn friction_and_eddies_are_those_of_the_wave_and_not_of_a_reading_that_lags() {
+        let setup = Setup {
+            radius_m: 0.035,
+            length_m: None,
+            volume_m3: 2e-4,
+            density_kg_m3: 997.0,
+            gravity_m_s2: 9.81,
+            channel: Channel::Torque,
+        };
+        let cylinder = UprightCylinder::new(0.035, 0.05, 9.81).unwrap();
+        let (spec, p) = build(&setup, &cylinder, 1e-3, 1e-6);
+        let mut shared: Vec<f64> =
+            spec.parameters.iter().filter(|q| q.scope == Scope::Shared).map(|q| q.start).collect();
+        (shared[p.friction.slot], shared[p.quadratic.slot]) = (2e-5, 30.0);
+        let said = |shared: &[f64], id: &str| {
+            let mechanism = spec.mechanisms.iter().find(|m| m.id == id).unwrap();
+            let [derived] = mechanism.derived.as_slice() else { unreachable!("one quantity") };
+            assert_eq!(derived.name, spec.parameters[mechanism.parameters[0]].name);
+            (derived.value)(shared)
+        };
+        assert_eq!(said(&shared, "contact-line-friction"), 2e-5);
+        assert_eq!(said(&shared, "quadratic-damping"), 30.0);
+        shared[p.lag.slot] = 3f64.sqrt() / cylinder.angular_frequency_rad_s(0, 0.0);
+        approx::assert_relative_eq!(said(&shared, "contact-line-friction"), 4e-5, max_relative = 1e-12);
+        approx::assert_relative_eq!(said(&shared, "quadratic-damping"), 15.0, max_relative = 1e-12);
+    }
+}

@@ -1,0 +1,212 @@
+//! Parameters, mechanisms and candidate terms of a flight.
+
+use std::sync::Arc;
+
+use missing_physics::model::{Derived, Quantity, Spec, Term};
+
+use super::model::{Axes, Role, Setup};
+use crate::builder::{ANY, At, Builder};
+
+/// A specification in the making, with the meaning of each shared parameter, in order.
+struct Flying {
+    b: Builder,
+    roles: Vec<Role>,
+}
+
+impl Flying {
+    fn shared(&mut self, role: Role, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> At {
+        self.roles.push(role);
+        self.b.shared(name, unit, 0.0, bounds, scale)
+    }
+
+    fn term(
+        &mut self,
+        role: Role,
+        (name, unit): (&str, &str),
+        lower: f64,
+        scale: f64,
+        formula: &str,
+        variables: &[&str],
+    ) {
+        let parameter = self.shared(role, name, unit, [lower, f64::INFINITY], scale).index;
+        self.b.spec.terms.push(Term {
+            parameter,
+            formula: formula.into(),
+            adds_to: Quantity::new("acceleration", "m/s^2"),
+            variables: variables.iter().map(|s| (*s).to_owned()).collect(),
+        });
+    }
+}
+
+/// The specification of a set-up and the meaning of each shared parameter, in order.
+pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
+    let mut flying = Flying { b: Builder::default(), roles: Vec::new() };
+    let b = &mut flying;
+    let (space, felt) = (setup.axes == Axes::Space, setup.axes == Axes::Accelerometer);
+    let sized = setup.mass_kg.is_some() && setup.diameter_m.is_some();
+    b.b.spec.baseline = if felt {
+        "free fall: an accelerometer on board reads its offset and nothing else".into()
+    } else {
+        "ballistic flight under gravity alone, seen by a true camera; every run has its own start".into()
+    };
+    let drag = if sized {
+        b.shared(Role::Quadratic, "drag_coefficient", "", [0.0, 10.0], 0.5)
+    } else {
+        b.shared(Role::Quadratic, "k_per_m", "1/m", [0.0, 20.0], 0.02)
+    };
+    let text = [
+        "air drag, quadratic",
+        "The air slows the ball in proportion to the square of its speed.",
+        "a = -k |v - w| (v - w), k = rho Cd A / (2 m)",
+        "Clift, Grace and Weber 1978, Bubbles, Drops, and Particles; de Silva et al. 2020, doi:10.3389/frai.2020.00025",
+    ];
+    let mechanism =
+        b.b.mechanism("quadratic-drag", &[drag], text, &["linear-drag", "buoyancy", "camera-scale"]);
+    if sized {
+        mechanism.derived.push(Derived {
+            name: "k_per_m".into(),
+            unit: "1/m".into(),
+            value: Arc::new(move |shared| drag_unit * shared[drag.slot]),
+        });
+    }
+    let rate = b.shared(Role::Linear, "rate_per_s", "1/s", [0.0, 20.0], 0.1);
+    let text = [
+        "air drag, linear",
+        "The air slows the ball in proportion to its speed.",
+        "a = -r (v - w)",
+        "Stokes 1851; de Silva et al. 2020, doi:10.3389/frai.2020.00025",
+    ];
+    b.b.mechanism("linear-drag", &[rate], text, &["quadratic-drag", "buoyancy", "camera-scale"]);
+    if !felt {
+        camera_and_gravity(b);
+    }
+    if space {
+        in_space(b, setup.spin, drag);
+    }
+    b.term(Role::Cubic, ("cubic_drag_s_per_m2", "s/m^2"), 0.0, 1e-3, "-|v|^2 v", &["v"]);
+    if !felt {
+        b.term(
+            Role::StiffZ,
+            ("stiffness_z_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(z - z(0))",
+            &["z_m"],
+        );
+    }
+    if space {
+        b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_x", &[]);
+        b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_y", &[]);
+        b.term(
+            Role::StiffX,
+            ("stiffness_x_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(x - x(0))",
+            &["x_m"],
+        );
+        b.term(
+            Role::StiffY,
+            ("stiffness_y_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(y - y(0))",
+            &["y_m"],
+        );
+    }
+    match setup.axes {
+        Axes::Height => {
+            b.b.own("z0_m", "m", ANY, 1.0);
+            b.b.own("vz0_m_s", "m/s", ANY, 1.0);
+        }
+        Axes::Space => {
+            for name in ["x0_m", "y0_m", "z0_m"] {
+                b.b.own(name, "m", ANY, 1.0);
+            }
+            for name in ["vx0_m_s", "vy0_m_s", "vz0_m_s"] {
+                b.b.own(name, "m/s", ANY, 1.0);
+            }
+        }
+        Axes::Accelerometer => {
+            b.b.own("offset_m_s2", "m/s^2", ANY, 1.0);
+            b.b.own("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
+        }
+    }
+    (flying.b.spec, flying.roles)
+}
+
+/// Effects that a height alone shows.
+fn camera_and_gravity(b: &mut Flying) {
+    // Beyond 0.5 m/s^2 it is not physics: nowhere on Earth is g that different, and air is not that dense.
+    let lift = b.shared(Role::Buoyancy, "acceleration_m_s2", "m/s^2", [-0.5, 0.5], 0.2);
+    let text = [
+        "buoyancy or another g",
+        "A constant force along gravity: a dense gas, a light ball, a frame that accelerates, another g.",
+        "a = b e_z, |b| <= 0.5 m/s^2",
+        "Archimedes' principle: b = g rho V / m; Moritz 1980, Geodetic Reference System, for the range of g",
+    ];
+    b.b.mechanism("buoyancy", &[lift], text, &["camera-scale", "clock-rate", "linear-drag"]);
+    // A scale error above a tenth, or the matching error of the clock, is seen by eye: the ball has the wrong size.
+    let scale = b.shared(Role::CameraScale, "scale", "", [-0.1, 0.1], 0.01);
+    let text = [
+        "camera scale",
+        "Positions are read too large or too small.",
+        "measured = (1 + s) true, |s| <= 0.1",
+        "Hartley and Zisserman 2004, doi:10.1017/CBO9780511811685, ch. 7 (calibration)",
+    ];
+    b.b.mechanism("camera-scale", &[scale], text, &["clock-rate", "buoyancy"]);
+    let clock = b.shared(Role::ClockRate, "rate", "", [-0.05, 0.05], 0.005);
+    let text = [
+        "clock rate",
+        "The camera's clock runs fast or slow.",
+        "stated time = (1 + rate) true time, |rate| <= 0.05",
+        "Olson 2010, doi:10.1109/IROS.2010.5650579 (clocks of sensors)",
+    ];
+    b.b.mechanism("clock-rate", &[clock], text, &["camera-scale", "buoyancy"]);
+}
+
+/// Effects that need all three coordinates.
+fn in_space(b: &mut Flying, spin: bool, drag: At) {
+    let (parameters, equation) = if spin {
+        let c = b.shared(Role::LiftCoefficient, "lift_coefficient", "", [-20.0, 20.0], 0.01);
+        (vec![c], "a = c spin x v")
+    } else {
+        let roles = [Role::LiftX, Role::LiftY, Role::LiftZ];
+        let names = ["lift_x_per_s", "lift_y_per_s", "lift_z_per_s"];
+        let lift =
+            roles.into_iter().zip(names).map(|(r, n)| b.shared(r, n, "1/s", [-20.0, 20.0], 0.1)).collect();
+        (lift, "a = lift x v")
+    };
+    let text = [
+        "Magnus lift",
+        "A spinning ball is pushed across its path.",
+        equation,
+        "Mehta 1985, doi:10.1146/annurev.fl.17.010185.001055",
+    ];
+    b.b.mechanism("magnus-lift", &parameters, text, &["wind", "camera-tilt"]);
+    let wx = b.shared(Role::WindX, "wind_x_m_s", "m/s", [-40.0, 40.0], 2.0);
+    let wy = b.shared(Role::WindY, "wind_y_m_s", "m/s", [-40.0, 40.0], 2.0);
+    let text = [
+        "wind",
+        "The air moves; it acts through drag.",
+        "u = v - w in every drag",
+        "Clift, Grace and Weber 1978, Bubbles, Drops, and Particles",
+    ];
+    let wind = b.b.mechanism("wind", &[wx, wy], text, &["quadratic-drag", "magnus-lift", "camera-tilt"]);
+    wind.companions = vec![drag.index];
+    wind.companions_unless = vec!["quadratic-drag".into(), "linear-drag".into()];
+    let tx = b.shared(Role::TiltX, "about_x_rad", "rad", [-0.5, 0.5], 0.01);
+    let ty = b.shared(Role::TiltY, "about_y_rad", "rad", [-0.5, 0.5], 0.01);
+    let text = [
+        "camera tilt",
+        "The camera's vertical is not gravity's.",
+        "measured = R_y(about_y) R_x(about_x) true",
+        "Hartley and Zisserman 2004, doi:10.1017/CBO9780511811685, ch. 2",
+    ];
+    let tilt = b.b.mechanism("camera-tilt", &[tx, ty], text, &["wind", "magnus-lift"]);
+    tilt.derived.push(Derived {
+        name: "angle_rad".into(),
+        unit: "rad".into(),
+        value: Arc::new(move |shared| shared[tx.slot].hypot(shared[ty.slot])),
+    });
+}

@@ -1,0 +1,233 @@
+//! One world of a proof: drawn, diagnosed, judged.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use missing_physics::data::Recording;
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use missing_physics::told::{Told, told};
+use serde::{Deserialize, Serialize};
+use worlds::concealed::{Concealed, Hidden, Key, Maker};
+
+use crate::{ProveError, write_whole};
+use missing_physics_domains::{self as domains, recording::read_text};
+use missing_physics_report::{self as report, ReportContext};
+
+/// Kinds of worlds, in the order in which they take turns: 40 % nothing, 30 % one, 15 % two, 15 % unlisted.
+const TURNS: [Hidden; 20] = {
+    use Hidden::{Nothing as N, One as O, Two as T, Unlisted as U};
+    [N, O, N, U, O, N, T, N, O, N, O, T, N, U, O, N, T, N, O, U]
+};
+
+/// One world.
+pub(super) struct World {
+    maker: &'static dyn Maker,
+    hidden: Hidden,
+    seed: u64,
+    name: String,
+    folder: PathBuf,
+}
+
+/// What is scored of a diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Outcome {
+    pub(super) verdict: String,
+    pub(super) p_value: f64,
+    pub(super) chosen: Vec<String>,
+    pub(super) confused_with: Vec<Vec<String>>,
+    pub(super) estimates: Vec<Estimated>,
+    pub(super) places: Vec<Located>,
+    pub(super) heldout_rmse: Vec<Option<f64>>,
+    pub(super) seconds: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Estimated {
+    pub(super) mechanism: String,
+    pub(super) name: String,
+    pub(super) ci95: [f64; 2],
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Located {
+    pub(super) variable: Option<String>,
+    pub(super) from: Option<f64>,
+    pub(super) to: Option<f64>,
+    /// Extent of the variable in the recording.
+    pub(super) extent: Option<f64>,
+}
+
+/// What somebody who was told the truth finds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Best {
+    pub(super) likelihood_ratio: f64,
+    pub(super) p_value: f64,
+    pub(super) decisive: f64,
+    pub(super) heldout_rmse: Vec<Option<f64>>,
+}
+
+/// A world with everything that is known of it.
+#[derive(Debug, Clone)]
+pub(super) struct Judged {
+    pub(super) domain: &'static str,
+    pub(super) name: String,
+    pub(super) key: Key,
+    pub(super) outcome: Outcome,
+    /// Where listed mechanisms are at work.
+    pub(super) best: Option<Best>,
+}
+
+impl World {
+    pub(super) fn new(maker: &'static dyn Maker, number: usize, seed: u64, folder: &Path) -> Self {
+        let name = format!("{}/{number:04}", maker.name());
+        // FNV-1a of the name, so that a domain's worlds do not depend on which others are asked for.
+        let hash =
+            name.bytes().fold(0xcbf2_9ce4_8422_2325 ^ seed.wrapping_mul(0x9e37_79b9_7f4a_7c15), |h, b| {
+                (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+            });
+        let folder = folder.join(&name);
+        Self { maker, hidden: TURNS[number % TURNS.len()], seed: hash, name, folder }
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn draw(&self) -> Concealed {
+        self.maker.conceal(self.hidden, self.seed)
+    }
+
+    /// Writes the recording and diagnoses it from its files, unless that has been done.
+    pub(super) fn diagnose(&self) -> Result<(), ProveError> {
+        let path = self.folder.join("outcome.json");
+        if read::<Outcome>(&path).is_some() {
+            return Ok(());
+        }
+        let recording = self.recording();
+        let fail = |e: std::io::Error| ProveError::Other(format!("{}: {e}", recording.display()));
+        std::fs::create_dir_all(&recording).map_err(fail)?;
+        for (name, contents) in &self.draw().files {
+            write_whole(&recording.join(name), contents)?;
+        }
+        let begin = Instant::now();
+        let (domain, loaded) = domains::load(&recording)?;
+        let options = self.options();
+        let found = diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)
+            .map_err(|e| ProveError::Other(format!("{}: {e}", recording.display())))?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let context = ReportContext {
+            domain: domain.id().into(),
+            recording: format!("{}/recording", self.name),
+            title: self.name.clone(),
+            additions: loaded.additions,
+        };
+        write_whole(&self.folder.join("answer.json"), report::json(&found, &context))?;
+        write_whole(&self.folder.join("report.html"), report::html(&found, &context))?;
+        write(&path, &Outcome::of(&found, &loaded.recording, seconds))
+    }
+
+    /// Fits what is truly at work, unless that has been done.
+    pub(super) fn tell_truth(&self) -> Result<(), ProveError> {
+        let truth = self.draw().key.mechanisms;
+        let path = self.folder.join("told.json");
+        if truth.is_empty() || read::<Best>(&path).is_some() {
+            return Ok(());
+        }
+        let (_, loaded) = domains::load(&self.recording())?;
+        let found = told(&*loaded.model, &loaded.recording, &truth, &self.options())
+            .map_err(|e| ProveError::Other(format!("{}: {e}", self.name)))?;
+        write(&path, &Best::of(&found))
+    }
+
+    pub(super) fn judged(&self) -> Result<Judged, ProveError> {
+        let missing = |what: &str| ProveError::Other(format!("{}: {what} is missing", self.folder.display()));
+        let key = self.draw().key;
+        let best = read::<Best>(&self.folder.join("told.json"));
+        if best.is_none() && !key.mechanisms.is_empty() {
+            return Err(missing("told.json"));
+        }
+        let outcome = read(&self.folder.join("outcome.json")).ok_or_else(|| missing("outcome.json"))?;
+        Ok(Judged { domain: self.maker.name(), name: self.name.clone(), key, outcome, best })
+    }
+
+    fn recording(&self) -> PathBuf {
+        self.folder.join("recording")
+    }
+
+    fn options(&self) -> Options {
+        Options { seed: self.seed, ..Options::default() }
+    }
+}
+
+impl Outcome {
+    fn of(d: &Diagnosis, recording: &Recording, seconds: f64) -> Self {
+        let estimates = d.mechanisms.iter().filter(|m| d.chosen.contains(&m.id)).flat_map(|m| {
+            m.parameters.iter().filter(|p| p.ci95.iter().all(|v| v.is_finite())).map(|p| Estimated {
+                mechanism: m.id.clone(),
+                name: p.name.clone(),
+                ci95: p.ci95,
+            })
+        });
+        Self {
+            verdict: d.verdict.word().into(),
+            p_value: d.p_value,
+            chosen: d.chosen.clone(),
+            confused_with: d.confused_with.clone(),
+            estimates: estimates.collect(),
+            places: d
+                .location
+                .iter()
+                .map(|l| Located {
+                    variable: l.variable.clone(),
+                    from: l.from,
+                    to: l.to,
+                    extent: l.variable.as_deref().and_then(|v| extent(recording, v)),
+                })
+                .collect(),
+            heldout_rmse: d.after.iter().map(|f| finite(f.heldout_rmse)).collect(),
+            seconds,
+        }
+    }
+}
+
+impl Best {
+    fn of(t: &Told) -> Self {
+        /// Far beyond any threshold, and a number in JSON.
+        const MOST: f64 = 1e9;
+        Self {
+            likelihood_ratio: t.likelihood_ratio.clamp(0.0, MOST),
+            p_value: t.p_value.clamp(0.0, 1.0),
+            decisive: if t.decisive.is_nan() { -MOST } else { t.decisive.clamp(-MOST, MOST) },
+            heldout_rmse: t.heldout_rmse.iter().map(|v| finite(*v)).collect(),
+        }
+    }
+}
+
+/// By how much a variable differs over a recording.
+fn extent(recording: &Recording, variable: &str) -> Option<f64> {
+    let at = recording.variables.iter().position(|v| v.name == variable)?;
+    let values = recording.runs.iter().flat_map(|r| &r.inputs[at]);
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    finite(high - low)
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// A file that is there and whole.
+fn read<T: for<'d> Deserialize<'d>>(path: &Path) -> Option<T> {
+    serde_json::from_str(&read_text(path).ok()?).ok()
+}
+
+fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), ProveError> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| ProveError::Other(format!("{}: {e}", path.display())))?;
+    write_whole(path, &(text + "\n"))
+}

@@ -1,0 +1,142 @@
+//! The answer's format, field by field.
+
+use std::collections::BTreeMap;
+
+use missing_physics::diagnosis::{ChannelFit, Diagnosis, Estimate};
+use serde::Serialize;
+use serde_json::{Value, json as value};
+
+use super::ReportContext;
+
+#[derive(Serialize)]
+struct Answer<'a> {
+    format: u32,
+    domain: &'a str,
+    recording: &'a str,
+    verdict: &'a str,
+    p_value: f64,
+    noise: Vec<Value>,
+    #[serde(rename = "where")]
+    places: Vec<Value>,
+    mechanisms: Vec<Value>,
+    chosen: &'a [String],
+    confused_with: &'a [Vec<String>],
+    fit: Value,
+    law: Value,
+    next_experiment: Value,
+    #[serde(flatten)]
+    additions: &'a serde_json::Map<String, Value>,
+    // Beyond the fixed part.
+    p_floor: f64,
+    final_p_value: Option<f64>,
+    baseline: &'a str,
+    baseline_parameters: Vec<Value>,
+    sets: Vec<Value>,
+    confusion: Value,
+    tests: Vec<Value>,
+    undetermined: &'a [String],
+    outliers: Vec<Value>,
+    remarks: &'a [String],
+}
+
+/// The answer as JSON; numbers that are not finite become null.
+pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
+    let answer = Answer {
+        format: 1,
+        additions: &context.additions,
+        domain: &context.domain,
+        recording: &context.recording,
+        verdict: d.verdict.word(),
+        p_value: d.p_value,
+        noise: d
+            .noise
+            .iter()
+            .map(|n| {
+                value!({"channel": n.channel, "sigma": n.sigma, "source": n.source.word(),
+                    "correlated_share": n.correlated_share, "correlation_length": n.correlation_length})
+            })
+            .collect(),
+        places: d
+            .location
+            .iter()
+            .map(|l| {
+                value!({"channel": l.channel, "variable": l.variable, "from": l.from, "to": l.to, "runs": l.runs,
+                    "share": l.share, "mean_residual": l.mean_residual, "z": l.z,
+                    "largest_residual": l.largest_residual})
+            })
+            .collect(),
+        mechanisms: d
+            .mechanisms
+            .iter()
+            .map(|m| {
+                let rmse: BTreeMap<&str, f64> = m.heldout_rmse.iter().map(|(c, v)| (c.as_str(), *v)).collect();
+                value!({"id": m.id, "name": m.name, "probability": m.probability.clamp(0.0, 1.0),
+                    "parameters": estimates(&m.parameters),
+                    "heldout_log_score_gain": m.heldout_log_score_gain, "heldout_rmse": rmse,
+                    "ruled_out": m.ruled_out})
+            })
+            .collect(),
+        chosen: &d.chosen,
+        confused_with: &d.confused_with,
+        fit: value!({"before": fits(&d.before), "after": fits(&d.after)}),
+        law: d.law.as_ref().map_or(Value::Null, |l| {
+            let rmse: BTreeMap<&str, Value> = l
+                .heldout_rmse
+                .iter()
+                .map(|(c, without, with)| (c.as_str(), value!({"without": without, "with": with})))
+                .collect();
+            let pair = |(name, unit): &(String, String)| value!({"name": name, "unit": unit});
+            value!({"formula": l.formula, "kind": l.kind, "adds_to": pair(&l.adds_to),
+                "variables": l.variables.iter().map(pair).collect::<Vec<_>>(),
+                "coefficients": estimates(&l.coefficients), "heldout_rmse": rmse,
+                "heldout_log_score_gain": l.heldout_log_score_gain})
+        }),
+        next_experiment: d.next_experiment.as_ref().map_or(Value::Null, |n| {
+            let action: BTreeMap<&str, f64> = n.action.iter().map(|(k, v)| (k.as_str(), *v)).collect();
+            value!({"action": action, "separates": n.separates,
+                "expected_log_bayes_factor": n.expected_log_bayes_factor, "words": n.words})
+        }),
+        p_floor: d.p_floor,
+        final_p_value: d.final_p_value,
+        baseline: &d.baseline,
+        baseline_parameters: estimates(&d.baseline_parameters),
+        sets: d
+            .sets
+            .iter()
+            .map(|s| {
+                value!({"ids": s.ids, "probability": s.probability, "p_value": s.p_value,
+                    "heldout_log_score_gain": s.heldout_log_score_gain})
+            })
+            .collect(),
+        confusion: d
+            .confusion
+            .as_ref()
+            .map_or(Value::Null, |c| value!({"sets": c.sets, "matrix": c.matrix})),
+        tests: d
+            .tests
+            .iter()
+            .map(|t| value!({"name": t.name, "statistic": t.statistic, "p_value": t.p_value}))
+            .collect(),
+        undetermined: &d.undetermined,
+        outliers: d
+            .outliers
+            .iter()
+            .map(|o| value!({"run": o.run, "row": o.row, "channel": o.channel, "z": o.z}))
+            .collect(),
+        remarks: &d.remarks,
+    };
+    // Numbers, texts and lists always serialise.
+    let mut text = serde_json::to_string_pretty(&answer).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+fn estimates(list: &[Estimate]) -> Vec<Value> {
+    list.iter().map(|e| value!({"name": e.name, "value": e.value, "ci95": e.ci95, "unit": e.unit})).collect()
+}
+
+fn fits(list: &[ChannelFit]) -> BTreeMap<&str, Value> {
+    list.iter()
+        .map(|f| (f.channel.as_str(), value!({"rmse": f.rmse, "heldout_rmse": f.heldout_rmse})))
+        .collect()
+}
