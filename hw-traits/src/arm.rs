@@ -2,6 +2,7 @@
 
 use crate::ErrorType;
 use crate::clock::Stamped;
+use crate::forward::forward;
 
 /// Where a tool is and how it is turned, in a frame that whoever passes it on has to name (`tool_in_world`).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +39,7 @@ pub trait Arm: ErrorType {
     fn settled(&mut self) -> Result<bool, Self::Error>;
 }
 
-impl<T: Arm + ?Sized> Arm for &mut T {
+forward!(Arm {
     fn move_to(&mut self, tool_in_base: Pose, deadline_s: f64) -> Result<(), Self::Error> {
         T::move_to(self, tool_in_base, deadline_s)
     }
@@ -50,4 +51,4 @@ impl<T: Arm + ?Sized> Arm for &mut T {
     fn settled(&mut self) -> Result<bool, Self::Error> {
         T::settled(self)
     }
-}
+});

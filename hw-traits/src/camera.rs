@@ -2,6 +2,7 @@
 
 use crate::ErrorType;
 use crate::clock::Stamped;
+use crate::forward::forward;
 use crate::picture::{Intrinsics, Picture};
 
 /// A camera that sees brightness.
@@ -32,13 +33,13 @@ pub trait DepthCamera: ErrorType {
     fn depth_m(&mut self) -> Result<Stamped<Picture<f32>>, Self::Error>;
 }
 
-impl<T: Camera + ?Sized> Camera for &mut T {
+forward!(Camera {
     fn picture(&mut self) -> Result<Stamped<Picture<u8>>, Self::Error> {
         T::picture(self)
     }
-}
+});
 
-impl<T: DepthCamera + ?Sized> DepthCamera for &mut T {
+forward!(DepthCamera {
     fn intrinsics(&self) -> Intrinsics {
         T::intrinsics(self)
     }
@@ -46,4 +47,4 @@ impl<T: DepthCamera + ?Sized> DepthCamera for &mut T {
     fn depth_m(&mut self) -> Result<Stamped<Picture<f32>>, Self::Error> {
         T::depth_m(self)
     }
-}
+});

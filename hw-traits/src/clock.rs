@@ -5,6 +5,7 @@
 //! driver never does it silently.
 
 use crate::ErrorType;
+use crate::forward::forward;
 
 /// A value and when it was true.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +37,7 @@ pub trait Clock: ErrorType {
     fn sleep_s(&mut self, duration_s: f64) -> Result<(), Self::Error>;
 }
 
-impl<T: Clock + ?Sized> Clock for &mut T {
+forward!(Clock {
     fn now_s(&mut self) -> Result<f64, Self::Error> {
         T::now_s(self)
     }
@@ -44,7 +45,7 @@ impl<T: Clock + ?Sized> Clock for &mut T {
     fn sleep_s(&mut self, duration_s: f64) -> Result<(), Self::Error> {
         T::sleep_s(self, duration_s)
     }
-}
+});
 
 /// The computer's monotonic clock.
 #[derive(Debug, Clone, Copy)]

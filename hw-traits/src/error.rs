@@ -1,3 +1,5 @@
+use crate::forward::forward;
+
 /// What kind of thing went wrong, in terms that a driver can act on without knowing the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -62,10 +64,6 @@ pub trait ErrorType {
     type Error: Error;
 }
 
-impl<T: ErrorType + ?Sized> ErrorType for &mut T {
+forward!(ErrorType {
     type Error = T::Error;
-}
-
-impl<T: ErrorType + ?Sized> ErrorType for Box<T> {
-    type Error = T::Error;
-}
+});

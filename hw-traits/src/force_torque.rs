@@ -2,6 +2,7 @@
 
 use crate::ErrorType;
 use crate::clock::Stamped;
+use crate::forward::forward;
 
 /// Force and torque on a sensor, in a frame that whoever passes it on has to name (`wrench_in_sensor`).
 ///
@@ -38,7 +39,7 @@ pub trait ForceTorque: ErrorType {
     fn tare(&mut self, readings: usize) -> Result<(), Self::Error>;
 }
 
-impl<T: ForceTorque + ?Sized> ForceTorque for &mut T {
+forward!(ForceTorque {
     fn read(&mut self) -> Result<Stamped<Wrench>, Self::Error> {
         T::read(self)
     }
@@ -46,7 +47,7 @@ impl<T: ForceTorque + ?Sized> ForceTorque for &mut T {
     fn tare(&mut self, readings: usize) -> Result<(), Self::Error> {
         T::tare(self, readings)
     }
-}
+});
 
 impl Wrench {
     /// Every component times a factor.

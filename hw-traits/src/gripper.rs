@@ -2,6 +2,7 @@
 
 use crate::ErrorType;
 use crate::clock::Stamped;
+use crate::forward::forward;
 
 /// Two fingers that move along one line, symmetrically.
 pub trait Gripper: ErrorType {
@@ -32,7 +33,7 @@ pub trait Gripper: ErrorType {
     fn settled(&mut self) -> Result<bool, Self::Error>;
 }
 
-impl<T: Gripper + ?Sized> Gripper for &mut T {
+forward!(Gripper {
     fn limits_m(&self) -> (f64, f64) {
         T::limits_m(self)
     }
@@ -48,4 +49,4 @@ impl<T: Gripper + ?Sized> Gripper for &mut T {
     fn settled(&mut self) -> Result<bool, Self::Error> {
         T::settled(self)
     }
-}
+});

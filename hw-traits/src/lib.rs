@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod error;
+mod forward;
 pub use error::{Error, ErrorKind, ErrorType};
 
 pub mod arm;

@@ -1,6 +1,7 @@
 //! Microphones that share one clock.
 
 use crate::ErrorType;
+use crate::forward::forward;
 
 /// Several microphones, sampled at the same instants.
 pub trait Microphones: ErrorType {
@@ -21,7 +22,7 @@ pub trait Microphones: ErrorType {
     fn read(&mut self, interleaved: &mut [f32]) -> Result<f64, Self::Error>;
 }
 
-impl<T: Microphones + ?Sized> Microphones for &mut T {
+forward!(Microphones {
     fn channels(&self) -> usize {
         T::channels(self)
     }
@@ -33,4 +34,4 @@ impl<T: Microphones + ?Sized> Microphones for &mut T {
     fn read(&mut self, interleaved: &mut [f32]) -> Result<f64, Self::Error> {
         T::read(self, interleaved)
     }
-}
+});

@@ -2,6 +2,7 @@
 
 use crate::ErrorType;
 use crate::clock::Stamped;
+use crate::forward::forward;
 
 /// A gauge pressure sensor.
 pub trait Pressure: ErrorType {
@@ -29,14 +30,14 @@ pub trait Valve: ErrorType {
     fn open(&mut self, fraction: f64) -> Result<(), Self::Error>;
 }
 
-impl<T: Pressure + ?Sized> Pressure for &mut T {
+forward!(Pressure {
     fn pressure_pa(&mut self) -> Result<Stamped<f64>, Self::Error> {
         T::pressure_pa(self)
     }
-}
+});
 
-impl<T: Valve + ?Sized> Valve for &mut T {
+forward!(Valve {
     fn open(&mut self, fraction: f64) -> Result<(), Self::Error> {
         T::open(self, fraction)
     }
-}
+});

@@ -51,7 +51,7 @@ pub struct ProgrammeError {
 ///
 /// # Errors
 /// [`ProgrammeError`] at the first device error; [`ErrorKind::Timeout`] where the wrist does not settle within the patience.
-pub fn run<R: Rotary + ForceTorque + Clock>(
+pub fn run<R: Rotary + ForceTorque + Clock + ?Sized>(
     rig: &mut R,
     programme: &TiltProgramme,
 ) -> Result<Vec<FeltPose>, ProgrammeError> {
@@ -65,7 +65,7 @@ pub fn run<R: Rotary + ForceTorque + Clock>(
     Ok(felt)
 }
 
-fn feel<R: Rotary + ForceTorque + Clock>(
+fn feel<R: Rotary + ForceTorque + Clock + ?Sized>(
     rig: &mut R,
     programme: &TiltProgramme,
     angle_rad: f64,

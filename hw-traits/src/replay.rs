@@ -11,7 +11,7 @@ use crate::{ErrorKind, ErrorType};
 
 /// What was measured at one angle.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pose {
+pub struct RecordedPose {
     /// The angle, rad.
     pub angle_rad: f64,
     /// The readings, in the sensor's frame; their times rise.
@@ -21,7 +21,7 @@ pub struct Pose {
 /// Plays a list of poses back; implements [`Rotary`], [`ForceTorque`] and [`Clock`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replay {
-    poses: Vec<Pose>,
+    poses: Vec<RecordedPose>,
     tolerance_rad: f64,
     /// The pose that was commanded last, and how many of its readings are used up.
     at: Option<(usize, usize)>,
@@ -31,7 +31,7 @@ pub struct Replay {
 
 impl Replay {
     /// Plays `poses` back; a commanded angle may differ from the recorded one by `tolerance_rad`.
-    pub fn new(poses: Vec<Pose>, tolerance_rad: f64) -> Self {
+    pub fn new(poses: Vec<RecordedPose>, tolerance_rad: f64) -> Self {
         Self { poses, tolerance_rad, at: None, now_s: 0.0, offset: Wrench::default() }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::ErrorType;
 use crate::clock::Stamped;
+use crate::forward::forward;
 
 /// A joint that turns about one axis.
 ///
@@ -34,7 +35,7 @@ pub trait Rotary: ErrorType {
     fn settled(&mut self) -> Result<bool, Self::Error>;
 }
 
-impl<T: Rotary + ?Sized> Rotary for &mut T {
+forward!(Rotary {
     fn limits_rad(&self) -> (f64, f64) {
         T::limits_rad(self)
     }
@@ -50,4 +51,4 @@ impl<T: Rotary + ?Sized> Rotary for &mut T {
     fn settled(&mut self) -> Result<bool, Self::Error> {
         T::settled(self)
     }
-}
+});

@@ -5,11 +5,11 @@ use hw_traits::ErrorKind;
 use hw_traits::clock::{Clock, Stamped, SystemClock};
 use hw_traits::force_torque::{ForceTorque, Wrench};
 use hw_traits::programme::{TiltProgramme, run};
-use hw_traits::replay::{Pose, Replay};
+use hw_traits::replay::{RecordedPose, Replay};
 use hw_traits::rotary::Rotary;
 
 fn rig() -> Replay {
-    let pose = |angle_rad: f64, t: f64| Pose {
+    let pose = |angle_rad: f64, t: f64| RecordedPose {
         angle_rad,
         readings: (0..4)
             .map(|i| Stamped {

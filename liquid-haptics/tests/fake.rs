@@ -111,7 +111,7 @@ fn the_programme_runs_on_a_replay_of_the_fake() {
         }
         wrist.sleep_s(programme.settle_s).unwrap();
         let readings = (0..20).map(|_| wrist.read().unwrap()).collect();
-        recorded.push(replay::Pose { angle_rad: wrist.angle_rad().unwrap().value, readings });
+        recorded.push(replay::RecordedPose { angle_rad: wrist.angle_rad().unwrap().value, readings });
     }
     let replayed = run(&mut Replay::new(recorded, 1e-3), &programme).unwrap();
     assert_eq!(felt, replayed);
