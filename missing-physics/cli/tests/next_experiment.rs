@@ -94,7 +94,7 @@ fn a_proposed_swing_says_how_high_and_how_long() {
         let value = |name: &str| experiment.action.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
         let (Some(height), Some(duration)) = (value("amplitude_nm"), value("duration_s")) else { continue };
         heights.push(height);
-        assert_eq!(experiment.own[0].iter().copied().fold(0.0, f64::max), height);
+        assert_eq!(experiment.nuisance[0].iter().copied().fold(0.0, f64::max), height);
         let last = experiment.runs[0].inputs[0].last().unwrap();
         assert!((last - duration).abs() < 1.5 / world.rate_hz, "{last} s, and not {duration} s");
     }

@@ -25,12 +25,12 @@ impl Builder {
     }
 
     /// A parameter that each run has for itself.
-    pub(super) fn own(&mut self, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> At {
-        self.own_from(name, unit, 0.0, bounds, scale)
+    pub(super) fn nuisance(&mut self, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> At {
+        self.nuisance_from(name, unit, 0.0, bounds, scale)
     }
 
     /// A parameter that each run has for itself, off (or starting) at `start`.
-    pub(super) fn own_from(
+    pub(super) fn nuisance_from(
         &mut self,
         name: &str,
         unit: &str,

@@ -11,7 +11,7 @@ pub(super) trait InDuals: Model {
         &self,
         run: &Run,
         shared: &[T],
-        own: &[T],
+        nuisance: &[T],
         moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String>;
@@ -21,9 +21,9 @@ pub(super) trait InDuals: Model {
 pub(super) struct Asked<'a> {
     pub(super) run: &'a Run,
     pub(super) shared: &'a [f64],
-    pub(super) own: &'a [f64],
+    pub(super) nuisance: &'a [f64],
     pub(super) shared_free: &'a [usize],
-    pub(super) own_free: &'a [usize],
+    pub(super) nuisance_free: &'a [usize],
 }
 
 /// A free parameter: its column, whether it is shared, and its slot.
@@ -38,13 +38,14 @@ impl Asked<'_> {
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
         let rows = out.len();
-        let own = self.own_free.iter().enumerate().map(|(k, &s)| (self.shared_free.len() + k, false, s));
-        let all = self.shared_free.iter().enumerate().map(|(k, &s)| (k, true, s)).chain(own);
+        let nuisance =
+            self.nuisance_free.iter().enumerate().map(|(k, &s)| (self.shared_free.len() + k, false, s));
+        let all = self.shared_free.iter().enumerate().map(|(k, &s)| (k, true, s)).chain(nuisance);
         let (acting, idle): (Vec<Free>, Vec<Free>) =
             all.partition(|&(_, is_shared, slot)| !is_shared || model.acts_on(self.run, slot));
         idle.iter().for_each(|(column, ..)| jacobian[column * rows..][..rows].fill(0.0));
         if acting.is_empty() {
-            return model.predict(self.run, self.shared, self.own, out);
+            return model.predict(self.run, self.shared, self.nuisance, out);
         }
         // Numbers no longer than needed: most time goes into their derivatives.
         for chunk in acting.chunks(8) {
@@ -69,16 +70,16 @@ impl Asked<'_> {
     ) -> Result<(), String> {
         let rows = out.len();
         let mut shared: Vec<DualSVec64<N>> = self.shared.iter().map(|v| (*v).into()).collect();
-        let mut own: Vec<DualSVec64<N>> = self.own.iter().map(|v| (*v).into()).collect();
+        let mut nuisance: Vec<DualSVec64<N>> = self.nuisance.iter().map(|v| (*v).into()).collect();
         for (i, &(_, is_shared, slot)) in free.iter().enumerate() {
-            let target = if is_shared { &mut shared[slot] } else { &mut own[slot] };
+            let target = if is_shared { &mut shared[slot] } else { &mut nuisance[slot] };
             let mut unit = nalgebra::SVector::<f64, N>::zeros();
             unit[i] = 1.0;
             target.eps = Derivative::some(unit);
         }
         let moving: Vec<usize> = free.iter().filter(|f| f.1).map(|f| f.2).collect();
         let mut values = vec![DualSVec64::<N>::from(0.0); rows];
-        model.predict_in(self.run, &shared, &own, &moving, &mut values)?;
+        model.predict_in(self.run, &shared, &nuisance, &moving, &mut values)?;
         for (row, value) in values.iter().enumerate() {
             out[row] = value.re;
             for (i, (column, ..)) in free.iter().enumerate() {

@@ -1,19 +1,19 @@
 //! What a diagnosis says, put together from fits.
 
-use crate::adequacy::Adequacy;
-use crate::compare::{Candidate, HeldOut};
+use crate::adequacy::test::Adequacy;
 use crate::data::Run;
 use crate::diagnosis::{
     ChannelFit, ChannelNoise, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
 };
 use crate::engine::size;
-use crate::estimate::{estimates, of_mechanism, with_open_noise};
-use crate::fit::{Fit, NoiseRule};
+use crate::estimate::estimates::{estimates, of_mechanism, with_open_noise};
+use crate::fit::gauss_newton::{Fit, NoiseRule};
 use crate::law;
 use crate::model::PredictError;
 use crate::problem::Problem;
-use crate::ranking::{Best, Ranking};
 use crate::repaired::Repaired;
+use crate::selection::compare::{Candidate, HeldOut};
+use crate::selection::ranking::{Best, Ranking};
 
 /// Sets that are listed.
 const LISTED_SETS: usize = 12;
@@ -24,7 +24,7 @@ pub(crate) struct Answer<'a> {
     pub(crate) rule: &'a NoiseRule,
     pub(crate) baseline: &'a Candidate,
     /// The baseline by plain least squares.
-    pub(crate) plain: &'a Fit,
+    pub(crate) least_squares: &'a Fit,
     pub(crate) outliers: &'a [Outlier],
 }
 
@@ -102,7 +102,7 @@ impl Answer<'_> {
             after: before.clone(),
             before,
         };
-        let before = law::predictions(self.problem, self.plain)?;
+        let before = law::predictions(self.problem, self.least_squares)?;
         Ok(self.problem.recording.runs.iter().zip(before).map(curves).collect())
     }
 
@@ -158,7 +158,7 @@ impl Answer<'_> {
         let open = |slot: usize| {
             let best = chosen.fit.shared[slot];
             let mut others: Vec<f64> =
-                chosen.elsewhere.iter().map(|e| e.shared[slot]).filter(|v| *v != best).collect();
+                chosen.alternative_modes.iter().map(|e| e.shared[slot]).filter(|v| *v != best).collect();
             others.sort_by(f64::total_cmp);
             others.dedup();
             let others: Vec<String> = others.iter().map(f64::to_string).collect();
@@ -167,7 +167,7 @@ impl Answer<'_> {
             };
             (!others.is_empty()).then(text)
         };
-        self.problem.places(&chosen.set).into_iter().filter_map(open).collect()
+        self.problem.integer_slots(&chosen.set).into_iter().filter_map(open).collect()
     }
 
     /// Why the closest explanation is none.

@@ -66,7 +66,7 @@ pub struct ChannelNoise {
     pub correlation_length: f64,
 }
 
-/// One test of the adequacy bank.
+/// One test of a model's adequacy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestOutcome {
     /// What was tested, for a person (`z_m depends on t_s`).
@@ -143,7 +143,7 @@ pub struct SetReport {
     pub ids: Vec<String>,
     /// Probability among all sets that were tried.
     pub probability: f64,
-    /// p-value of the adequacy bank, where it was run.
+    /// p-value of the set's adequacy, where it was tested.
     pub p_value: Option<f64>,
     /// Gain in log score on unseen runs, over the baseline by the same rule of noise.
     pub heldout_log_score_gain: Option<f64>,
@@ -248,7 +248,7 @@ pub struct Diagnosis {
     pub variables: Vec<(String, String)>,
     /// What the baseline is.
     pub baseline: String,
-    /// The baseline's own shared parameters.
+    /// The shared parameters of the baseline.
     pub baseline_parameters: Vec<Estimate>,
     /// Noise by channel.
     pub noise: Vec<ChannelNoise>,

@@ -1,21 +1,21 @@
 //! The diagnosis from end to end.
 
-use crate::adequacy::{self, Adequacy};
+use crate::adequacy::outliers::set_aside;
+use crate::adequacy::test::{self, Adequacy};
 use crate::answer::Answer;
-use crate::compare::{Candidate, HeldOut, candidate, confusion, held_out, search};
 use crate::data::{Recording, RecordingError};
 use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Outlier, Verdict};
 use crate::experiment;
-use crate::fit::{Fit, NoiseRule, NoiseState, fit, solve};
+use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, fit, solve};
 use crate::law;
-use crate::locate::locate;
+use crate::locate::scan::locate;
 use crate::model::{Experiment, Model, PredictError};
-use crate::noise::{median, rough_sigma};
-use crate::noise_rule::noise_rule;
+use crate::noise::process::{median, rough_sigma};
+use crate::noise::rule::noise_rule;
 use crate::observer::{Observer, Progress};
-use crate::outliers::set_aside;
 use crate::problem::Problem;
-use crate::ranking::{Best, Ranking, clearly};
+use crate::selection::compare::{Candidate, HeldOut, candidate, confusion, held_out, search};
+use crate::selection::ranking::{Best, Ranking, clearly};
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +40,7 @@ pub enum DiagnoseError {
     /// The recording is not sound.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// There are too few rows for the baseline's own parameters.
+    /// There are too few rows for the baseline's nuisance parameters.
     #[error(
         "{rows} measured values are too few for the {parameters} parameters of the baseline and its noise"
     )]
@@ -90,7 +90,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let diagnosis = diagnose_with(model, recording, experiments, options, observer);
     // A simulation that broke half way leaves an answer that may rest on what it did not say.
-    match model.broken() {
+    match model.fatal_error() {
         Some(error) => Err(error.into()),
         None => diagnosis,
     }
@@ -120,7 +120,7 @@ fn begin<'a>(
     let rule = noise_rule(&problem);
     enough_rows(&problem)?;
     let selection = problem.select(&[], &[]);
-    let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
+    let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.nuisance_start), None)?;
     let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
     Ok(Begun { problem, outliers, rule, baseline, start })
 }
@@ -144,8 +144,8 @@ fn diagnose_with(
 ) -> Result<Diagnosis, DiagnoseError> {
     tell(observer, "reading the noise", 0.0)?;
     let begun = begin(model, recording, options)?;
-    let plain = plain(&begun)?;
-    Course { begun: &begun, plain: &plain, experiments, options, observer }.run()
+    let least_squares = least_squares_baseline(&begun)?;
+    Course { begun: &begun, least_squares: &least_squares, experiments, options, observer }.run()
 }
 
 fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseError> {
@@ -153,17 +153,17 @@ fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseE
 }
 
 /// What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
-fn plain(begun: &Begun<'_>) -> Result<Candidate, PredictError> {
+fn least_squares_baseline(begun: &Begun<'_>) -> Result<Candidate, PredictError> {
     let Begun { problem, rule, baseline, start, .. } = begun;
     let white = NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(problem, rule, start) };
-    let fit = solve(problem, &baseline.selection, &white, &start.shared, &start.own)?;
+    let fit = solve(problem, &baseline.selection, &white, &start.shared, &start.nuisance)?;
     Ok(Candidate { fit, ..baseline.clone() })
 }
 
 /// The way from a fitted baseline to an answer.
 struct Course<'a> {
     begun: &'a Begun<'a>,
-    plain: &'a Candidate,
+    least_squares: &'a Candidate,
     experiments: &'a [Experiment],
     options: &'a Options,
     observer: &'a dyn Observer,
@@ -181,7 +181,7 @@ impl Course<'_> {
             (0..problem.spec().mechanisms.len()).filter(|m| !candidate.set.contains(m)).collect();
         let seed = self.options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ stream;
         let replicates = self.options.replicates;
-        adequacy::test(problem, &candidate.selection, &candidate.fit, &rivals, rule, replicates, seed)
+        test::test(problem, &candidate.selection, &candidate.fit, &rivals, rule, replicates, seed)
     }
 
     fn run(&self) -> Result<Diagnosis, DiagnoseError> {
@@ -189,8 +189,13 @@ impl Course<'_> {
         self.tell("adequacy of the baseline", 0.0)?;
         let adequacy = self.test(baseline, 1)?;
         self.tell("adequacy of the baseline", 1.0)?;
-        let answer =
-            Answer { problem, rule, baseline, plain: &self.plain.fit, outliers: &self.begun.outliers };
+        let answer = Answer {
+            problem,
+            rule,
+            baseline,
+            least_squares: &self.least_squares.fit,
+            outliers: &self.begun.outliers,
+        };
         if adequacy.p_value > self.options.alpha {
             return Ok(answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?);
         }
@@ -212,7 +217,7 @@ impl Course<'_> {
             Some(_) => ended_with.fit.noise.sigma.clone(),
             None => rough_sigmas(problem, rule, &baseline.fit),
         };
-        diagnosis.location = locate(problem, &baseline.selection, &self.plain.fit, &sigma)?;
+        diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &sigma)?;
         if let Some(chosen) = explained {
             diagnosis.final_p_value = Some(chosen.p_value);
             self.explained(&mut diagnosis, &answer, &ranking, chosen)?;
@@ -228,7 +233,7 @@ impl Course<'_> {
 
     /// Errors of the plain simulation.
     fn before(&self, answer: &Answer<'_>) -> Result<Vec<ChannelFit>, PredictError> {
-        answer.errors(&self.plain.fit, &held_out(&self.begun.problem, self.plain)?)
+        answer.errors(&self.least_squares.fit, &held_out(&self.begun.problem, self.least_squares)?)
     }
 
     /// Every set of mechanisms worth looking at, fitted.
@@ -342,7 +347,7 @@ fn check(recording: &Recording, options: &Options) -> Result<(), DiagnoseError> 
 pub(crate) fn size(problem: &Problem<'_>) -> (usize, usize) {
     let selection = problem.select(&[], &[]);
     let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-    (rows, selection.shared.len() + selection.own.len() * problem.rows.len() + problem.channels())
+    (rows, selection.shared.len() + selection.nuisance.len() * problem.rows.len() + problem.channels())
 }
 
 fn enough_rows(problem: &Problem<'_>) -> Result<(), DiagnoseError> {

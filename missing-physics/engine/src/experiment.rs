@@ -2,13 +2,13 @@
 
 use nalgebra::DMatrix;
 
-use crate::compare::Candidate;
 use crate::data::Recording;
 use crate::diagnosis::NextExperiment;
-use crate::fit::{NoiseState, whitened_columns};
+use crate::fit::gauss_newton::{NoiseState, whitened_columns};
 use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward};
 use crate::model::{Experiment, PredictError};
 use crate::problem::{Problem, Selection};
+use crate::selection::compare::Candidate;
 
 /// Below this expected log Bayes factor an experiment is not worth doing.
 const WORTHWHILE: f64 = 1.0;
@@ -22,10 +22,10 @@ pub(crate) fn best(
 ) -> Option<NextExperiment> {
     let most = rivals.iter().map(|r| r.evidence).fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = rivals.iter().map(|r| (r.evidence - most).exp()).collect();
-    let told: Vec<Told> =
-        experiments.iter().map(|experiment| Told::by(problem, rivals, &weights, experiment)).collect();
-    let at = (0..told.len()).max_by(|&a, &b| told[a].worth.total_cmp(&told[b].worth))?;
-    let apart = &told[at].over_nearest;
+    let outlooks: Vec<Outlook> =
+        experiments.iter().map(|experiment| Outlook::by(problem, rivals, &weights, experiment)).collect();
+    let at = (0..outlooks.len()).max_by(|&a, &b| outlooks[a].worth.total_cmp(&outlooks[b].worth))?;
+    let apart = &outlooks[at].over_nearest;
     let (least, greatest) =
         (apart.iter().copied().fold(f64::INFINITY, f64::min), apart.iter().copied().fold(0.0, f64::max));
     let value = if least >= WORTHWHILE { least } else { greatest };
@@ -59,14 +59,14 @@ pub(crate) fn best(
 }
 
 /// What an experiment is expected to tell.
-struct Told {
+struct Outlook {
     /// For each rival: the log Bayes factor over the nearest other, if that rival is the truth.
     over_nearest: Vec<f64>,
     /// How little doubt is left: minus the logarithm of the chance that the truth does not come out first.
     worth: f64,
 }
 
-impl Told {
+impl Outlook {
     fn by(problem: &Problem<'_>, rivals: &[&Candidate], weights: &[f64], experiment: &Experiment) -> Self {
         let mut over_nearest = vec![f64::INFINITY; rivals.len()];
         let mut doubt = f64::MIN_POSITIVE;
@@ -93,17 +93,17 @@ fn expected(
 ) -> Result<f64, PredictError> {
     let channels = problem.channels();
     let mut recording = Recording { runs: experiment.runs.clone(), ..problem.recording.clone() };
-    for (run, own) in recording.runs.iter_mut().zip(&experiment.own) {
+    for (run, nuisance) in recording.runs.iter_mut().zip(&experiment.nuisance) {
         let n = run.len();
         let mut out = vec![0.0; n * channels];
-        problem.model.predict(run, &truth.fit.shared, &own_of_next(truth, own), &mut out)?;
+        problem.model.predict(run, &truth.fit.shared, &nuisance_of_next(truth, nuisance), &mut out)?;
         run.outputs = (0..channels).map(|c| out[c * n..(c + 1) * n].to_vec()).collect();
     }
     let future = problem.with(recording);
     // The rivals' noise is a property of the rig: white at the level that the present data show.
     let noise = NoiseState { shape: vec![0; channels], sigma: truth.fit.noise.sigma.clone() };
     let selection: &Selection = &other.selection;
-    let (n_own, n_shared) = (selection.own.len(), selection.shared.len());
+    let (n_nuisance, n_shared) = (selection.nuisance.len(), selection.shared.len());
     let mut information: DMatrix<f64> = other.fit.information.clone();
     let mut right = vec![0.0; n_shared];
     let mut total = 0.0;
@@ -114,25 +114,25 @@ fn expected(
             &noise,
             run,
             &other.fit.shared,
-            &own_of_next(other, &experiment.own[run]),
+            &nuisance_of_next(other, &experiment.nuisance[run]),
         )?;
-        let residual = &columns[n_own + n_shared];
+        let residual = &columns[n_nuisance + n_shared];
         total += dot(residual, residual);
-        let mut factor = DMatrix::from_fn(n_own, n_own, |i, j| dot(&columns[i], &columns[j]));
+        let mut factor = DMatrix::from_fn(n_nuisance, n_nuisance, |i, j| dot(&columns[i], &columns[j]));
         let kept = cholesky(&mut factor, RANK_FLOOR);
         let border = |j: usize| {
-            let mut column: Vec<f64> = (0..n_own).map(|i| dot(&columns[i], &columns[j])).collect();
+            let mut column: Vec<f64> = (0..n_nuisance).map(|i| dot(&columns[i], &columns[j])).collect();
             forward(&factor, &kept, &mut column);
             column
         };
-        let borders: Vec<Vec<f64>> = (n_own..=n_own + n_shared).map(border).collect();
+        let borders: Vec<Vec<f64>> = (n_nuisance..=n_nuisance + n_shared).map(border).collect();
         total -= dot(&borders[n_shared], &borders[n_shared]);
         for i in 0..n_shared {
             for j in 0..n_shared {
                 information[(i, j)] +=
-                    dot(&columns[n_own + i], &columns[n_own + j]) - dot(&borders[i], &borders[j]);
+                    dot(&columns[n_nuisance + i], &columns[n_nuisance + j]) - dot(&borders[i], &borders[j]);
             }
-            right[i] += dot(&columns[n_own + i], residual) - dot(&borders[i], &borders[n_shared]);
+            right[i] += dot(&columns[n_nuisance + i], residual) - dot(&borders[i], &borders[n_shared]);
         }
     }
     let gradient = right.clone();
@@ -142,13 +142,13 @@ fn expected(
     Ok(0.5 * (total - dot(&gradient, &right)).max(0.0))
 }
 
-/// A further run's own parameters: those that a mechanism added have the mean of the runs so far.
-fn own_of_next(candidate: &Candidate, stated: &[f64]) -> Vec<f64> {
-    let Selection { own: slots, added_own: added, .. } = &candidate.selection;
-    let mut own = stated.to_vec();
+/// A further run's nuisance parameters: those that a mechanism added have the mean of the runs so far.
+fn nuisance_of_next(candidate: &Candidate, stated: &[f64]) -> Vec<f64> {
+    let Selection { nuisance: slots, added_nuisance: added, .. } = &candidate.selection;
+    let mut nuisance = stated.to_vec();
     for (&slot, _) in slots.iter().zip(added).filter(|(_, added)| **added) {
-        let runs = &candidate.fit.own;
-        own[slot] = runs.iter().map(|run| run[slot]).sum::<f64>() / runs.len().max(1) as f64;
+        let runs = &candidate.fit.nuisance;
+        nuisance[slot] = runs.iter().map(|run| run[slot]).sum::<f64>() / runs.len().max(1) as f64;
     }
-    own
+    nuisance
 }

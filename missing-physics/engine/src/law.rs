@@ -3,15 +3,15 @@
 //! Three kinds of law are tried, the simplest first, each judged on data that its fit has not seen: a few of the model's
 //! candidate terms, an oscillation of one frequency, and a smooth curve over a variable.
 
-use crate::bank::DEGREE;
-use crate::compare::{Candidate, HeldOut, candidate, held_out};
+use crate::adequacy::linearised::DEGREE;
 use crate::data::Run;
 use crate::diagnosis::{Estimate, Law};
-use crate::estimate::estimates;
-use crate::fit::{Fit, NoiseRule};
+use crate::estimate::estimates::estimates;
+use crate::fit::gauss_newton::{Fit, NoiseRule};
 use crate::linalg::dot;
 use crate::model::{Model, Parameter, PredictError, Scope, Spec, Term};
 use crate::problem::Problem;
+use crate::selection::compare::{Candidate, HeldOut, candidate, held_out};
 use rayon::prelude::*;
 
 /// A law must gain this much log score on unseen data.
@@ -136,11 +136,11 @@ pub(crate) fn predictions(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Ve
         .recording
         .runs
         .iter()
-        .zip(&fit.own)
-        .map(|(run, own)| {
+        .zip(&fit.nuisance)
+        .map(|(run, nuisance)| {
             let n = run.len();
             let mut out = vec![0.0; n * problem.channels()];
-            problem.model.predict(run, &fit.shared, own, &mut out)?;
+            problem.model.predict(run, &fit.shared, nuisance, &mut out)?;
             Ok((0..problem.channels()).map(|c| out[c * n..(c + 1) * n].to_vec()).collect())
         })
         .collect()
@@ -151,7 +151,7 @@ struct Extended<'a> {
     inner: &'a dyn Model,
     spec: Spec,
     inner_shared: usize,
-    inner_own: usize,
+    inner_nuisance: usize,
     channels: usize,
     noise_along: Option<usize>,
     term: Added,
@@ -168,13 +168,13 @@ impl<'a> Extended<'a> {
     fn new(problem: &Problem<'a>, parameters: Vec<Parameter>, term: Added) -> Self {
         let mut spec = problem.spec().clone();
         // Mechanisms and terms stay in the list so that their parameters stay off.
-        let (inner_shared, inner_own) = (spec.count(Scope::Shared), spec.count(Scope::PerRun));
+        let (inner_shared, inner_nuisance) = (spec.count(Scope::Shared), spec.count(Scope::PerRun));
         spec.parameters.extend(parameters);
         Self {
             inner: problem.model,
             spec,
             inner_shared,
-            inner_own,
+            inner_nuisance,
             channels: problem.channels(),
             noise_along: problem.recording.noise_along,
             term,
@@ -184,7 +184,7 @@ impl<'a> Extended<'a> {
     /// An oscillation; its frequency starts where the residual's power is largest. None where runs are so short that none would
     /// turn one and a half times.
     fn periodic(problem: &Problem<'a>, fit: &Fit) -> Result<Option<Self>, PredictError> {
-        let residual = crate::adequacy::residuals(problem, fit)?;
+        let residual = crate::adequacy::test::residuals(problem, fit)?;
         let span = problem
             .rows
             .iter()
@@ -238,7 +238,7 @@ impl<'a> Extended<'a> {
                     start: 0.0,
                     lower: f64::NEG_INFINITY,
                     upper: f64::INFINITY,
-                    // Own parameters have a prior a thousand scales wide: here about the size of the residual.
+                    // Nuisance parameters have a prior a thousand scales wide: here about the size of the residual.
                     scale: 3e-3 * fit.noise.sigma[c],
                 });
             }
@@ -279,8 +279,14 @@ impl Model for Extended<'_> {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.inner.predict(run, &shared[..self.inner_shared], &own[..self.inner_own], out)?;
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.inner.predict(run, &shared[..self.inner_shared], &nuisance[..self.inner_nuisance], out)?;
         let n = run.len();
         match &self.term {
             Added::Periodic => {
@@ -291,8 +297,8 @@ impl Model for Extended<'_> {
                 for (i, position) in rows.iter().enumerate() {
                     let (sin, cos) = (shared[self.inner_shared] * position).sin_cos();
                     for c in 0..self.channels {
-                        let at = self.inner_own + 2 * c;
-                        out[c * n + i] += own[at] * cos + own[at + 1] * sin;
+                        let at = self.inner_nuisance + 2 * c;
+                        out[c * n + i] += nuisance[at] * cos + nuisance[at + 1] * sin;
                     }
                 }
             }
@@ -314,21 +320,30 @@ impl Model for Extended<'_> {
         self.inner.relative_step()
     }
 
-    fn start(&self, run: &Run, own: &mut [f64]) {
-        self.inner.start(run, &mut own[..self.inner_own]);
+    fn start(&self, run: &Run, nuisance: &mut [f64]) {
+        self.inner.start(run, &mut nuisance[..self.inner_nuisance]);
     }
 
     fn jacobian(
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         shared_free: &[usize],
-        own_free: &[usize],
+        nuisance_free: &[usize],
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        crate::fit::finite_differences(self, run, shared, own, shared_free, own_free, out, jacobian)
+        crate::fit::gauss_newton::finite_differences(
+            self,
+            run,
+            shared,
+            nuisance,
+            shared_free,
+            nuisance_free,
+            out,
+            jacobian,
+        )
     }
 }
 
@@ -343,8 +358,8 @@ fn extended(
     let wide = Problem::new(model, problem.recording.clone());
     let mut near = baseline.fit.clone();
     near.shared.extend_from_slice(&wide.shared.start[model.inner_shared..]);
-    for own in &mut near.own {
-        own.extend_from_slice(&wide.own.start[model.inner_own..]);
+    for nuisance in &mut near.nuisance {
+        nuisance.extend_from_slice(&wide.nuisance.start[model.inner_nuisance..]);
     }
     let Ok(fitted) = candidate(&wide, rule, &[], &[], &near, &[]) else { return Ok(None) };
     let Ok(score) = held_out(&wide, &fitted) else { return Ok(None) };
@@ -363,9 +378,14 @@ fn extended(
             let omega = fitted.fit.shared[model.inner_shared];
             let amplitudes: Vec<String> = (0..model.channels)
                 .map(|c| {
-                    let at = model.inner_own + 2 * c;
-                    let mean = fitted.fit.own.iter().map(|own| own[at].hypot(own[at + 1])).sum::<f64>()
-                        / fitted.fit.own.len() as f64;
+                    let at = model.inner_nuisance + 2 * c;
+                    let mean = fitted
+                        .fit
+                        .nuisance
+                        .iter()
+                        .map(|nuisance| nuisance[at].hypot(nuisance[at + 1]))
+                        .sum::<f64>()
+                        / fitted.fit.nuisance.len() as f64;
                     let channel = &problem.recording.channels[c];
                     format!("{} {mean:.2e} {}", channel.name, channel.unit)
                 })

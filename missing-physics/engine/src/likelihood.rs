@@ -50,8 +50,8 @@ impl<L: Likelihood> Scores<L> {
         seed: u64,
     ) -> Result<(Synthetic<Self>, Recording), SyntheticError> {
         let spec = likelihood.spec();
-        if let Some(own) = spec.parameters.iter().find(|p| p.scope != Scope::Shared) {
-            let reason = format!("parameter {} is of each run, expected shared ones", own.name);
+        if let Some(nuisance) = spec.parameters.iter().find(|p| p.scope != Scope::Shared) {
+            let reason = format!("parameter {} is of each run, expected shared ones", nuisance.name);
             return Err(PredictError { run: "(all)".into(), reason }.into());
         }
         let statistics =
@@ -141,7 +141,7 @@ impl<L: Likelihood> Simulator for Scores<L> {
         &self,
         run: &Run,
         shared: &[f64],
-        _own: &[f64],
+        _nuisance: &[f64],
         rng: &mut dyn Rng,
         out: &mut [f64],
     ) -> Result<(), PredictError> {

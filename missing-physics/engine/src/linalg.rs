@@ -67,20 +67,20 @@ pub(crate) fn cholesky(matrix: &mut DMatrix<f64>, floor: f64) -> Vec<bool> {
     kept
 }
 
-/// A run's own coefficients once the shared ones are known: `own` and the shared columns' `borders` are forward-solved with the own
+/// A run's nuisance coefficients once the shared ones are known: `nuisance` and the shared columns' `borders` are forward-solved with the nuisance
 /// columns' factor.
-pub(crate) fn own_given(
+pub(crate) fn back_substitute(
     factor: &DMatrix<f64>,
     kept: &[bool],
     borders: &[Vec<f64>],
-    mut own: Vec<f64>,
+    mut nuisance: Vec<f64>,
     shared: &[f64],
 ) -> Vec<f64> {
     for (border, x) in borders.iter().zip(shared) {
-        own.iter_mut().zip(border).for_each(|(o, b)| *o -= x * b);
+        nuisance.iter_mut().zip(border).for_each(|(o, b)| *o -= x * b);
     }
-    backward(factor, kept, &mut own);
-    own
+    backward(factor, kept, &mut nuisance);
+    nuisance
 }
 
 /// Cholesky with pivots judged against the columns' sums of squares before elimination.

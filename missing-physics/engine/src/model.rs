@@ -67,7 +67,7 @@ impl std::fmt::Debug for Derived {
     }
 }
 
-/// A function of the shared parameters and of one run's own.
+/// A function of the shared parameters and of one run's nuisance parameters.
 pub type OfRun = std::sync::Arc<dyn Fn(&[f64], &[f64]) -> f64 + Send + Sync>;
 
 /// What is reported of a quantity that each run has of its own.
@@ -89,7 +89,7 @@ pub struct DerivedPerRun {
     pub unit: String,
     /// What is reported of it.
     pub over: Over,
-    /// The value from the shared parameters and the run's own ones, each in the order of [`Spec::parameters`].
+    /// The value from the shared parameters and the run's nuisance ones, each in the order of [`Spec::parameters`].
     pub value: OfRun,
 }
 
@@ -120,17 +120,17 @@ pub struct Mechanism {
     /// oscillation whose amplitude is free): at the off value of the others they make no difference. Their `start` is a
     /// typical value, and all values within their bounds are thought equally likely (on a log scale where both bounds are
     /// above zero).
-    pub shapes: Vec<usize>,
+    pub shape_parameters: Vec<usize>,
     /// Those of [`Self::parameters`] that are whole numbers (the row at which something jumps): no fit moves them,
     /// [`Model::starts`] proposes their values, and all whole values within their bounds are thought equally likely.
-    pub places: Vec<usize>,
+    pub integer_parameters: Vec<usize>,
     /// Parameters freed with it because it acts only through them (wind acts through drag), not reported as its own.
     pub companions: Vec<usize>,
     /// Identifiers of mechanisms that make the companions unnecessary.
     pub companions_unless: Vec<String>,
     /// Quantities computed from its parameters, reported beside them.
     pub derived: Vec<Derived>,
-    /// Quantities computed from each run's own parameters, reported as they say ([`Over`]).
+    /// Quantities computed from each run's nuisance parameters, reported as they say ([`Over`]).
     pub derived_per_run: Vec<DerivedPerRun>,
 }
 
@@ -168,11 +168,11 @@ impl Spec {
 
     /// Position of each parameter among those of its scope.
     pub fn slots(&self) -> Vec<usize> {
-        let (mut shared, mut own) = (0, 0);
+        let (mut shared, mut nuisance) = (0, 0);
         self.parameters
             .iter()
             .map(|p| {
-                let counter = if p.scope == Scope::Shared { &mut shared } else { &mut own };
+                let counter = if p.scope == Scope::Shared { &mut shared } else { &mut nuisance };
                 *counter += 1;
                 *counter - 1
             })
@@ -193,7 +193,7 @@ pub struct PredictError {
 /// A full model: a simulation with every effect in it.
 ///
 /// Parameters come in two slices: `shared` (those with [`Scope::Shared`], in the order of [`Spec::parameters`]) and
-/// `own` (those with [`Scope::PerRun`], likewise). A prediction fills `out` channel by channel:
+/// `nuisance` (those with [`Scope::PerRun`], likewise). A prediction fills `out` channel by channel:
 /// `out[c * run.len() + i]` is channel `c` at row `i`.
 pub trait Model: Sync {
     /// Parameters, mechanisms and candidate terms.
@@ -203,7 +203,13 @@ pub trait Model: Sync {
     ///
     /// # Errors
     /// [`PredictError`] where the simulation has no answer at these parameters.
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError>;
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError>;
 
     /// The longest correlation that noise may have along a run, in steps between its rows: what is slower is physics. Zero
     /// where noise is white by construction; no limit by default.
@@ -214,7 +220,7 @@ pub trait Model: Sync {
     /// What chance alone may do to a run, in sigmas of each channel, `[world][copy][channel][row]`, of a model that knows its errors
     /// not to be normal: as many worlds for every run, which share what is not known of the noise, and independent copies in
     /// each. None by default.
-    fn by_chance(&self, _run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
+    fn null_samples(&self, _run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
         &[]
     }
 
@@ -224,8 +230,8 @@ pub trait Model: Sync {
         true
     }
 
-    /// Fills in good starting values of the run's own parameters; `own` holds each parameter's `start`.
-    fn start(&self, _run: &Run, _own: &mut [f64]) {}
+    /// Fills in good starting values of the run's nuisance parameters; `nuisance` holds each parameter's `start`.
+    fn start(&self, _run: &Run, _nuisance: &mut [f64]) {}
 
     /// Where to begin fitting a mechanism (index into [`Spec::mechanisms`]) whose surface has many hills, judged from what a
     /// fit without it leaves: `residual[run][channel][row]`, measured less predicted, NaN where nothing was measured.
@@ -252,7 +258,7 @@ pub trait Model: Sync {
     ///
     /// # Errors
     /// As [`Model::predict`].
-    fn departing(
+    fn perturbation_response(
         &self,
         _runs: &[Run],
         _shared: &[f64],
@@ -269,7 +275,7 @@ pub trait Model: Sync {
 
     /// Why the simulation will give no prediction any more, whatever is asked of it (the program behind it has ended): the
     /// diagnosis then ends with this error, even where it could do without the predictions that failed.
-    fn broken(&self) -> Option<PredictError> {
+    fn fatal_error(&self) -> Option<PredictError> {
         None
     }
 
@@ -284,7 +290,7 @@ pub trait Model: Sync {
     }
 
     /// The derivatives of [`Model::predict`] with respect to the shared parameters at the slots `shared_free` and
-    /// the own parameters at the slots `own_free`, one column after the other, each as long as `out`.
+    /// the nuisance parameters at the slots `nuisance_free`, one column after the other, each as long as `out`.
     ///
     /// The default takes central differences at steps of [`Model::relative_step`], one-sided at a bound.
     ///
@@ -298,13 +304,22 @@ pub trait Model: Sync {
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         shared_free: &[usize],
-        own_free: &[usize],
+        nuisance_free: &[usize],
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        crate::fit::finite_differences(self, run, shared, own, shared_free, own_free, out, jacobian)
+        crate::fit::gauss_newton::finite_differences(
+            self,
+            run,
+            shared,
+            nuisance,
+            shared_free,
+            nuisance_free,
+            out,
+            jacobian,
+        )
     }
 }
 
@@ -317,6 +332,6 @@ pub struct Experiment {
     pub words: String,
     /// Runs with their inputs; the measured channels may hold anything.
     pub runs: Vec<Run>,
-    /// The own parameters of each run, in the order of the model's own parameters.
-    pub own: Vec<Vec<f64>>,
+    /// The nuisance parameters of each run, in the order of the model's nuisance parameters.
+    pub nuisance: Vec<Vec<f64>>,
 }

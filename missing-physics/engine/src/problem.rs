@@ -3,9 +3,9 @@
 use std::sync::OnceLock;
 
 use crate::data::{Recording, Run};
-use crate::family::Family;
 use crate::model::{Model, Scope, Spec};
-use crate::noise::{Whitener, median};
+use crate::noise::family::Family;
+use crate::noise::process::{Whitener, median};
 
 /// A model and a recording, with everything about the rows that no fit changes.
 pub(crate) struct Problem<'a> {
@@ -20,9 +20,9 @@ pub(crate) struct Problem<'a> {
     pub(crate) uneven: bool,
     pub(crate) slots: Vec<usize>,
     pub(crate) shared: ParameterTable,
-    pub(crate) own: ParameterTable,
-    /// Where each run's own parameters start.
-    pub(crate) own_start: Vec<Vec<f64>>,
+    pub(crate) nuisance: ParameterTable,
+    /// Where each run's nuisance parameters start.
+    pub(crate) nuisance_start: Vec<Vec<f64>>,
 }
 
 /// The parameters of one scope, column by column.
@@ -92,18 +92,18 @@ impl<'a> Problem<'a> {
         let step = median(&mut gaps).unwrap_or(1.0);
         let odd = gaps.iter().filter(|g| (*g / step - 1.0).abs() > 0.2).count();
         let spec = model.spec();
-        let own = ParameterTable::new(spec, Scope::PerRun);
-        let own_start = recording
+        let nuisance = ParameterTable::new(spec, Scope::PerRun);
+        let nuisance_start = recording
             .runs
             .iter()
             .map(|run| {
-                let mut start = own.start.clone();
+                let mut start = nuisance.start.clone();
                 model.start(run, &mut start);
                 for (i, value) in start.iter_mut().enumerate() {
                     *value = if value.is_finite() {
-                        value.clamp(own.lower[i], own.upper[i])
+                        value.clamp(nuisance.lower[i], nuisance.upper[i])
                     } else {
-                        own.start[i]
+                        nuisance.start[i]
                     };
                 }
                 start
@@ -112,8 +112,8 @@ impl<'a> Problem<'a> {
         Self {
             slots: spec.slots(),
             shared: ParameterTable::new(spec, Scope::Shared),
-            own,
-            own_start,
+            nuisance,
+            nuisance_start,
             step,
             uneven: 10 * odd > gaps.len(),
             family,
@@ -164,8 +164,11 @@ impl<'a> Problem<'a> {
     }
 
     /// Slots of the whole numbers that belong to the mechanisms `set`.
-    pub(crate) fn places(&self, set: &[usize]) -> Vec<usize> {
-        set.iter().flat_map(|&m| &self.spec().mechanisms[m].places).map(|&p| self.slots[p]).collect()
+    pub(crate) fn integer_slots(&self, set: &[usize]) -> Vec<usize> {
+        set.iter()
+            .flat_map(|&m| &self.spec().mechanisms[m].integer_parameters)
+            .map(|&p| self.slots[p])
+            .collect()
     }
 
     /// The free parameters with the mechanisms `set` (indices into [`Spec::mechanisms`]) and terms `terms` on.
@@ -190,7 +193,7 @@ impl<'a> Problem<'a> {
                 mechanism.companions.iter().for_each(|&p| free[p] = true);
             }
         }
-        for &place in spec.mechanisms.iter().flat_map(|m| &m.places) {
+        for &place in spec.mechanisms.iter().flat_map(|m| &m.integer_parameters) {
             free[place] = false;
         }
         for &t in terms {
@@ -203,8 +206,8 @@ impl<'a> Problem<'a> {
                 .unzip()
         };
         let (shared, added_shared) = pick(Scope::Shared);
-        let (own, added_own) = pick(Scope::PerRun);
-        Selection { shared, own, added_shared, added_own }
+        let (nuisance, added_nuisance) = pick(Scope::PerRun);
+        Selection { shared, nuisance, added_shared, added_nuisance }
     }
 }
 
@@ -221,10 +224,10 @@ pub(crate) fn noise_positions(recording: &Recording, run: &Run) -> Vec<f64> {
 pub(crate) struct Selection {
     /// Slots among the shared parameters.
     pub(crate) shared: Vec<usize>,
-    /// Slots among the runs' own parameters.
-    pub(crate) own: Vec<usize>,
+    /// Slots among the runs' nuisance parameters.
+    pub(crate) nuisance: Vec<usize>,
     /// Which of `shared` a mechanism or term added to the baseline.
     pub(crate) added_shared: Vec<bool>,
-    /// Which of `own` likewise.
-    pub(crate) added_own: Vec<bool>,
+    /// Which of `nuisance` likewise.
+    pub(crate) added_nuisance: Vec<bool>,
 }

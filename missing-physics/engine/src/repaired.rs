@@ -3,13 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::compare::Candidate;
 use crate::data::{Recording, RecordingError};
-use crate::family::Family;
-use crate::fit::{NoiseState, own_normal, solve};
+use crate::fit::gauss_newton::{NoiseState, normal_of_run, solve};
 use crate::linalg::inverse;
 use crate::model::{Model, PredictError, Quantity};
+use crate::noise::family::Family;
 use crate::problem::{Problem, Selection};
+use crate::selection::compare::Candidate;
 
 /// A model with its mechanisms on, and how well its parameters are known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,14 +67,14 @@ pub enum RepairedError {
     /// Sizes, signs or numbers that no diagnosis writes.
     #[error("the model is damaged: {0}")]
     Damaged(&'static str),
-    /// A run whose own unknowns nothing tells.
+    /// A run whose nuisance parameters nothing tells.
     #[error("run {run} has {got} measured values, expected at least {expected} to tell how it began")]
     NotStarted {
         /// Label of the run.
         run: String,
         /// Measured values in it.
         got: usize,
-        /// Its own unknowns.
+        /// Its nuisance parameters.
         expected: usize,
     },
     /// The recording is not sound.
@@ -92,7 +92,7 @@ pub struct PredictedRun {
     pub label: String,
     /// Simulated channels, one column each.
     pub channels: Vec<Vec<f64>>,
-    /// One sigma of each simulated value: what is not known of the shared parameters and of the run's own ones.
+    /// One sigma of each simulated value: what is not known of the shared parameters and of the run's nuisance ones.
     pub sigma: Vec<Vec<f64>>,
 }
 
@@ -122,7 +122,7 @@ impl Repaired {
 
     /// Predicts every row of a recording, measured or not (NaN where a channel was not measured).
     ///
-    /// The shared parameters stay as they were found; each run's own ones (where it began) are fitted to its measured rows.
+    /// The shared parameters stay as they were found; each run's nuisance ones (where it began) are fitted to its measured rows.
     ///
     /// # Errors
     /// [`RepairedError`].
@@ -139,7 +139,7 @@ impl Repaired {
             shape: self.noise.iter().map(|n| n.shape).collect(),
             sigma: self.noise.iter().map(|n| n.sigma).collect(),
         };
-        let unknown = selection.own.len();
+        let unknown = selection.nuisance.len();
         for (run, rows) in recording.runs.iter().zip(&problem.rows) {
             let got = rows.valid.iter().map(Vec::len).sum();
             if got < unknown {
@@ -148,9 +148,9 @@ impl Repaired {
         }
         let shared: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
         let still = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
-        let own = solve(&problem, &still, &noise, &shared, &problem.own_start)?.own;
+        let nuisance = solve(&problem, &still, &noise, &shared, &problem.nuisance_start)?.nuisance;
         (0..recording.runs.len())
-            .map(|run| self.predict_run(&problem, &selection, &noise, run, &shared, &own[run]))
+            .map(|run| self.predict_run(&problem, &selection, &noise, run, &shared, &nuisance[run]))
             .collect()
     }
 
@@ -161,34 +161,34 @@ impl Repaired {
         noise: &NoiseState,
         run: usize,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
     ) -> Result<PredictedRun, RepairedError> {
         let data = &problem.recording.runs[run];
-        let (n_shared, n_own) = (selection.shared.len(), selection.own.len());
+        let (n_shared, n_nuisance) = (selection.shared.len(), selection.nuisance.len());
         let rows = problem.channels() * data.len();
-        let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows * (n_shared + n_own)]);
+        let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows * (n_shared + n_nuisance)]);
         problem.model.jacobian(
             data,
             shared,
-            own,
+            nuisance,
             &selection.shared,
-            &selection.own,
+            &selection.nuisance,
             &mut out,
             &mut jacobian,
         )?;
-        let jacobian = DMatrix::from_vec(rows, n_shared + n_own, jacobian);
-        // The run's own parameters follow the shared ones: d own / d shared = -A^-1 B of its normal equations.
-        let normal = own_normal(problem, selection, noise, run, shared, own)?;
-        let own_covariance = inverse(&normal.view((0, 0), (n_own, n_own)).into_owned());
-        let follow = -(&own_covariance * normal.view((0, n_own), (n_own, n_shared)));
+        let jacobian = DMatrix::from_vec(rows, n_shared + n_nuisance, jacobian);
+        // The run's nuisance parameters follow the shared ones: d own / d shared = -A^-1 B of its normal equations.
+        let normal = normal_of_run(problem, selection, noise, run, shared, nuisance)?;
+        let nuisance_covariance = inverse(&normal.view((0, 0), (n_nuisance, n_nuisance)).into_owned());
+        let follow = -(&nuisance_covariance * normal.view((0, n_nuisance), (n_nuisance, n_shared)));
         let covariance = DMatrix::from_fn(n_shared, n_shared, |i, j| self.covariance[i][j]);
-        let by_own = jacobian.columns(n_shared, n_own).into_owned();
-        let by_shared = jacobian.columns(0, n_shared) + &by_own * follow;
+        let by_nuisance = jacobian.columns(n_shared, n_nuisance).into_owned();
+        let by_shared = jacobian.columns(0, n_shared) + &by_nuisance * follow;
         let quadratic = |by: &DMatrix<f64>, of: &DMatrix<f64>| -> DVector<f64> {
             let product = by * of;
             DVector::from_iterator(rows, (0..rows).map(|r| product.row(r).dot(&by.row(r))))
         };
-        let variance = quadratic(&by_own, &own_covariance) + quadratic(&by_shared, &covariance);
+        let variance = quadratic(&by_nuisance, &nuisance_covariance) + quadratic(&by_shared, &covariance);
         let sigma: Vec<f64> = variance.iter().map(|v| v.max(0.0).sqrt()).collect();
         let columns = |all: &[f64]| all.chunks(data.len().max(1)).map(<[f64]>::to_vec).collect();
         Ok(PredictedRun { label: data.label.clone(), channels: columns(&out), sigma: columns(&sigma) })

@@ -33,7 +33,7 @@ pub trait Simulator: Sync {
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         rng: &mut dyn Rng,
         out: &mut [f64],
     ) -> Result<(), PredictError>;
@@ -126,11 +126,11 @@ impl<S: Simulator> Synthetic<S> {
         let start = |scope: Scope| -> Vec<f64> {
             model.simulator.spec().parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
         };
-        let own = start(Scope::PerRun);
+        let nuisance = start(Scope::PerRun);
         let shared = model.simulator.reference().map_or_else(|| start(Scope::Shared), <[f64]>::to_vec);
         let (mut covariance, mut centre) = (DMatrix::zeros(n, n), vec![0.0; n]);
         for (run, _) in runs {
-            let drawn = model.draw(run, &shared, &own)?;
+            let drawn = model.draw(run, &shared, &nuisance)?;
             let count = drawn.len() as f64;
             let mean: Vec<f64> = (0..n).map(|k| drawn.iter().map(|d| d[k]).sum::<f64>() / count).collect();
             for d in &drawn {
@@ -178,13 +178,13 @@ impl<S: Simulator> Synthetic<S> {
         &self.simulator
     }
 
-    fn draw(&self, run: &Run, shared: &[f64], own: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {
+    fn draw(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {
         (0..self.draws as u64)
             .map(|k| {
                 let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
                 rng.set_stream(k);
                 let mut out = vec![0.0; self.centre.len()];
-                self.simulator.simulate(run, shared, own, &mut rng, &mut out)?;
+                self.simulator.simulate(run, shared, nuisance, &mut rng, &mut out)?;
                 Ok(out)
             })
             .collect()
@@ -202,8 +202,14 @@ impl<S: Simulator> Model for Synthetic<S> {
         self.simulator.spec()
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        let drawn = self.draw(self.whole.get(&run.label).unwrap_or(run), shared, own)?;
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        let drawn = self.draw(self.whole.get(&run.label).unwrap_or(run), shared, nuisance)?;
         let n = self.centre.len();
         let mean: Vec<f64> =
             (0..n).map(|k| drawn.iter().map(|d| d[k]).sum::<f64>() / drawn.len() as f64).collect();

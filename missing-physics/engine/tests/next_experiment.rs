@@ -22,7 +22,7 @@ fn experiment(words: &str, x: Vec<f64>) -> Experiment {
         action: vec![("x".into(), x[0])],
         words: words.into(),
         runs: vec![run(x, nothing)],
-        own: vec![vec![0.0]],
+        nuisance: vec![vec![0.0]],
     }
 }
 
@@ -33,7 +33,8 @@ fn the_same_again_is_not_proposed_where_it_cannot_tell() {
     let slope = parameter("slope", 0.0, [-10.0, 10.0]);
     let offset = Parameter { scope: Scope::PerRun, ..parameter("offset", 0.0, [-10.0, 10.0]) };
     let mechanisms = vec![mechanism("slope", vec![0]), mechanism("offset", vec![1])];
-    let model = Curve::new(vec![slope, offset], mechanisms, |shared, own, x| own[0] + shared[0] * x);
+    let model =
+        Curve::new(vec![slope, offset], mechanisms, |shared, nuisance, x| nuisance[0] + shared[0] * x);
     let (mut rng, noise) = (ChaCha8Rng::seed_from_u64(3), Normal::new(0.0, 0.1).unwrap());
     let readings = (0..ROWS).map(|_| 1.0 + noise.sample(&mut rng)).collect();
     let recording = recording("x", vec![run(vec![1.0; ROWS], readings)], Some(0.1));

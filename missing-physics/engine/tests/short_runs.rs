@@ -15,7 +15,13 @@ impl Model for Level {
         &self.0
     }
 
-    fn predict(&self, _run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        _run: &Run,
+        shared: &[f64],
+        _nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         out.fill(shared[0]);
         Ok(())
     }

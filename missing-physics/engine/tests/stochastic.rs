@@ -52,7 +52,7 @@ impl Simulator for Bounces {
         &self,
         run: &Run,
         shared: &[f64],
-        _own: &[f64],
+        _nuisance: &[f64],
         rng: &mut dyn Rng,
         out: &mut [f64],
     ) -> Result<(), PredictError> {

@@ -7,7 +7,7 @@ use missing_physics::data::Recording;
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use missing_physics::told::{Told, told};
+use missing_physics::oracle::{Oracle, oracle};
 use serde::{Deserialize, Serialize};
 use worlds::concealed::{Concealed, Hidden, Key, Maker};
 
@@ -140,7 +140,7 @@ impl World {
             return Ok(());
         }
         let (_, loaded) = domains::load(&self.recording())?;
-        let found = told(&*loaded.model, &loaded.recording, &truth, &self.options())
+        let found = oracle(&*loaded.model, &loaded.recording, &truth, &self.options())
             .map_err(|e| ProveError::Other(format!("{}: {e}", self.name)))?;
         write(&path, &Best::of(&found))
     }
@@ -197,7 +197,7 @@ impl Outcome {
 }
 
 impl Best {
-    fn of(t: &Told) -> Self {
+    fn of(t: &Oracle) -> Self {
         /// Far beyond any threshold, and a number in JSON.
         const MOST: f64 = 1e9;
         Self {

@@ -47,8 +47,8 @@ pub(super) fn of_times(model: &TimesModel, restitution: f64, gravity_m_s2: f64) 
         let runs: Vec<Run> =
             (0..REPEATS).map(|k| TimesModel::run(&format!("next {height} {k}"), &drop, &numbers())).collect();
         let leaves = 0.5 * gravity_m_s2 * drop.times_s[1];
-        let own = vec![model.own(leaves); runs.len()];
-        experiment("drop_height_m", *height, format!("drop it from {height} m"), own, runs)
+        let nuisance = vec![model.nuisance(leaves); runs.len()];
+        experiment("drop_height_m", *height, format!("drop it from {height} m"), nuisance, runs)
     };
     HEIGHTS_M.iter().map(of).collect()
 }
@@ -57,9 +57,9 @@ fn numbers() -> Vec<f64> {
     (1..=IMPACTS).map(|i| i as f64).collect()
 }
 
-fn experiment(name: &str, value: f64, words: String, own: Vec<Vec<f64>>, runs: Vec<Run>) -> Experiment {
+fn experiment(name: &str, value: f64, words: String, nuisance: Vec<Vec<f64>>, runs: Vec<Run>) -> Experiment {
     let words = format!("{words}, {REPEATS} times");
-    Experiment { action: vec![(name.to_owned(), value)], words, runs, own }
+    Experiment { action: vec![(name.to_owned(), value)], words, runs, nuisance }
 }
 
 /// A drop as the baseline has it.

@@ -45,7 +45,7 @@ struct Known {
     heard: Vec<([f64; 2], Vec<f64>)>,
     rows: Rows,
     /// What chance alone may do to it, in sigmas, `[world][copy][channel][row]`.
-    by_chance: Vec<Vec<Vec<Vec<f64>>>>,
+    null_samples: Vec<Vec<Vec<Vec<f64>>>>,
 }
 
 /// Simulated drops for each measured one and each plausible spread.
@@ -139,7 +139,7 @@ impl BounceModel {
         let mut inputs = vec![of_row(numbers), of_row(&linear.drop.speeds(&self.nominal))];
         // Likely places: their errors, unlike the measured ones', have nothing to do with those of the impacts.
         inputs.extend((0..2).map(|k| of_row(&places.iter().map(|p| p[k]).collect::<Vec<f64>>())));
-        let by_chance = self.by_chance(&linear, drop, &rows, copies);
+        let null_samples = self.null_samples(&linear, drop, &rows, copies);
         let weights = Weights::new(linear, self.spread)?;
         let shown = weights.errors(&self.nominal, &[])?.as_slice().to_vec();
         if shown.iter().any(|v| !v.is_finite()) {
@@ -158,7 +158,7 @@ impl BounceModel {
             };
             rows.heard.clone().map(misfit).collect::<Vec<f64>>()
         }));
-        self.drops.insert(label.to_owned(), Known { weights, shown, heard, rows, by_chance });
+        self.drops.insert(label.to_owned(), Known { weights, shown, heard, rows, null_samples });
         Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
     }
 
@@ -169,7 +169,13 @@ impl BounceModel {
         Rows { heard: if all { 0..drop.times_s.len() } else { known.clone() }, known }
     }
 
-    fn by_chance(&self, likely: &Linear, drop: &Drop, rows: &Rows, copies: usize) -> Vec<Vec<Vec<Vec<f64>>>> {
+    fn null_samples(
+        &self,
+        likely: &Linear,
+        drop: &Drop,
+        rows: &Rows,
+        copies: usize,
+    ) -> Vec<Vec<Vec<Vec<f64>>>> {
         let mut rng = ChaCha8Rng::seed_from_u64(0xba11);
         rng.set_stream(self.drops.len() as u64);
         let sigmas = self.spread.of_channels();
@@ -240,7 +246,9 @@ impl Model for BounceModel {
 
     fn starts(&self, mechanism: usize, _runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         match self.places.microphone {
-            Some([.., which]) if self.spec.mechanisms[mechanism].places.contains(&which.index) => {
+            Some([.., which])
+                if self.spec.mechanisms[mechanism].integer_parameters.contains(&which.index) =>
+            {
                 (0..self.setup.microphones).map(|k| vec![(which.index, k as f64)]).collect()
             }
             _ => Vec::new(),
@@ -251,8 +259,8 @@ impl Model for BounceModel {
         false
     }
 
-    fn by_chance(&self, run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
-        self.drops.get(&run.label).map_or(&[], |known| &known.by_chance)
+    fn null_samples(&self, run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
+        self.drops.get(&run.label).map_or(&[], |known| &known.null_samples)
     }
 
     /// Errors come apart by their own covariance.
@@ -260,7 +268,13 @@ impl Model for BounceModel {
         0.0
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        _nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
         let known = self.drops.get(&run.label).ok_or_else(|| wrong("no such drop"))?;
         let array = self.wrong(shared);

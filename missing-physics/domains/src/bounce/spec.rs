@@ -205,7 +205,7 @@ fn microphone(b: &mut Builder, p: &mut Places, count: usize) {
         ],
         &["position-scale"],
     );
-    mechanism.places = vec![which.index];
+    mechanism.integer_parameters = vec![which.index];
     mechanism.derived.push(Derived {
         name: "offset_m".into(),
         unit: "m".into(),

@@ -60,13 +60,13 @@ impl TimesModel {
         Run { label: label.into(), inputs, outputs: vec![drop.times_s.clone()], kind: 0 }
     }
 
-    /// Own parameters of a drop that begins at t = 0 and leaves the table at a speed.
-    pub(super) fn own(&self, leaves_m_s: f64) -> Vec<f64> {
-        let mut own = vec![0.0; self.spec.count(Scope::PerRun)];
+    /// Nuisance parameters of a drop that begins at t = 0 and leaves the table at a speed.
+    pub(super) fn nuisance(&self, leaves_m_s: f64) -> Vec<f64> {
+        let mut nuisance = vec![0.0; self.spec.count(Scope::PerRun)];
         if let Some(at) = self.leaves {
-            own[at.slot] = leaves_m_s;
+            nuisance[at.slot] = leaves_m_s;
         }
-        own
+        nuisance
     }
 
     /// Times of the impacts that are heard, of all that there are.
@@ -74,7 +74,7 @@ impl TimesModel {
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         hidden: usize,
         out: &mut [f64],
     ) -> Result<(), String> {
@@ -88,7 +88,7 @@ impl TimesModel {
         let rate = p.clock.map_or(0.0, |at| shared[at.slot]);
         let gravity = self.setup.gravity_m_s2;
         let mut leaves = match (self.leaves, self.height_m) {
-            (Some(at), _) => own[at.slot],
+            (Some(at), _) => nuisance[at.slot],
             (None, Some(height)) => {
                 let fell = speed_after_drop(height, gravity, drag);
                 restitution(fell) * fell
@@ -105,20 +105,20 @@ impl TimesModel {
                 leaves = restitution(lands) * lands;
                 impact += 1.0;
             }
-            *time = own[self.begins.slot] + (1.0 + rate) * elapsed;
+            *time = nuisance[self.begins.slot] + (1.0 + rate) * elapsed;
         }
         Ok(())
     }
 
-    fn fill(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
+    fn fill(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
         if run.inputs.len() <= FOUND {
             return Err("its impacts are not numbered".into());
         }
-        self.times(run, shared, own, KNOWN, out)?;
+        self.times(run, shared, nuisance, KNOWN, out)?;
         let split = self.places.unheard.map_or(0.0, |at| shared[at.slot]);
         if split != 0.0 {
             let mut apart = vec![0.0; out.len()];
-            self.times(run, shared, own, FOUND, &mut apart)?;
+            self.times(run, shared, nuisance, FOUND, &mut apart)?;
             out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
         }
         Ok(())
@@ -127,8 +127,8 @@ impl TimesModel {
 
 fn build_times(setup: &Setup, restitution: f64) -> (Spec, Places, At, Option<At>) {
     let (mut b, places) = build(setup, restitution);
-    let begins = b.own("first_impact_s", "s", ANY, 0.1);
-    let leaves = (!setup.dropped).then(|| b.own("leaves_m_s", "m/s", [0.0, 1e3], 0.5));
+    let begins = b.nuisance("first_impact_s", "s", ANY, 0.1);
+    let leaves = (!setup.dropped).then(|| b.nuisance("leaves_m_s", "m/s", [0.0, 1e3], 0.5));
     (b.spec, places, begins, leaves)
 }
 
@@ -142,18 +142,25 @@ impl Model for TimesModel {
         self.longest_noise
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.fill(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.fill(run, shared, nuisance, out)
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
-    fn start(&self, run: &Run, own: &mut [f64]) {
+    fn start(&self, run: &Run, nuisance: &mut [f64]) {
         let heard: Vec<(usize, f64)> =
             run.outputs[0].iter().copied().enumerate().filter(|(_, t)| t.is_finite()).collect();
         let [(first, t0), (second, t1), ..] = heard.as_slice() else { return };
-        own[self.begins.slot] = *t0;
+        nuisance[self.begins.slot] = *t0;
         if let Some(at) = self.leaves {
             let flights = (run.inputs[FOUND][*second] - run.inputs[FOUND][*first]) + (second - first) as f64;
-            own[at.slot] = 0.5 * self.setup.gravity_m_s2 * (t1 - t0) / flights;
+            nuisance[at.slot] = 0.5 * self.setup.gravity_m_s2 * (t1 - t0) / flights;
         }
     }
 }

@@ -49,15 +49,15 @@ pub(super) fn declare(header: &Header, b: &mut Builder) -> Result<Names, ReadErr
         let name = section.optional_text("name", "a text")?.unwrap_or(id);
         let texts = [name, text("explanation")?, text("equation")?, text("reference")?];
         let confused = section.texts("confused_with")?.unwrap_or_default();
-        let own: Vec<At> = section
+        let nuisance: Vec<At> = section
             .sections("parameter")?
             .iter()
             .map(|s| parameter(s, "off", Some(0.0), b, &mut names))
             .collect::<Result<_, _>>()?;
-        if own.is_empty() {
+        if nuisance.is_empty() {
             return Err(section.unfit("parameter", "absent", "at least one [[mechanism.parameter]]"));
         }
-        b.mechanism(id, &own, texts, &confused);
+        b.mechanism(id, &nuisance, texts, &confused);
     }
     Ok(names)
 }
@@ -89,7 +89,7 @@ fn parameter(
     };
     let scale = section.required("scale", f64::MIN_POSITIVE, f64::MAX)?;
     let at = if section.flag("per_run")?.unwrap_or(false) {
-        b.own_from(name, unit, begin, [lower, upper], scale)
+        b.nuisance_from(name, unit, begin, [lower, upper], scale)
     } else {
         b.shared(name, unit, begin, [lower, upper], scale)
     };

@@ -221,7 +221,7 @@ fn experiments(
     let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
     known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
     let table = header.table("experiments", &known)?;
-    let own: Vec<f64> =
+    let nuisance: Vec<f64> =
         spec.parameters.iter().filter(|p| p.scope == Scope::PerRun).map(|p| p.start).collect();
     let experiment = |mut run: Run| {
         run.outputs = vec![vec![0.0; run.len()]; channels];
@@ -231,7 +231,7 @@ fn experiments(
         let words = format!("record the run {} of {name}", quoted(&run.label));
         // Not to be taken for a run that was recorded.
         run.label = format!("next: {}", run.label);
-        Experiment { action, words, runs: vec![run], own: vec![own.clone()] }
+        Experiment { action, words, runs: vec![run], nuisance: vec![nuisance.clone()] }
     };
     Ok(runs(&table, inputs, &[])?.into_iter().map(experiment).collect())
 }

@@ -51,10 +51,16 @@ pub(super) struct CustomModel {
 }
 
 impl Asked {
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], rows: usize) -> Result<Arc<Vec<f64>>, Failure> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        rows: usize,
+    ) -> Result<Arc<Vec<f64>>, Failure> {
         let value = |scope: &Scope, slot: &usize| match scope {
             Scope::Shared => shared[*slot],
-            Scope::PerRun => own[*slot],
+            Scope::PerRun => nuisance[*slot],
         };
         let bits = self.parameters.iter().map(|(_, scope, slot)| value(scope, slot).to_bits()).collect();
         let key = (run.label.clone(), bits);
@@ -84,14 +90,20 @@ impl Model for CustomModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         let fail = |reason: String| PredictError { run: run.label.clone(), reason };
         match &self.simulation {
             Simulation::Made(made) => {
                 let made = made.get(&run.label).filter(|m| m.len() == out.len());
                 out.copy_from_slice(made.ok_or_else(|| fail("no such run was simulated".into()))?);
             }
-            Simulation::Asked(asked) => match asked.predict(run, shared, own, out.len()) {
+            Simulation::Asked(asked) => match asked.predict(run, shared, nuisance, out.len()) {
                 Ok(predicted) => out.copy_from_slice(&predicted),
                 Err(Failure::Here(why) | Failure::Forever(why)) => return Err(fail(why)),
             },
@@ -105,7 +117,7 @@ impl Model for CustomModel {
         Ok(())
     }
 
-    fn broken(&self) -> Option<PredictError> {
+    fn fatal_error(&self) -> Option<PredictError> {
         match &self.simulation {
             Simulation::Made(_) => None,
             Simulation::Asked(asked) => {

@@ -32,7 +32,7 @@ pub(super) fn experiments(model: &mut DoughModel, runs: &[RunOfRolls]) -> Vec<Ex
         list.push(Experiment {
             action: vec![(name.to_owned(), value)],
             words: format!("{words}, {REPEATS} doughs"),
-            own: vec![Vec::new(); runs.len()],
+            nuisance: vec![Vec::new(); runs.len()],
             runs,
         });
     };

@@ -175,8 +175,8 @@ impl DoughModel {
     ) -> DVector<f64> {
         let mut errors = DVector::zeros(block.off.len());
         for (at, dough) in block.doughs.iter().enumerate() {
-            let own = white(&self.follow(dough, &block.fresh, effects, &|roll| larger(at, roll)));
-            errors.rows_mut(dough.first, own.len()).copy_from(&own);
+            let of_dough = white(&self.follow(dough, &block.fresh, effects, &|roll| larger(at, roll)));
+            errors.rows_mut(dough.first, of_dough.len()).copy_from(&of_dough);
         }
         block.tie.untie(&errors)
     }
@@ -281,7 +281,13 @@ impl Model for DoughModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        _nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         let (block, dough) = self.place(run)?;
         let errors = self.kept_errors(block, shared);
         let block = &self.blocks[block];
@@ -316,7 +322,7 @@ impl Model for DoughModel {
     }
 
     /// The response of each roll: what follows from that is measured in all rolls that what was learned ties to it.
-    fn departing(
+    fn perturbation_response(
         &self,
         runs: &[Run],
         shared: &[f64],

@@ -141,7 +141,7 @@ fn propose(model: &mut PourModel, height_m: f64) -> Experiment {
     Experiment {
         action: vec![("funnel_height_m".into(), height_m)],
         words: format!("pour from {height_m:.3} m, {REPEATS} times"),
-        own: vec![Vec::new(); runs.len()],
+        nuisance: vec![Vec::new(); runs.len()],
         runs,
     }
 }

@@ -143,12 +143,12 @@ impl PourModel {
             }
         }
         let correlation = self.emulator.correlation();
-        let own = discrepancy(&mean, &sigma);
+        let discrepant = discrepancy(&mean, &sigma);
         let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
             // Where the ground reads is the camera's, and says nothing of the grains.
             let tied = if i != j && i.min(j) < GROUND { 0.0 } else { correlation[(i, j)] };
             // A discrepancy is the same in all pictures, so that their mean has no less of it.
-            sigma[i] * sigma[j] * (tied + pictures * own[(i, j)])
+            sigma[i] * sigma[j] * (tied + pictures * discrepant[(i, j)])
         });
         covariance
             .cholesky()
@@ -335,7 +335,13 @@ impl Model for PourModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], _own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        _nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         let Some(shown) = self.runs.get(&run.label) else {
             return Err(PredictError { run: run.label.clone(), reason: "no such pour".into() });
         };

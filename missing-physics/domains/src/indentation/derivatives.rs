@@ -39,21 +39,22 @@ fn derivatives_agree_with_differences() {
         let model = IndentationModel::new(setup, &conditions, 2.1e-3, 0.2, 1.8).unwrap();
         let run = run();
         let parameters = |scope| model.spec().parameters.iter().filter(move |p| p.scope == scope);
-        let own = vec![0.02e-3, 1e-3];
+        let nuisance = vec![0.02e-3, 1e-3];
         for on in [0.0, 0.8] {
             let shared: Vec<f64> = parameters(Scope::Shared)
                 .map(|p| if on > 0.0 && p.start == 0.0 { on * p.scale } else { p.start })
                 .collect();
             let free = (0..shared.len()).collect::<Vec<_>>();
             let mut out = [0.0; ROWS];
-            let columns = free.len() + own.len();
+            let columns = free.len() + nuisance.len();
             let (mut exact, mut rough) = (vec![0.0; ROWS * columns], vec![0.0; ROWS * columns]);
-            let own_free = [0, 1];
-            model.jacobian(&run, &shared, &own, &free, &own_free, &mut out, &mut exact).unwrap();
+            let nuisance_free = [0, 1];
+            model.jacobian(&run, &shared, &nuisance, &free, &nuisance_free, &mut out, &mut exact).unwrap();
             let mut plain = [0.0; ROWS];
-            model.predict(&run, &shared, &own, &mut plain).unwrap();
+            model.predict(&run, &shared, &nuisance, &mut plain).unwrap();
             assert!(out.iter().zip(plain).all(|(a, b)| (a - b).abs() < 1e-12), "{indenter:?}");
-            finite_differences(&model, &run, &shared, &own, &free, &own_free, &mut out, &mut rough).unwrap();
+            finite_differences(&model, &run, &shared, &nuisance, &free, &nuisance_free, &mut out, &mut rough)
+                .unwrap();
             for k in 0..columns {
                 let (a, b) = (&exact[k * ROWS..][..ROWS], &rough[k * ROWS..][..ROWS]);
                 let size = b.iter().fold(1e-9, |m: f64, v| m.max(v.abs()));

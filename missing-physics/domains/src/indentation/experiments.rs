@@ -17,7 +17,7 @@ const ABOVE: f64 = 0.5;
 /// the sensor is felt.
 pub(super) fn experiments(model: &IndentationModel, recording: &Recording) -> Vec<Experiment> {
     let deepest = model.deepest_m();
-    let own = vec![0.0; model.spec().count(Scope::PerRun)];
+    let nuisance = vec![0.0; model.spec().count(Scope::PerRun)];
     let duration = recording
         .runs
         .iter()
@@ -47,7 +47,7 @@ pub(super) fn experiments(model: &IndentationModel, recording: &Recording) -> Ve
             action: action.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
             words: format!("{words}, {REPEATS} times"),
             runs: vec![run; REPEATS],
-            own: vec![own.clone(); REPEATS],
+            nuisance: vec![nuisance.clone(); REPEATS],
         });
     };
     for depth in [0.3, 1.0, 1.5, 2.0].map(|factor| factor * deepest) {

@@ -157,7 +157,7 @@ impl InDuals for IndentationModel {
         &self,
         run: &Run,
         shared: &[T],
-        own: &[T],
+        nuisance: &[T],
         moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String> {
@@ -183,7 +183,7 @@ impl InDuals for IndentationModel {
         law.check().map_err(|e| e.to_string())?;
         let relaxation =
             on(p.relaxed).then(|| LinearSolid { relaxed_fraction: value(p.relaxed), tau_s: value(p.tau) });
-        let offset = own[p.offset.slot];
+        let offset = nuisance[p.offset.slot];
         let true_depths: Vec<T> = depths.iter().map(|d| -offset + *d).collect();
         let acting = Acting {
             adhesion: on(p.adhesion),
@@ -193,7 +193,7 @@ impl InDuals for IndentationModel {
             compliance: on(Some(p.compliance)),
         };
         self.follow(run, &law.contact(acting), relaxation, &true_depths, out)?;
-        out.iter_mut().for_each(|force| *force += own[p.lift.slot]);
+        out.iter_mut().for_each(|force| *force += nuisance[p.lift.slot]);
         Ok(())
     }
 }
@@ -203,8 +203,14 @@ impl Model for IndentationModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.predict_in(run, shared, own, &[], out)
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.predict_in(run, shared, nuisance, &[], out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
@@ -212,19 +218,19 @@ impl Model for IndentationModel {
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         shared_free: &[usize],
-        own_free: &[usize],
+        nuisance_free: &[usize],
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        Asked { run, shared, own, shared_free, own_free }.answer(self, out, jacobian)
+        Asked { run, shared, nuisance, shared_free, nuisance_free }.answer(self, out, jacobian)
     }
 
     /// A modulus acts on the runs of its own condition.
     fn acts_on(&self, run: &Run, shared_slot: usize) -> bool {
-        let own = self.modulus(run).map(|at| at.slot);
-        own == Some(shared_slot) || self.places.moduli.iter().all(|at| at.slot != shared_slot)
+        let of_run = self.modulus(run).map(|at| at.slot);
+        of_run == Some(shared_slot) || self.places.moduli.iter().all(|at| at.slot != shared_slot)
     }
 
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {

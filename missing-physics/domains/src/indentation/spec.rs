@@ -47,7 +47,7 @@ pub(super) fn build(
         let start = condition.start_pa;
         p.moduli.push(b.shared(&condition.name, "Pa", start, [1e-6 * start, 1e6 * start], 0.2 * start));
     }
-    p.offset = b.own("offset_m", "m", [-deepest, deepest], 0.05 * deepest);
+    p.offset = b.nuisance("offset_m", "m", [-deepest, deepest], 0.05 * deepest);
     b.mechanism(
         "contact-offset",
         &[p.offset],
@@ -59,7 +59,7 @@ pub(super) fn build(
         ],
         &["force-offset", "membrane-tension"],
     );
-    p.lift = b.own("offset_n", "N", ANY, 0.02 * strongest);
+    p.lift = b.nuisance("offset_n", "N", ANY, 0.02 * strongest);
     let stiffness = strongest / deepest;
     extra_stiffness(&mut b, &mut p, stiffness, deepest);
     if let (Indenter::Sphere { radius_m }, true) = (setup.indenter, setup.radius_known) {
@@ -122,7 +122,7 @@ pub(super) fn build(
             ],
             &["contact-offset", "load-cell-compliance"],
         );
-        mechanism.shapes = vec![tau.index];
+        mechanism.shape_parameters = vec![tau.index];
         (p.relaxed, p.tau) = (Some(relaxed), Some(tau));
     }
     if setup.radius_known && !matches!(setup.indenter, Indenter::Cone { .. }) {
@@ -193,7 +193,7 @@ fn extra_stiffness(b: &mut Builder, p: &mut Places, stiffness: f64, deepest: f64
         ],
         &["membrane-stretching", "strain-stiffening"],
     );
-    rim.shapes = vec![p.rim_depth.index];
+    rim.shape_parameters = vec![p.rim_depth.index];
     p.compliance = b.shared("compliance_m_n", "m/N", 0.0, [0.0, 0.9 / stiffness], 0.02 / stiffness);
     b.mechanism(
         "load-cell-compliance",

@@ -35,7 +35,7 @@ pub(super) fn experiments(model: &LiquidTiltModel, recording: &Recording) -> Vec
             action: action.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
             words,
             runs: vec![run],
-            own: vec![model.own(density * volume, volume)],
+            nuisance: vec![model.nuisance(density * volume, volume)],
         });
     };
     for share in [0.0, 0.1, 0.25, 0.5, 0.75, 0.95] {

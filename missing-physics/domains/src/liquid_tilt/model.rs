@@ -137,38 +137,38 @@ impl LiquidTiltModel {
         &self.setup
     }
 
-    /// Own parameters of a run with a mass (kg) of liquid of a volume (m^3), as far as the run has them.
-    pub fn own(&self, mass_kg: f64, volume_m3: f64) -> Vec<f64> {
-        let mut own = vec![0.0; self.spec.count(Scope::PerRun)];
+    /// Nuisance parameters of a run with a mass (kg) of liquid of a volume (m^3), as far as the run has them.
+    pub fn nuisance(&self, mass_kg: f64, volume_m3: f64) -> Vec<f64> {
+        let mut nuisance = vec![0.0; self.spec.count(Scope::PerRun)];
         for (at, value) in [(self.places.mass, mass_kg), (self.places.volume, volume_m3)] {
             if let Some(at) = at {
-                own[at.slot] = value;
+                nuisance[at.slot] = value;
             }
         }
-        own
+        nuisance
     }
 
     /// Mass (kg) and volume (m^3) of a run's liquid; no volume weighs nothing.
-    fn load(&self, run: &Run, own: &[f64]) -> (f64, f64) {
+    fn load(&self, run: &Run, nuisance: &[f64]) -> (f64, f64) {
         let known = run.inputs.get(2).filter(|_| self.setup.volumes_known).and_then(|c| c.first()).copied();
         if known == Some(0.0) {
             return (0.0, 0.0);
         }
-        let mass = self.places.mass.map(|at| own[at.slot]);
+        let mass = self.places.mass.map(|at| nuisance[at.slot]);
         let volume = known
-            .or_else(|| self.places.volume.map(|at| own[at.slot]))
+            .or_else(|| self.places.volume.map(|at| nuisance[at.slot]))
             .or_else(|| Some(mass? / self.setup.density_kg_m3?))
             .unwrap_or(0.0);
         (mass.unwrap_or_else(|| volume * self.setup.density_kg_m3.unwrap_or(0.0)), volume)
     }
 
-    fn feel(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
+    fn feel(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
         let p = &self.places;
         let [theta, row, ..] = run.inputs.as_slice() else {
             return Err("theta_rad and row are missing".into());
         };
         let cavity = self.cavity(shared[p.thickness.slot])?;
-        let (mass, volume) = self.load(run, own);
+        let (mass, volume) = self.load(run, nuisance);
         let volume = volume.clamp(0.0, cavity.capacity_m3());
         let mut departures = Departures {
             force_gain: shared[p.gain.slot],
@@ -203,8 +203,15 @@ impl Model for LiquidTiltModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.feel(run, shared, own, out).map_err(|reason| PredictError { run: run.label.clone(), reason })
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.feel(run, shared, nuisance, out)
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
     /// Poses are settled ones, seconds apart: a sensor that wanders forgets within a few of them. What lasts longer is physics, such
@@ -213,7 +220,7 @@ impl Model for LiquidTiltModel {
         2.9
     }
 
-    fn start(&self, run: &Run, own: &mut [f64]) {
+    fn start(&self, run: &Run, nuisance: &mut [f64]) {
         let grasp = &self.setup.grasp;
         let Some(forces) = run.outputs.get(1) else { return };
         let finite = forces.iter().filter(|f| f.is_finite());
@@ -221,7 +228,7 @@ impl Model for LiquidTiltModel {
         let weight = -sum / f64::max(n, 1.0) / grasp.gravity_m_s2;
         let mass = (weight - grasp.container_mass_kg - grasp.gripper_mass_kg).max(0.0);
         if let Some(at) = self.places.mass {
-            own[at.slot] = mass;
+            nuisance[at.slot] = mass;
         }
         let Some(at) = self.places.volume else { return };
         // The volume whose torque is nearest, on a grid: the surface has more than one valley.
@@ -233,8 +240,8 @@ impl Model for LiquidTiltModel {
         let mut best = (f64::INFINITY, 0.5 * capacity);
         for k in 1..40 {
             let volume = capacity * f64::from(k) / 40.0;
-            own[at.slot] = volume;
-            if self.feel(run, &shared, own, &mut out).is_err() {
+            nuisance[at.slot] = volume;
+            if self.feel(run, &shared, nuisance, &mut out).is_err() {
                 continue;
             }
             let torque = &out[2 * run.len()..];
@@ -248,7 +255,7 @@ impl Model for LiquidTiltModel {
                 best = (misfit, volume);
             }
         }
-        own[at.slot] = best.1;
+        nuisance[at.slot] = best.1;
     }
 
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
@@ -287,10 +294,10 @@ fn build(setup: &Setup, rows: usize) -> (Spec, Places) {
     b.spec.baseline = "the weight of gripper, container and liquid (eq. 2.1): walls of no thickness, a level surface, the shell's centre of mass in its middle".into();
     if !(setup.volumes_known && setup.density_kg_m3.is_some()) {
         let most = setup.density_kg_m3.map_or(30.0 * (capacity * 1e3), |d| d * capacity);
-        p.mass = Some(b.own("liquid_mass_kg", "kg", [0.0, most], capacity * 100.0));
+        p.mass = Some(b.nuisance("liquid_mass_kg", "kg", [0.0, most], capacity * 100.0));
     }
     if !setup.volumes_known && setup.density_kg_m3.is_none() {
-        p.volume = Some(b.own("volume_m3", "m^3", [0.0, capacity], 0.1 * capacity));
+        p.volume = Some(b.nuisance("volume_m3", "m^3", [0.0, capacity], 0.1 * capacity));
     }
     let length = setup.vessel.length_m();
     let moment = grasp.gravity_m_s2 * (grasp.container_mass_kg + capacity * 500.0) * length;
@@ -379,7 +386,7 @@ fn build(setup: &Setup, rows: usize) -> (Spec, Places) {
         ],
         &["grasp-offset", "sensor-drift"],
     );
-    slip.places = vec![p.slip_row.index];
+    slip.integer_parameters = vec![p.slip_row.index];
     p.drift =
         b.shared("rate_nm_per_row", "N m", 0.0, [-moment, moment], 0.3 * moment / rows.max(1) as f64 * 1e-2);
     b.mechanism(

@@ -25,7 +25,7 @@ pub(super) fn experiments(model: &SloshModel, recording: &Recording) -> Vec<Expe
     };
     let mut list = Vec::new();
     let mut add = |action: Vec<(String, f64)>, words: String, run: Run, amplitude: f64| {
-        list.push(Experiment { action, words, runs: vec![run], own: vec![model.wave(amplitude)] });
+        list.push(Experiment { action, words, runs: vec![run], nuisance: vec![model.wave(amplitude)] });
     };
     let largest = model.largest();
     let (channel, unit) = (model.channel(), model.channel().unit());

@@ -66,9 +66,9 @@ pub struct SloshModel {
     arm: usize,
     second: usize,
     friction: usize,
-    /// Index of each shared and each own parameter.
+    /// Index of each shared and each nuisance parameter.
     shared: Vec<usize>,
-    own: Vec<usize>,
+    nuisance: Vec<usize>,
 }
 
 impl SloshModel {
@@ -99,8 +99,8 @@ impl SloshModel {
         let (arm, second) = (find("arm-compliance"), find("second-mode"));
         let friction = find("contact-line-friction");
         let of = |scope| (0..spec.parameters.len()).filter(|&i| spec.parameters[i].scope == scope).collect();
-        let (shared, own) = (of(Scope::Shared), of(Scope::PerRun));
-        Ok(Self { setup, spec, places, cylinders, largest, arm, second, friction, shared, own })
+        let (shared, nuisance) = (of(Scope::Shared), of(Scope::PerRun));
+        Ok(Self { setup, spec, places, cylinders, largest, arm, second, friction, shared, nuisance })
     }
 
     /// Whether a run of this kind fits into the container.
@@ -111,11 +111,11 @@ impl SloshModel {
         FILLS.get(kind).is_some_and(|share| share * self.setup.volume_m3 <= capacity)
     }
 
-    /// Own parameters of a run in which the wave starts from its crest at the given reading.
+    /// Nuisance parameters of a run in which the wave starts from its crest at the given reading.
     pub fn wave(&self, amplitude: f64) -> Vec<f64> {
-        let mut own = vec![0.0; self.spec.count(Scope::PerRun)];
-        own[self.places.cos.slot] = amplitude;
-        own
+        let mut nuisance = vec![0.0; self.spec.count(Scope::PerRun)];
+        nuisance[self.places.cos.slot] = amplitude;
+        nuisance
     }
 
     /// What was measured.
@@ -133,7 +133,7 @@ impl SloshModel {
     }
 
     /// The first mode.
-    fn wave_at(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
+    fn wave_at(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
         let (p, cylinder) = (&self.places, self.cylinder(run));
         let mode = Decay {
             omega_rad_s: cylinder
@@ -147,11 +147,11 @@ impl SloshModel {
             },
         };
         let times = run.inputs.first().ok_or("there is no column of times")?;
-        mode.read(times, [own[p.cos.slot], own[p.sin.slot]], out).map_err(|e| e.to_string())
+        mode.read(times, [nuisance[p.cos.slot], nuisance[p.sin.slot]], out).map_err(|e| e.to_string())
     }
 
     /// What is added to the first mode's reading: other oscillations, and the sensor's transient.
-    fn add_others(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), String> {
+    fn add_others(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
         let (p, cylinder) = (&self.places, self.cylinder(run));
         let times = run.inputs.first().ok_or("there is no column of times")?;
         let mode =
@@ -163,14 +163,14 @@ impl SloshModel {
         let arm = mode(shared[p.arm_omega.slot], shared[p.arm_damping.slot]);
         let mut more = Vec::new();
         for (mode, cos, sin) in [(second, p.second_cos, p.second_sin), (arm, p.arm_cos, p.arm_sin)] {
-            let start = [own[cos.slot], own[sin.slot]];
+            let start = [nuisance[cos.slot], nuisance[sin.slot]];
             if start != [0.0; 2] {
                 more.resize(times.len(), 0.0);
                 mode.read(times, start, &mut more).map_err(|e| e.to_string())?;
                 out.iter_mut().zip(&more).for_each(|(y, x)| *y += x);
             }
         }
-        let transient = own[p.transient.slot];
+        let transient = nuisance[p.transient.slot];
         if transient != 0.0 {
             for (y, t) in out.iter_mut().zip(times) {
                 *y += transient * (-t / shared[p.lag.slot]).exp();
@@ -197,9 +197,15 @@ impl Model for SloshModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.wave_at(run, shared, own, out)
-            .and_then(|()| self.add_others(run, shared, own, out))
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.wave_at(run, shared, nuisance, out)
+            .and_then(|()| self.add_others(run, shared, nuisance, out))
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
@@ -207,42 +213,42 @@ impl Model for SloshModel {
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         shared_free: &[usize],
-        own_free: &[usize],
+        nuisance_free: &[usize],
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict(run, shared, own, out)?;
-        let (mut shared, mut own) = (shared.to_vec(), own.to_vec());
+        self.predict(run, shared, nuisance, out)?;
+        let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
         let mut below = vec![0.0; out.len()];
-        let free = shared_free.iter().map(|&s| (true, s)).chain(own_free.iter().map(|&s| (false, s)));
+        let free = shared_free.iter().map(|&s| (true, s)).chain(nuisance_free.iter().map(|&s| (false, s)));
         for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(out.len().max(1))) {
-            let info = &self.spec.parameters[if is_shared { self.shared[slot] } else { self.own[slot] }];
-            let value = if is_shared { shared[slot] } else { own[slot] };
+            let info = &self.spec.parameters[if is_shared { self.shared[slot] } else { self.nuisance[slot] }];
+            let value = if is_shared { shared[slot] } else { nuisance[slot] };
             let step = 1e-5 * info.scale.max(1e-3 * value.abs());
             let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
             for (x, target) in [(high, &mut *column), (low, &mut below)] {
-                *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = x;
+                *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = x;
                 let done = if self.is_added(is_shared, slot) {
                     target.fill(0.0);
-                    self.add_others(run, &shared, &own, target)
+                    self.add_others(run, &shared, &nuisance, target)
                 } else {
-                    self.wave_at(run, &shared, &own, target)
+                    self.wave_at(run, &shared, &nuisance, target)
                 };
                 done.map_err(|reason| PredictError { run: run.label.clone(), reason })?;
             }
-            *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = value;
+            *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = value;
             column.iter_mut().zip(&below).for_each(|(d, b)| *d = (*d - b) / (high - low));
         }
         Ok(())
     }
 
-    fn start(&self, run: &Run, own: &mut [f64]) {
+    fn start(&self, run: &Run, nuisance: &mut [f64]) {
         let viscosity = self.spec.parameters[self.places.viscosity.index].start;
         if let Some([a, b]) = first_wave(&self.cylinders[0], viscosity, run) {
-            own[self.places.cos.slot] = a;
-            own[self.places.sin.slot] = b;
+            nuisance[self.places.cos.slot] = a;
+            nuisance[self.places.sin.slot] = b;
         }
     }
 

@@ -58,8 +58,8 @@ pub(super) fn build(
         [1e-12, cylinder.kinematic_viscosity_m2_s(0.9)],
         viscosity,
     );
-    p.cos = b.own(&format!("cos_{suffix}"), unit, ANY, largest);
-    p.sin = b.own(&format!("sin_{suffix}"), unit, ANY, largest);
+    p.cos = b.nuisance(&format!("cos_{suffix}"), unit, ANY, largest);
+    p.sin = b.nuisance(&format!("sin_{suffix}"), unit, ANY, largest);
     let (omega, at_rest) = (cylinder.angular_frequency_rad_s(0, 0.0), 0.02);
     // Liquids near room temperature have 0.015 to 0.073 N/m, liquid metals up to 0.6.
     let strongest = if setup.density_kg_m3 > 5000.0 { 0.7 } else { 0.09 };
@@ -96,10 +96,11 @@ pub(super) fn build(
     );
     // The start says how high the wave is only together with the spring: the change is that of its motion.
     let (cos, sin, frequency) = (p.cos.slot, p.sin.slot, p.frequency.slot);
-    let shift = move |shared: &[f64], own: &[f64]| {
+    let shift = move |shared: &[f64], nuisance: &[f64]| {
         let effects =
             Effects { frequency_change: shared[frequency], largest_amplitude: 1.0, ..Effects::default() };
-        Decay { omega_rad_s: omega, damping_ratio: 0.0, effects }.frequency_shift([own[cos], own[sin]])
+        Decay { omega_rad_s: omega, damping_ratio: 0.0, effects }
+            .frequency_shift([nuisance[cos], nuisance[sin]])
     };
     mechanism.derived_per_run = vec![DerivedPerRun {
         name: "coefficient".into(),
@@ -138,7 +139,7 @@ pub(super) fn build(
         &["contact-line-friction"],
     );
     p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3, 100.0], 1.0 / omega);
-    p.transient = b.own(&format!("transient_{suffix}"), unit, ANY, amplitude);
+    p.transient = b.nuisance(&format!("transient_{suffix}"), unit, ANY, amplitude);
     modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
     let mechanism = b.mechanism(
         "sensor-lag",
@@ -152,7 +153,7 @@ pub(super) fn build(
         &["arm-compliance"],
     );
     mechanism.companions = vec![p.transient.index];
-    mechanism.shapes = vec![p.lag.index];
+    mechanism.shape_parameters = vec![p.lag.index];
     unlagged(&mut b, &p, omega, (unit, suffix));
     (b.spec, p)
 }
@@ -186,8 +187,8 @@ fn modes(
     p.second_omega =
         b.shared("omega_rad_s", "rad/s", cylinder.angular_frequency_rad_s(1, 0.0), [low, high], 0.3);
     p.second_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.5], 0.01);
-    p.second_cos = b.own(&format!("second_cos_{suffix}"), unit, ANY, amplitude);
-    p.second_sin = b.own(&format!("second_sin_{suffix}"), unit, ANY, amplitude);
+    p.second_cos = b.nuisance(&format!("second_cos_{suffix}"), unit, ANY, amplitude);
+    p.second_sin = b.nuisance(&format!("second_sin_{suffix}"), unit, ANY, amplitude);
     let second = b.mechanism(
         "second-mode",
         &[p.second_omega, p.second_damping],
@@ -202,11 +203,11 @@ fn modes(
     second.companions = vec![p.second_cos.index, p.second_sin.index];
     second.derived_per_run =
         vec![amplitude_of(p, [p.second_omega, p.second_cos, p.second_sin], suffix, unit)];
-    second.shapes = vec![p.second_omega.index, p.second_damping.index];
+    second.shape_parameters = vec![p.second_omega.index, p.second_damping.index];
     p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
     p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
-    p.arm_cos = b.own(&format!("arm_cos_{suffix}"), unit, ANY, amplitude);
-    p.arm_sin = b.own(&format!("arm_sin_{suffix}"), unit, ANY, amplitude);
+    p.arm_cos = b.nuisance(&format!("arm_cos_{suffix}"), unit, ANY, amplitude);
+    p.arm_sin = b.nuisance(&format!("arm_sin_{suffix}"), unit, ANY, amplitude);
     let arm = b.mechanism(
         "arm-compliance",
         &[p.arm_omega, p.arm_damping],
@@ -220,7 +221,7 @@ fn modes(
     );
     arm.companions = vec![p.arm_cos.index, p.arm_sin.index];
     arm.derived_per_run = vec![amplitude_of(p, [p.arm_omega, p.arm_cos, p.arm_sin], suffix, unit)];
-    arm.shapes = vec![p.arm_omega.index, p.arm_damping.index];
+    arm.shape_parameters = vec![p.arm_omega.index, p.arm_damping.index];
 }
 
 /// The amplitude at t = 0 of a wave that each run has in two parts. A sensor that lags (its reading has a transient) shows less of it.
@@ -230,9 +231,9 @@ fn amplitude_of(p: &Places, [omega, cos, sin]: [At; 3], suffix: &str, unit: &str
         name: format!("amplitude_{suffix}"),
         unit: unit.into(),
         over: Over::Mean,
-        value: Arc::new(move |shared, own| {
-            let lags = if own[transient] == 0.0 { 0.0 } else { shared[omega] * shared[lag] };
-            own[cos].hypot(own[sin]) * lags.hypot(1.0)
+        value: Arc::new(move |shared, nuisance| {
+            let lags = if nuisance[transient] == 0.0 { 0.0 } else { shared[omega] * shared[lag] };
+            nuisance[cos].hypot(nuisance[sin]) * lags.hypot(1.0)
         }),
     }
 }

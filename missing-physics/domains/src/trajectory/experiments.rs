@@ -21,12 +21,19 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
     for drop in [1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0] {
         if drop <= 2.0 * height {
             let duration = (2.0 * drop / gravity_m_s2).sqrt();
-            let own = match axes {
+            let nuisance = match axes {
                 Axes::Space => vec![0.0, 0.0, drop, 0.0, 0.0, 0.0],
                 _ => vec![drop, 0.0],
             };
             let words = format!("drop it from {drop} m as well, {REPEATS} times");
-            list.push(repeated(recording, vec![("drop_height_m".into(), drop)], words, duration, frame, own));
+            list.push(repeated(
+                recording,
+                vec![("drop_height_m".into(), drop)],
+                words,
+                duration,
+                frame,
+                nuisance,
+            ));
         }
     }
     if axes == Axes::Space {
@@ -44,19 +51,19 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
                 ];
                 let words =
                     format!("throw it at {launch} m/s, {degrees} degrees above level, {REPEATS} times");
-                let own = vec![0.0, 0.0, 1.0, launch * cos, 0.0, launch * sin];
-                list.push(repeated(recording, action, words, duration, frame, own));
+                let nuisance = vec![0.0, 0.0, 1.0, launch * cos, 0.0, launch * sin];
+                list.push(repeated(recording, action, words, duration, frame, nuisance));
             }
         }
     }
     let mut rod = template(recording, vec![0.0, 1.0]);
     rod.kind = ROD;
-    let own = vec![0.0; if axes == Axes::Space { 6 } else { 2 }];
+    let nuisance = vec![0.0; if axes == Axes::Space { 6 } else { 2 }];
     list.push(Experiment {
         action: vec![("known_length_m".into(), 1.0)],
         words: "film an upright rod of exactly 1 m, 10 times, and read its ends".into(),
         runs: vec![rod; 10],
-        own: vec![own; 10],
+        nuisance: vec![nuisance; 10],
     });
     list
 }
@@ -67,12 +74,12 @@ fn repeated(
     words: String,
     duration: f64,
     frame: f64,
-    own: Vec<f64>,
+    nuisance: Vec<f64>,
 ) -> Experiment {
     let frames = ((duration / frame) as usize + 1).clamp(4, MOST_FRAMES);
     let step = frame.max(duration / MOST_FRAMES as f64);
     let run = template(recording, (0..frames).map(|i| i as f64 * step).collect());
-    Experiment { action, words, runs: vec![run; REPEATS], own: vec![own; REPEATS] }
+    Experiment { action, words, runs: vec![run; REPEATS], nuisance: vec![nuisance; REPEATS] }
 }
 
 /// A run with the given times, the recording's last spin and no measurements yet.

@@ -103,7 +103,7 @@ impl Domain for Trajectory {
         let spin = spins.len() == 3;
         let model =
             TrajectoryModel::new(Setup { axes, mass_kg, diameter_m, gravity_m_s2, air_density_kg_m3, spin });
-        let per_run = model.own_count();
+        let per_run = model.nuisance_count();
         let (values, needed) = (labels.len() * columns.len(), runs.len() * per_run + columns.len() + 2);
         if values < needed {
             let rows = needed.div_ceil(columns.len().max(1));

@@ -100,8 +100,8 @@ impl TrajectoryModel {
         self.setup.axes
     }
 
-    /// Number of own parameters of a run.
-    pub fn own_count(&self) -> usize {
+    /// Number of nuisance parameters of a run.
+    pub fn nuisance_count(&self) -> usize {
         self.spec.count(Scope::PerRun)
     }
 }
@@ -111,7 +111,7 @@ impl InDuals for TrajectoryModel {
         &self,
         run: &Run,
         shared: &[T],
-        own: &[T],
+        nuisance: &[T],
         moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String> {
@@ -161,15 +161,20 @@ impl InDuals for TrajectoryModel {
                 }
                 let first = 3 - out.len() / n.max(1);
                 for (c, p) in p.iter().enumerate().skip(first) {
-                    out[(c - first) * n + i] = own[c - first] + scale * *p;
+                    out[(c - first) * n + i] = nuisance[c - first] + scale * *p;
                 }
             }
             return Ok(());
         }
         let start = match self.setup.axes {
-            Axes::Height => State { position: [zero, zero, own[0]], velocity: [zero, zero, own[1]] },
-            Axes::Space => State { position: [own[0], own[1], own[2]], velocity: [own[3], own[4], own[5]] },
-            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, own[1]] },
+            Axes::Height => {
+                State { position: [zero, zero, nuisance[0]], velocity: [zero, zero, nuisance[1]] }
+            }
+            Axes::Space => State {
+                position: [nuisance[0], nuisance[1], nuisance[2]],
+                velocity: [nuisance[3], nuisance[4], nuisance[5]],
+            },
+            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, nuisance[1]] },
         };
         let begin = times.first().copied().unwrap_or(0.0);
         let elapsed: Vec<f64> = times.iter().map(|t| t - begin).collect();
@@ -195,7 +200,7 @@ impl InDuals for TrajectoryModel {
             match self.setup.axes {
                 Axes::Height => out[i] = scale * p[2],
                 // Specific force: what is left of the acceleration once gravity is taken away, plus the sensor's offset.
-                Axes::Accelerometer => out[i] = a[2] + self.setup.gravity_m_s2 + own[0],
+                Axes::Accelerometer => out[i] = a[2] + self.setup.gravity_m_s2 + nuisance[0],
                 Axes::Space => {
                     let p = tilted(p, tilt);
                     for c in 0..3 {
@@ -220,18 +225,24 @@ impl Model for TrajectoryModel {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        self.predict_in(run, shared, own, &[], out)
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.predict_in(run, shared, nuisance, &[], out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
-    fn start(&self, run: &Run, own: &mut [f64]) {
+    fn start(&self, run: &Run, nuisance: &mut [f64]) {
         let Some(times) = run.inputs.first() else { return };
         let begin = times.first().copied().unwrap_or(0.0);
         if self.setup.axes == Axes::Accelerometer {
             let finite = run.outputs[0].iter().filter(|v| v.is_finite());
             let (sum, n) = finite.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-            own[0] = if n > 0.0 { sum / n } else { 0.0 };
+            nuisance[0] = if n > 0.0 { sum / n } else { 0.0 };
             return;
         }
         let channels = run.outputs.len();
@@ -251,8 +262,8 @@ impl Model for TrajectoryModel {
             } else {
                 0.0
             };
-            own[c] = zm - speed * tm;
-            own[channels + c] = speed;
+            nuisance[c] = zm - speed * tm;
+            nuisance[channels + c] = speed;
         }
     }
 
@@ -260,13 +271,13 @@ impl Model for TrajectoryModel {
         &self,
         run: &Run,
         shared: &[f64],
-        own: &[f64],
+        nuisance: &[f64],
         shared_free: &[usize],
-        own_free: &[usize],
+        nuisance_free: &[usize],
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        Asked { run, shared, own, shared_free, own_free }.answer(self, out, jacobian)
+        Asked { run, shared, nuisance, shared_free, nuisance_free }.answer(self, out, jacobian)
     }
 }
 
@@ -304,21 +315,22 @@ mod tests {
             let channels = if axes == Axes::Space { 3 } else { 1 };
             let run = run(channels, spin);
             let n_shared = model.spec().count(Scope::Shared);
-            let own: Vec<f64> = (0..model.own_count()).map(|i| 1.0 + 0.7 * i as f64).collect();
+            let nuisance: Vec<f64> = (0..model.nuisance_count()).map(|i| 1.0 + 0.7 * i as f64).collect();
             for on in [0.0, 1.0] {
                 let shared: Vec<f64> = model.spec().parameters[..n_shared]
                     .iter()
                     .map(|p| (on * 0.3 * p.scale).min(p.upper))
                     .collect();
-                let (sf, of): (Vec<usize>, Vec<usize>) = ((0..n_shared).collect(), (0..own.len()).collect());
+                let (sf, of): (Vec<usize>, Vec<usize>) =
+                    ((0..n_shared).collect(), (0..nuisance.len()).collect());
                 let rows = channels * run.len();
                 let mut out = vec![0.0; rows];
                 let (mut exact, mut rough) =
                     (vec![0.0; rows * (sf.len() + of.len())], vec![0.0; rows * (sf.len() + of.len())]);
-                model.jacobian(&run, &shared, &own, &sf, &of, &mut out, &mut exact).unwrap();
+                model.jacobian(&run, &shared, &nuisance, &sf, &of, &mut out, &mut exact).unwrap();
                 // Steps away from the bound at zero: drags are differenced on one side there.
                 let inner: Vec<f64> = shared.clone();
-                finite_differences(&model, &run, &inner, &own, &sf, &of, &mut out, &mut rough).unwrap();
+                finite_differences(&model, &run, &inner, &nuisance, &sf, &of, &mut out, &mut rough).unwrap();
                 for k in 0..sf.len() + of.len() {
                     let (a, b) = (&exact[k * rows..(k + 1) * rows], &rough[k * rows..(k + 1) * rows]);
                     let size = a.iter().fold(1e-3, |m: f64, v| m.max(v.abs()));
@@ -358,16 +370,16 @@ mod tests {
             outputs: vec![vec![0.0; 2]; 3],
             kind: ROD,
         };
-        let own = [0.3, -0.4, 0.5, 7.0, 7.0, 7.0];
+        let nuisance = [0.3, -0.4, 0.5, 7.0, 7.0, 7.0];
         let mut out = [f64::NAN; 6];
-        model.predict(&rod, &shared, &own, &mut out).unwrap();
+        model.predict(&rod, &shared, &nuisance, &mut out).unwrap();
         // e_z turned by -0.03 about x, then by 0.01 about y.
         let (sx, cx) = (-0.03_f64).sin_cos();
         let (sy, cy) = 0.01_f64.sin_cos();
         let top = [sy * cx, -sx, cy * cx];
         for c in 0..3 {
-            assert!((out[2 * c] - own[c]).abs() < 1e-15, "{out:?}");
-            assert!((out[2 * c + 1] - own[c] - 1.02 * top[c]).abs() < 1e-15, "{out:?}");
+            assert!((out[2 * c] - nuisance[c]).abs() < 1e-15, "{out:?}");
+            assert!((out[2 * c + 1] - nuisance[c] - 1.02 * top[c]).abs() < 1e-15, "{out:?}");
         }
     }
 
@@ -391,10 +403,10 @@ mod tests {
             run.outputs[c].copy_from_slice(&out[12 * c..12 * (c + 1)]);
         }
         run.outputs[1][4] = f64::NAN;
-        let mut own = [0.0; 6];
-        model.start(&run, &mut own);
-        for (a, b) in own.iter().zip(truth) {
-            assert!((a - b).abs() < 1e-9, "{own:?}");
+        let mut nuisance = [0.0; 6];
+        model.start(&run, &mut nuisance);
+        for (a, b) in nuisance.iter().zip(truth) {
+            assert!((a - b).abs() < 1e-9, "{nuisance:?}");
         }
     }
 }

@@ -116,20 +116,20 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
     }
     match setup.axes {
         Axes::Height => {
-            b.b.own("z0_m", "m", ANY, 1.0);
-            b.b.own("vz0_m_s", "m/s", ANY, 1.0);
+            b.b.nuisance("z0_m", "m", ANY, 1.0);
+            b.b.nuisance("vz0_m_s", "m/s", ANY, 1.0);
         }
         Axes::Space => {
             for name in ["x0_m", "y0_m", "z0_m"] {
-                b.b.own(name, "m", ANY, 1.0);
+                b.b.nuisance(name, "m", ANY, 1.0);
             }
             for name in ["vx0_m_s", "vy0_m_s", "vz0_m_s"] {
-                b.b.own(name, "m/s", ANY, 1.0);
+                b.b.nuisance(name, "m/s", ANY, 1.0);
             }
         }
         Axes::Accelerometer => {
-            b.b.own("offset_m_s2", "m/s^2", ANY, 1.0);
-            b.b.own("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
+            b.b.nuisance("offset_m_s2", "m/s^2", ANY, 1.0);
+            b.b.nuisance("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
         }
     }
     (flying.b.spec, flying.roles)

@@ -44,7 +44,7 @@ pub(crate) type Starts = fn(&[Run]) -> Vec<Vec<(usize, f64)>>;
 /// A curve over one variable.
 pub(crate) struct Curve {
     spec: Spec,
-    law: fn(shared: &[f64], own: &[f64], x: f64) -> f64,
+    law: fn(shared: &[f64], nuisance: &[f64], x: f64) -> f64,
     starts: Starts,
 }
 
@@ -70,8 +70,14 @@ impl Model for Curve {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        out.iter_mut().zip(&run.inputs[0]).for_each(|(y, x)| *y = (self.law)(shared, own, *x));
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        out.iter_mut().zip(&run.inputs[0]).for_each(|(y, x)| *y = (self.law)(shared, nuisance, *x));
         Ok(())
     }
 
@@ -105,7 +111,7 @@ impl Ball {
     }
 
     pub(crate) fn in_unit(unit_m: f64) -> Self {
-        let own = |name: &str| {
+        let nuisance = |name: &str| {
             let free = parameter(name, 0.0, [f64::NEG_INFINITY, f64::INFINITY]);
             Parameter { scope: Scope::PerRun, scale: 1.0 / unit_m, ..free }
         };
@@ -116,8 +122,8 @@ impl Ball {
                 shared("rate_per_s", [0.0, 20.0], 0.1),
                 shared("acceleration", [-0.5 / unit_m, 0.5 / unit_m], 0.2 / unit_m),
                 shared("scale", [-0.5, 0.5], 0.01),
-                own("z0"),
-                own("vz0"),
+                nuisance("z0"),
+                nuisance("vz0"),
             ],
             mechanisms: vec![
                 mechanism("linear-drag", vec![0]),
@@ -135,14 +141,20 @@ impl Model for Ball {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         let (r, g) = (shared[0], G / self.unit_m - shared[1]);
         for (z, t) in out.iter_mut().zip(&run.inputs[0]) {
             // (1 - exp(-x)) / x and its next term, by series where x is small.
             let x = r * t;
             let first = if x < 1e-4 { 1.0 - x / 2.0 + x * x / 6.0 } else { -(-x).exp_m1() / x };
             let second = if x < 1e-3 { 0.5 - x / 6.0 + x * x / 24.0 } else { (1.0 - first) / x };
-            *z = (1.0 + shared[2]) * (own[0] + own[1] * t * first - g * t * t * second);
+            *z = (1.0 + shared[2]) * (nuisance[0] + nuisance[1] * t * first - g * t * t * second);
         }
         Ok(())
     }

@@ -51,14 +51,14 @@ fn fit(
     free: &[usize],
     sigma: &[f64],
 ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let own_count = model.own_count();
-    let own_free: Vec<usize> = (0..own_count).collect();
+    let nuisance_count = model.nuisance_count();
+    let nuisance_free: Vec<usize> = (0..nuisance_count).collect();
     let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
-    let mut owns = vec![vec![0.0; own_count]; runs.len()];
-    for (run, own) in runs.iter().zip(&mut owns) {
-        model.start(run, own);
+    let mut nuisances = vec![vec![0.0; nuisance_count]; runs.len()];
+    for (run, nuisance) in runs.iter().zip(&mut nuisances) {
+        model.start(run, nuisance);
     }
-    let size = free.len() + own_count * runs.len();
+    let size = free.len() + nuisance_count * runs.len();
     let mut errors = Vec::new();
     let mut squares = vec![0.0; sigma.len()];
     let rows: usize = runs.iter().map(Run::len).sum();
@@ -68,10 +68,13 @@ fn fit(
         for (r, run) in runs.iter().enumerate() {
             let n = run.len();
             let mut out = vec![0.0; n * sigma.len()];
-            let mut jacobian = vec![0.0; out.len() * (free.len() + own_count)];
-            model.jacobian(run, &shared, &owns[r], free, &own_free, &mut out, &mut jacobian).unwrap();
-            let slots: Vec<usize> =
-                (0..free.len()).chain((0..own_count).map(|i| free.len() + r * own_count + i)).collect();
+            let mut jacobian = vec![0.0; out.len() * (free.len() + nuisance_count)];
+            model
+                .jacobian(run, &shared, &nuisances[r], free, &nuisance_free, &mut out, &mut jacobian)
+                .unwrap();
+            let slots: Vec<usize> = (0..free.len())
+                .chain((0..nuisance_count).map(|i| free.len() + r * nuisance_count + i))
+                .collect();
             for row in 0..out.len() {
                 let sigma = sigma[row / n];
                 let residual = (run.outputs[row / n][row % n] - out[row]) / sigma;
@@ -90,9 +93,9 @@ fn fit(
         for (i, &slot) in free.iter().enumerate() {
             shared[slot] += step[i];
         }
-        for (r, own) in owns.iter_mut().enumerate() {
-            for (i, own) in own.iter_mut().enumerate() {
-                *own += step[free.len() + r * own_count + i];
+        for (r, nuisance) in nuisances.iter_mut().enumerate() {
+            for (i, nuisance) in nuisance.iter_mut().enumerate() {
+                *nuisance += step[free.len() + r * nuisance_count + i];
             }
         }
         errors = (0..free.len()).map(|i| inverse[(i, i)].sqrt()).collect();

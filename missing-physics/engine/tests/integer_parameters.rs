@@ -18,7 +18,7 @@ const ROWS: usize = 30;
 fn step() -> Curve {
     let size = parameter("size", 0.0, [-10.0, 10.0]);
     let row = parameter("row", -1.0, [-1.0, ROWS as f64]);
-    let step = Mechanism { places: vec![1], ..mechanism("step", vec![0, 1]) };
+    let step = Mechanism { integer_parameters: vec![1], ..mechanism("step", vec![0, 1]) };
     Curve::new(vec![size, row], vec![step], |s, _, row| if s[1] >= 0.0 && row >= s[1] { s[0] } else { 0.0 })
         .from(|_| (1..ROWS).map(|row| vec![(1, row as f64)]).collect())
 }

@@ -1,17 +1,17 @@
 //! Which noise a data vector has, of the shapes on the family's lattice.
 
-use super::Bank;
+use super::Linearised;
 
 /// Most moves of a climb at one stride.
 const CLIMB: usize = 8;
 
-impl Bank<'_> {
+impl Linearised<'_> {
     /// The noise of a data vector once the model *and* every mechanism are fitted to it: shape of the family and sigma, by
     /// channel. Where the noise of null worlds is taken from, so that what is tested for does not swell it.
     pub(crate) fn noise_beyond_mechanisms(&self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
         let products = self.products(data);
-        let own: Vec<usize> = (0..self.n_own).collect();
-        let mut shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
+        let nuisance: Vec<usize> = (0..self.n_nuisance).collect();
+        let mut shared: Vec<usize> = (self.n_nuisance..self.n_nuisance + self.n_shared).collect();
         for alternative in &self.alternatives[..self.mechanisms] {
             for column in &alternative.shared {
                 if !shared.contains(column) {
@@ -20,7 +20,7 @@ impl Bank<'_> {
             }
         }
         let start = self.white_start(&products);
-        let (_, noise, _) = self.alternate(&products, &own, &shared, &start, 8);
+        let (_, noise, _) = self.alternate(&products, &nuisance, &shared, &start, 8);
         noise.into_iter().map(|(shape, sigma)| (self.in_play[shape], sigma)).collect()
     }
 

@@ -5,23 +5,27 @@
 
 use nalgebra::DMatrix;
 
-use crate::compare::LOG_RANGE;
-use crate::fit::{Fit, covariance, own_prior_width};
+use crate::fit::gauss_newton::{Fit, covariance, nuisance_prior_width};
 use crate::linalg::{cholesky, dot, forward, log_determinant};
 use crate::problem::{Problem, Selection};
+use crate::selection::compare::LOG_RANGE;
 
-/// Log evidence that the `i`-th free own parameter costs: minus the log of the best normal law's density at the runs' values (with
+/// Log evidence that the `i`-th free nuisance parameter costs: minus the log of the best normal law's density at the runs' values (with
 /// the errors that they have, alone and through the shared parameters), plus what choosing that law costs.
 pub(crate) fn cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: usize) -> f64 {
-    let (slot, widest) = (selection.own[i], own_prior_width(problem, selection, i));
-    let n = fit.own.len();
-    let values: Vec<f64> =
-        fit.own.iter().zip(&problem.own_start).map(|(own, start)| own[slot] - start[slot]).collect();
+    let (slot, widest) = (selection.nuisance[i], nuisance_prior_width(problem, selection, i));
+    let n = fit.nuisance.len();
+    let values: Vec<f64> = fit
+        .nuisance
+        .iter()
+        .zip(&problem.nuisance_start)
+        .map(|(nuisance, start)| nuisance[slot] - start[slot])
+        .collect();
     // What the fit's wide prior has taken already.
     let taken: f64 = values.iter().map(|v| 0.5 * v * v / (widest * widest)).sum();
     let shared = covariance(&fit.information);
     let errors = DMatrix::from_fn(n, n, |r, q| {
-        let (a, b) = (&fit.own_told[r], &fit.own_told[q]);
+        let (a, b) = (&fit.nuisance_errors[r], &fit.nuisance_errors[q]);
         let mut through = 0.0;
         for (j, x) in a.slope[i].iter().enumerate() {
             for (k, y) in b.slope[i].iter().enumerate().filter(|(k, _)| shared[(j, *k)].is_finite()) {

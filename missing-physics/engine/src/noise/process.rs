@@ -237,7 +237,7 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::family::Family;
+    use crate::noise::family::Family;
     use nalgebra::{DMatrix, DVector};
 
     fn covariance(positions: &[f64], step: f64, shape: Shape) -> DMatrix<f64> {

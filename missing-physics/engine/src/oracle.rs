@@ -2,14 +2,14 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-use crate::compare::{candidate, held_out, search};
 use crate::data::Recording;
 use crate::engine::{DiagnoseError, Options, baseline_of};
 use crate::model::Model;
+use crate::selection::compare::{candidate, held_out, search};
 
 /// What the data say of the mechanisms that are truly at work.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct Oracle {
     /// Twice the gain in log likelihood of the true mechanisms over the baseline, each fitted with its own noise.
     pub likelihood_ratio: f64,
     /// Shared parameters that the true mechanisms add.
@@ -27,12 +27,12 @@ pub struct Told {
 ///
 /// # Errors
 /// [`DiagnoseError`]; [`DiagnoseError::Unknown`] for a mechanism that the model has not.
-pub fn told(
+pub fn oracle(
     model: &dyn Model,
     recording: &Recording,
     truth: &[String],
     options: &Options,
-) -> Result<Told, DiagnoseError> {
+) -> Result<Oracle, DiagnoseError> {
     let (problem, rule, baseline) = baseline_of(model, recording, options)?;
     let mut set = Vec::with_capacity(truth.len());
     for id in truth {
@@ -49,13 +49,14 @@ pub fn told(
         Some(found) => found,
         None => candidate(&problem, &competing, &set, &[], &baseline.fit, &[])?,
     };
-    let lacking =
-        |c: &&crate::compare::Candidate| !set.iter().all(|m| c.set.contains(m)) && c.ruled_out.is_none();
+    let lacking = |c: &&crate::selection::compare::Candidate| {
+        !set.iter().all(|m| c.set.contains(m)) && c.ruled_out.is_none()
+    };
     let rival = all.iter().filter(lacking).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
     let likelihood_ratio = 2.0 * (truth.fit.log_likelihood - all[0].fit.log_likelihood);
     let degrees = truth.selection.shared.len() - all[0].selection.shared.len();
     let p_value = ChiSquared::new(degrees.max(1) as f64).map_or(1.0, |law| law.sf(likelihood_ratio.max(0.0)));
-    Ok(Told {
+    Ok(Oracle {
         likelihood_ratio,
         degrees,
         p_value,

@@ -1,4 +1,4 @@
-//! Is a model adequate? A bank of tests with one p-value, calibrated by a parametric bootstrap of the whole fit.
+//! Is a model adequate? Several tests with one p-value, calibrated by a parametric bootstrap of the whole fit.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,13 +6,13 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Gamma, Normal};
 
-use crate::bank::{Bank, Reading};
+use crate::adequacy::linearised::{Linearised, Reading};
 use crate::diagnosis::TestOutcome;
-use crate::fit::{Fit, NoiseRule};
+use crate::fit::gauss_newton::{Fit, NoiseRule};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
-/// What the bank says of a model.
+/// What the tests say of a model.
 #[derive(Debug, Clone)]
 pub(crate) struct Adequacy {
     pub(crate) p_value: f64,
@@ -34,25 +34,25 @@ pub(crate) fn test(
     replicates: usize,
     seed: u64,
 ) -> Result<Adequacy, PredictError> {
-    let mut bank = Bank::new(problem, selection, fit, rivals, rule)?;
+    let mut linearised = Linearised::new(problem, selection, fit, rivals, rule)?;
     let observed = residuals(problem, fit)?;
-    let truth = bank.sharpen(&observed);
+    let truth = linearised.sharpen(&observed);
     // Shapes that such worlds never choose, nor these data under any alternative, need not be tried again for each of them.
     let mut wanted: Vec<usize> = truth.iter().map(|&(shape, _)| shape).chain([0]).collect();
     let pilots: Vec<Reading> = (0..12u64)
         .into_par_iter()
-        .map(|k| bank.read(&draw(problem, &truth, rule, seed ^ 0x5eed, k)))
+        .map(|k| linearised.read(&draw(problem, &truth, rule, seed ^ 0x5eed, k)))
         .collect();
-    for reading in pilots.iter().chain([&bank.read(&observed)]) {
-        wanted.extend(reading.noise.iter().map(|&(s, _)| bank.in_play()[s]));
+    for reading in pilots.iter().chain([&linearised.read(&observed)]) {
+        wanted.extend(reading.noise.iter().map(|&(s, _)| linearised.in_play()[s]));
     }
     wanted.sort_unstable();
     wanted.dedup();
-    bank.play(&wanted);
+    linearised.play(&wanted);
 
     let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
-        let reading = bank.read(data);
-        let white = bank.whitened_residual(data, &reading);
+        let reading = linearised.read(data);
+        let white = linearised.whitened_residual(data, &reading);
         let mut all = reading.gains;
         all.extend(omnibus(problem, &white, rule));
         all
@@ -63,7 +63,7 @@ pub(crate) fn test(
         .map(|k| statistics(&draw(problem, &truth, rule, seed, k)))
         .collect();
     let tails: Vec<Tail> = (0..seen.len()).map(|t| Tail::new(null.iter().map(|row| row[t]))).collect();
-    let directed = bank.mechanisms;
+    let directed = linearised.mechanisms;
     let smallest = |row: &[f64]| {
         let weighted = row.iter().zip(&tails).enumerate().map(|(t, (x, tail))| {
             let weight = if t < directed { 1.0 } else { UNDIRECTED_WEIGHT };
@@ -71,10 +71,10 @@ pub(crate) fn test(
         });
         weighted.fold(f64::INFINITY, f64::min)
     };
-    let own = smallest(&seen);
-    let below = null.iter().filter(|row| smallest(row) <= own).count();
+    let observed_smallest = smallest(&seen);
+    let below = null.iter().filter(|row| smallest(row) <= observed_smallest).count();
     let floor = 1.0 / (replicates as f64 + 1.0);
-    let names = bank.alternatives.iter().map(|a| a.name.clone()).chain(omnibus_names(problem, rule));
+    let names = linearised.alternatives.iter().map(|a| a.name.clone()).chain(omnibus_names(problem, rule));
     let mut tests: Vec<TestOutcome> = names
         .zip(seen.iter().zip(&tails))
         .map(|(name, (&statistic, tail))| TestOutcome { name, statistic, p_value: tail.p(statistic) })
@@ -93,7 +93,7 @@ pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Vec<
         .map(|(run, data)| {
             let n = data.len();
             let mut out = vec![0.0; n * problem.channels()];
-            problem.model.predict(data, &fit.shared, &fit.own[run], &mut out)?;
+            problem.model.predict(data, &fit.shared, &fit.nuisance[run], &mut out)?;
             Ok((0..problem.channels())
                 .map(|c| {
                     problem.rows[run].valid[c].iter().map(|&i| data.outputs[c][i] - out[c * n + i]).collect()
@@ -126,7 +126,7 @@ pub(crate) fn draw(
     let world = stream as usize;
     (0..problem.rows.len())
         .map(|run| {
-            let worlds = problem.model.by_chance(&problem.recording.runs[run]);
+            let worlds = problem.model.null_samples(&problem.recording.runs[run]);
             let copies = worlds.get(world.checked_rem(worlds.len()).unwrap_or(0));
             let copy = copies.and_then(|c| c.get(rng.random_range(0..c.len().max(1))));
             (0..problem.channels())
@@ -229,7 +229,7 @@ fn scan(runs: &[&[f64]]) -> f64 {
 
 /// The upper tail of a statistic's null distribution: a gamma law with its mean and variance, or the normal law that it becomes.
 ///
-/// It only puts the tests of a bank on one scale; the p-value of the whole bank is counted, not read from this law.
+/// It only puts the tests on one scale; the p-value of all of them together is counted, not read from this law.
 enum Tail {
     /// It does not vary.
     Constant,

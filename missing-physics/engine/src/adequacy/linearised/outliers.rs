@@ -6,9 +6,9 @@
 
 use nalgebra::DMatrix;
 
-use super::Bank;
+use super::Linearised;
 use crate::linalg::{RANK_FLOOR, cholesky, cholesky_against, dot, forward};
-use crate::noise::median;
+use crate::noise::process::median;
 
 /// Rows after which the whitened image of a single row's shift has died away.
 const REACH: usize = 256;
@@ -17,18 +17,18 @@ const FREEDOM: f64 = 0.05;
 /// A channel with fewer measured rows has no scale of its own to judge a row by.
 const FEWEST_ROWS: usize = 24;
 
-/// A run's own columns eliminated: Cholesky factor, kept pivots, forward-solved borders.
+/// A run's nuisance columns eliminated: Cholesky factor, kept pivots, forward-solved borders.
 type Eliminated = (DMatrix<f64>, Vec<bool>, Vec<Vec<f64>>);
 
-impl Bank<'_> {
+impl Linearised<'_> {
     /// How far each row lies from what all the other rows say of it, in robust sigmas; `[run][channel]`, measured rows.
     pub(crate) fn row_scores(&self, data: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
-        let (own, shared) = self.with_mechanisms();
+        let (nuisance, shared) = self.with_mechanisms();
         let products = self.products(data);
         let start = self.white_start(&products);
-        let (_, noise, coefficients) = self.alternate(&products, &own, &shared, &start, 8);
-        let ids: Vec<usize> = own.iter().chain(&shared).copied().collect();
-        let (q, s) = (own.len(), shared.len());
+        let (_, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
+        let ids: Vec<usize> = nuisance.iter().chain(&shared).copied().collect();
+        let (q, s) = (nuisance.len(), shared.len());
         let mut information = DMatrix::zeros(s, s);
         let parts: Vec<Eliminated> = self
             .blocks
@@ -114,12 +114,12 @@ impl Bank<'_> {
         scores.into_iter().map(|row| row.into_iter().zip(&scale).map(judged).collect()).collect()
     }
 
-    /// The columns of the model with every mechanism switched on: own and shared.
+    /// The columns of the model with every mechanism switched on: nuisance and shared.
     fn with_mechanisms(&self) -> (Vec<usize>, Vec<usize>) {
-        let mut own: Vec<usize> = (0..self.n_own).collect();
-        let mut shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
+        let mut nuisance: Vec<usize> = (0..self.n_nuisance).collect();
+        let mut shared: Vec<usize> = (self.n_nuisance..self.n_nuisance + self.n_shared).collect();
         for alternative in &self.alternatives[..self.mechanisms] {
-            for (list, more) in [(&mut own, &alternative.own), (&mut shared, &alternative.shared)] {
+            for (list, more) in [(&mut nuisance, &alternative.nuisance), (&mut shared, &alternative.shared)] {
                 more.iter().for_each(|c| {
                     if !list.contains(c) {
                         list.push(*c);
@@ -127,6 +127,6 @@ impl Bank<'_> {
                 });
             }
         }
-        (own, shared)
+        (nuisance, shared)
     }
 }

@@ -32,12 +32,12 @@ impl Model for Steps {
         &self.spec
     }
 
-    fn predict(&self, run: &Run, _: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
-        out.iter_mut().zip(sums(own[0], run.inputs[0].iter().copied())).for_each(|(y, sum)| *y = sum);
+    fn predict(&self, run: &Run, _: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        out.iter_mut().zip(sums(nuisance[0], run.inputs[0].iter().copied())).for_each(|(y, sum)| *y = sum);
         Ok(())
     }
 
-    fn departing(
+    fn perturbation_response(
         &self,
         runs: &[Run],
         _: &[f64],

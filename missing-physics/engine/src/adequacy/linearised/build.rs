@@ -1,37 +1,37 @@
 //! Linearises a model around a fit: the columns of its plane, and of the directions in which it might be wrong.
 
-use super::{Alternative, Bank, Block, Curves, DEGREE};
-use crate::fit::{Fit, NoiseRule, NoiseState, whitened_columns};
+use super::{Alternative, Block, Curves, DEGREE, Linearised};
+use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, whitened_columns};
 use crate::linalg::{determined, dot};
 use crate::model::{Mechanism, PredictError, Scope};
 use crate::problem::{Problem, Selection};
 
-/// Everything that the model or any rival frees, and where its columns stand in a block: own of the model, shared of the model, own
+/// Everything that the model or any rival frees, and where its columns stand in a block: nuisance of the model, shared of the model, nuisance
 /// of rivals, shared of rivals, polynomials.
 struct Layout {
     wide: Selection,
-    n_own: usize,
+    n_nuisance: usize,
     n_shared: usize,
 }
 
 impl Layout {
-    fn own(&self, i: usize) -> usize {
-        if i < self.n_own { i } else { self.n_shared + i }
+    fn nuisance(&self, i: usize) -> usize {
+        if i < self.n_nuisance { i } else { self.n_shared + i }
     }
 
     fn shared(&self, i: usize) -> usize {
-        if i < self.n_shared { self.n_own + i } else { self.wide.own.len() + i }
+        if i < self.n_shared { self.n_nuisance + i } else { self.wide.nuisance.len() + i }
     }
 
     /// Where the polynomials begin.
     fn base(&self) -> usize {
-        self.wide.own.len() + self.wide.shared.len()
+        self.wide.nuisance.len() + self.wide.shared.len()
     }
 }
 
-/// What a mechanism frees beyond the model: places among the own and the shared parameters of all, and the sign of its strength.
+/// What a mechanism frees beyond the model: places among the nuisance and the shared parameters of all, and the sign of its strength.
 struct Freed {
-    own: Vec<usize>,
+    nuisance: Vec<usize>,
     shared: Vec<usize>,
     sign: f64,
 }
@@ -39,13 +39,13 @@ struct Freed {
 /// Adds what a mechanism frees to `wide`.
 fn freed(problem: &Problem<'_>, selection: &Selection, wide: &mut Selection, mechanism: &Mechanism) -> Freed {
     let spec = problem.spec();
-    let mut freed = Freed { own: Vec::new(), shared: Vec::new(), sign: 0.0 };
+    let mut freed = Freed { nuisance: Vec::new(), shared: Vec::new(), sign: 0.0 };
     for &p in mechanism.parameters.iter().chain(&mechanism.companions) {
         let (slot, info) = (problem.slots[p], &spec.parameters[p]);
         let (list, target, of_model) = if info.scope == Scope::Shared {
             (&mut wide.shared, &mut freed.shared, &selection.shared)
         } else {
-            (&mut wide.own, &mut freed.own, &selection.own)
+            (&mut wide.nuisance, &mut freed.nuisance, &selection.nuisance)
         };
         let at = list.iter().position(|&s| s == slot).unwrap_or_else(|| {
             list.push(slot);
@@ -62,7 +62,7 @@ fn freed(problem: &Problem<'_>, selection: &Selection, wide: &mut Selection, mec
             0.0
         };
     }
-    if freed.shared.len() != 1 || !freed.own.is_empty() {
+    if freed.shared.len() != 1 || !freed.nuisance.is_empty() {
         freed.sign = 0.0;
     }
     freed
@@ -77,12 +77,12 @@ fn mechanisms(problem: &Problem<'_>, selection: &Selection, rivals: &[usize]) ->
             let mechanism = &problem.spec().mechanisms[m];
             (mechanism.id.clone(), freed(problem, selection, &mut wide, mechanism))
         })
-        .filter(|(_, freed)| !(freed.own.is_empty() && freed.shared.is_empty()))
+        .filter(|(_, freed)| !(freed.nuisance.is_empty() && freed.shared.is_empty()))
         .collect();
-    let layout = Layout { wide, n_own: selection.own.len(), n_shared: selection.shared.len() };
+    let layout = Layout { wide, n_nuisance: selection.nuisance.len(), n_shared: selection.shared.len() };
     let placed = |(name, freed): (String, Freed)| Alternative {
         name,
-        own: freed.own.into_iter().map(|i| layout.own(i)).collect(),
+        nuisance: freed.nuisance.into_iter().map(|i| layout.nuisance(i)).collect(),
         shared: freed.shared.into_iter().map(|i| layout.shared(i)).collect(),
         sign: freed.sign,
     };
@@ -101,7 +101,7 @@ fn smooth<'a>(
             let first = base + (curves.offset(channel) + k) * DEGREE;
             Alternative {
                 name: format!("{} depends on {name}", quantity.name),
-                own: Vec::new(),
+                nuisance: Vec::new(),
                 shared: (first..first + DEGREE).collect(),
                 sign: 0.0,
             }
@@ -118,33 +118,34 @@ fn blocks(
     run: usize,
 ) -> Result<Vec<Block>, PredictError> {
     let unit = NoiseState { shape: vec![0; problem.channels()], sigma: vec![1.0; problem.channels()] };
-    let Layout { wide, n_own, .. } = layout;
-    let columns = whitened_columns(problem, wide, &unit, run, &fit.shared, &fit.own[run])?;
+    let Layout { wide, n_nuisance, .. } = layout;
+    let columns = whitened_columns(problem, wide, &unit, run, &fit.shared, &fit.nuisance[run])?;
     let mut start = 0;
     let mut row = Vec::with_capacity(problem.channels());
     for channel in 0..problem.channels() {
         let n = problem.rows[run].valid[channel].len();
         let mut raw = vec![vec![0.0; n]; layout.base() + curves.total() * DEGREE];
-        for i in 0..wide.own.len() {
-            raw[layout.own(i)].copy_from_slice(&columns[i][start..start + n]);
+        for i in 0..wide.nuisance.len() {
+            raw[layout.nuisance(i)].copy_from_slice(&columns[i][start..start + n]);
         }
         for i in 0..wide.shared.len() {
-            raw[layout.shared(i)].copy_from_slice(&columns[wide.own.len() + i][start..start + n]);
+            raw[layout.shared(i)].copy_from_slice(&columns[wide.nuisance.len() + i][start..start + n]);
         }
         curves.fill(problem, run, channel, &mut raw[layout.base()..]);
         start += n;
         row.push(Block { raw, mine: Vec::new(), shapes: Vec::new() });
     }
     let squares: Vec<Vec<f64>> =
-        row.iter().map(|b| b.raw[..*n_own].iter().map(|c| dot(c, c)).collect()).collect();
-    let largest: Vec<f64> = (0..*n_own).map(|k| squares.iter().map(|s| s[k]).fold(0.0, f64::max)).collect();
+        row.iter().map(|b| b.raw[..*n_nuisance].iter().map(|c| dot(c, c)).collect()).collect();
+    let largest: Vec<f64> =
+        (0..*n_nuisance).map(|k| squares.iter().map(|s| s[k]).fold(0.0, f64::max)).collect();
     for (block, here) in row.iter_mut().zip(&squares) {
         block.mine = determined(here, &largest);
     }
     Ok(row)
 }
 
-impl<'a> Bank<'a> {
+impl<'a> Linearised<'a> {
     /// Linearises around `fit`; the mechanisms in `rivals` become alternatives beside smooth functions of each variable.
     pub(crate) fn new(
         problem: &'a Problem<'a>,
@@ -160,7 +161,7 @@ impl<'a> Bank<'a> {
         let blocks: Vec<Vec<Block>> = (0..problem.rows.len())
             .map(|run| blocks(problem, fit, &layout, &curves, run))
             .collect::<Result<_, _>>()?;
-        let Layout { n_own, n_shared, .. } = layout;
+        let Layout { n_nuisance, n_shared, .. } = layout;
         let counted: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let freedom = (0..problem.channels())
             .map(|c| {
@@ -171,9 +172,9 @@ impl<'a> Bank<'a> {
             .collect();
         let rule = rule.clone();
         let in_play = Vec::new();
-        let mut bank =
-            Self { problem, in_play, blocks, n_own, n_shared, alternatives, mechanisms, rule, freedom };
-        bank.play(&bank.rule.allowed.clone());
-        Ok(bank)
+        let mut linearised =
+            Self { problem, in_play, blocks, n_nuisance, n_shared, alternatives, mechanisms, rule, freedom };
+        linearised.play(&linearised.rule.allowed.clone());
+        Ok(linearised)
     }
 }

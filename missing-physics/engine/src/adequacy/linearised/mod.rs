@@ -13,7 +13,7 @@ mod solve;
 
 use nalgebra::DMatrix;
 
-use crate::fit::NoiseRule;
+use crate::fit::gauss_newton::NoiseRule;
 use crate::linalg::{cholesky, forward, gram, log_determinant};
 use crate::problem::Problem;
 pub(crate) use curves::Curves;
@@ -22,22 +22,22 @@ pub(crate) use curves::Curves;
 #[derive(Debug, Clone)]
 pub(crate) struct Alternative {
     pub(crate) name: String,
-    /// Columns added to each run's own ones.
-    own: Vec<usize>,
+    /// Columns added to each run's nuisance ones.
+    nuisance: Vec<usize>,
     /// Columns added to the shared ones.
     shared: Vec<usize>,
     /// For a single shared column: the sign that its coefficient must have (0: either).
     sign: f64,
 }
 
-/// Degree of the polynomial in a variable that the bank looks for.
+/// Degree of the polynomial in a variable that the adequacy test looks for.
 pub(crate) const DEGREE: usize = 5;
 
 /// One run and channel: whitened columns for each shape that is in play.
 struct Block {
     /// Raw (unwhitened) columns over the measured rows.
     raw: Vec<Vec<f64>>,
-    /// The model's own columns that this channel determines.
+    /// The model's nuisance columns that this channel determines.
     mine: Vec<usize>,
     /// Per shape in play: whitened columns and their Gram matrix.
     shapes: Vec<Whitened>,
@@ -46,21 +46,21 @@ struct Block {
 struct Whitened {
     columns: Vec<Vec<f64>>,
     gram: DMatrix<f64>,
-    /// The own columns' Cholesky factor and kept pivots.
-    own: (DMatrix<f64>, Vec<bool>),
-    /// The own columns' share of every other column: forward-solved products.
+    /// The nuisance columns' Cholesky factor and kept pivots.
+    nuisance: (DMatrix<f64>, Vec<bool>),
+    /// The nuisance columns' share of every other column: forward-solved products.
     borders: Vec<Vec<f64>>,
-    /// Log determinant of the noise and of the own columns.
+    /// Log determinant of the noise and of the nuisance columns.
     log_determinant: f64,
 }
 
 /// The linearised model.
-pub(crate) struct Bank<'a> {
+pub(crate) struct Linearised<'a> {
     problem: &'a Problem<'a>,
     /// Index into the family for each shape in play.
     in_play: Vec<usize>,
     blocks: Vec<Vec<Block>>,
-    n_own: usize,
+    n_nuisance: usize,
     n_shared: usize,
     pub(crate) alternatives: Vec<Alternative>,
     /// How many of the alternatives, the first ones, are mechanisms.
@@ -74,9 +74,9 @@ pub(crate) struct Bank<'a> {
 struct Product {
     /// With each column.
     with: Vec<f64>,
-    /// The own columns' share, forward-solved.
-    own: Vec<f64>,
-    /// Sum of squares that the own columns leave.
+    /// The nuisance columns' share, forward-solved.
+    nuisance: Vec<f64>,
+    /// Sum of squares that the nuisance columns leave.
     left: f64,
     /// Sum of squares.
     total: f64,
@@ -96,11 +96,11 @@ pub(crate) struct Reading {
     pub(crate) gains: Vec<f64>,
     /// Noise of the model alone: shape in play and sigma, by channel.
     pub(crate) noise: Vec<(usize, f64)>,
-    /// Coefficients of the model alone, by run: own, then shared.
+    /// Coefficients of the model alone, by run: nuisance, then shared.
     coefficients: Vec<Vec<f64>>,
 }
 
-impl Bank<'_> {
+impl Linearised<'_> {
     /// Puts the given shapes of the family in play, and no others.
     pub(crate) fn play(&mut self, shapes: &[usize]) {
         self.in_play = shapes.to_vec();
@@ -114,19 +114,19 @@ impl Bank<'_> {
                         let mut columns = block.raw.clone();
                         columns.iter_mut().for_each(|c| whitener.whiten(c));
                         let gram = gram(&columns);
-                        let mut own = DMatrix::from_fn(block.mine.len(), block.mine.len(), |i, j| {
+                        let mut nuisance = DMatrix::from_fn(block.mine.len(), block.mine.len(), |i, j| {
                             gram[(block.mine[i], block.mine[j])]
                         });
-                        let kept = cholesky(&mut own, 1e-9);
-                        let log_determinant = whitener.log_determinant + log_determinant(&own, &kept);
+                        let kept = cholesky(&mut nuisance, 1e-9);
+                        let log_determinant = whitener.log_determinant + log_determinant(&nuisance, &kept);
                         let borders = (0..columns.len())
                             .map(|j| {
                                 let mut border: Vec<f64> = block.mine.iter().map(|&i| gram[(i, j)]).collect();
-                                forward(&own, &kept, &mut border);
+                                forward(&nuisance, &kept, &mut border);
                                 border
                             })
                             .collect();
-                        Whitened { gram, own: (own, kept), borders, columns, log_determinant }
+                        Whitened { gram, nuisance: (nuisance, kept), borders, columns, log_determinant }
                     })
                     .collect();
             }
@@ -146,25 +146,25 @@ impl Bank<'_> {
     /// Fits the model and every alternative to a data vector (`[run][channel]`, measured rows).
     pub(crate) fn read(&self, data: &[Vec<Vec<f64>>]) -> Reading {
         let products = self.products(data);
-        let own: Vec<usize> = (0..self.n_own).collect();
-        let shared: Vec<usize> = (self.n_own..self.n_own + self.n_shared).collect();
+        let nuisance: Vec<usize> = (0..self.n_nuisance).collect();
+        let shared: Vec<usize> = (self.n_nuisance..self.n_nuisance + self.n_shared).collect();
         let start = self.white_start(&products);
-        let (score, noise, coefficients) = self.alternate(&products, &own, &shared, &start, 8);
-        let plain = (own.clone(), shared.clone());
+        let (score, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
+        let plain = (nuisance.clone(), shared.clone());
         let gains = self
             .alternatives
             .iter()
             .map(|alternative| {
-                let own: Vec<usize> = own.iter().chain(&alternative.own).copied().collect();
+                let nuisance: Vec<usize> = nuisance.iter().chain(&alternative.nuisance).copied().collect();
                 let shared: Vec<usize> = shared.iter().chain(&alternative.shared).copied().collect();
-                let (_, beside, _) = self.alternate(&products, &own, &shared, &noise, 4);
-                let x = self.solve(&products, &beside, &own, &shared);
+                let (_, beside, _) = self.alternate(&products, &nuisance, &shared, &noise, 4);
+                let x = self.solve(&products, &beside, &nuisance, &shared);
                 let wrong = alternative.sign != 0.0
                     && x.first().and_then(|x| x.last()).is_some_and(|value| value * alternative.sign < 0.0);
                 if wrong {
                     return 0.0;
                 }
-                let with = self.chi2(&products, &beside, &own, &shared, &x);
+                let with = self.chi2(&products, &beside, &nuisance, &shared, &x);
                 let without = self.solve(&products, &beside, &plain.0, &plain.1);
                 (self.chi2(&products, &beside, &plain.0, &plain.1, &without) - with).max(0.0)
             })
@@ -174,7 +174,7 @@ impl Bank<'_> {
 
     /// The whitened residual of a data vector under the model alone, `[run][channel]`.
     pub(crate) fn whitened_residual(&self, data: &[Vec<Vec<f64>>], reading: &Reading) -> Vec<Vec<Vec<f64>>> {
-        let used = self.n_own + self.n_shared;
+        let used = self.n_nuisance + self.n_shared;
         data.iter()
             .enumerate()
             .map(|(run, row)| {

@@ -1,12 +1,12 @@
 //! Wild readings: set aside before anything is judged, and listed.
 
-use crate::adequacy::residuals;
-use crate::bank::Bank;
+use crate::adequacy::linearised::Linearised;
+use crate::adequacy::test::residuals;
 use crate::data::Recording;
 use crate::diagnosis::Outlier;
-use crate::fit::fit;
+use crate::fit::gauss_newton::fit;
 use crate::model::PredictError;
-use crate::noise_rule::noise_rule;
+use crate::noise::rule::noise_rule;
 use crate::problem::Problem;
 
 /// A row further than this many robust sigmas from what all other rows say of it is wild.
@@ -65,10 +65,10 @@ struct Wild {
 fn wild_rows(problem: &Problem<'_>) -> Result<Vec<Wild>, PredictError> {
     let rule = noise_rule(problem);
     let selection = problem.select(&[], &[]);
-    let start = fit(problem, &selection, &rule, (&problem.shared.start, &problem.own_start), None)?;
+    let start = fit(problem, &selection, &rule, (&problem.shared.start, &problem.nuisance_start), None)?;
     let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
-    let bank = Bank::new(problem, &selection, &start, &everything, &rule)?;
-    let scores = bank.row_scores(&residuals(problem, &start)?);
+    let linearised = Linearised::new(problem, &selection, &start, &everything, &rule)?;
+    let scores = linearised.row_scores(&residuals(problem, &start)?);
     let mut found = Vec::new();
     for channel in 0..problem.channels() {
         let all: usize = problem.count(channel);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::fit::NoiseRule;
+use crate::fit::gauss_newton::NoiseRule;
 use crate::problem::Problem;
 
 /// Relative standard error of a calibrated sigma.

@@ -1,7 +1,7 @@
 //! Smooth functions of the inputs and of the prediction itself: what a residual may depend on when nothing is known.
 
 use super::DEGREE;
-use crate::fit::Fit;
+use crate::fit::gauss_newton::Fit;
 use crate::model::PredictError;
 use crate::problem::Problem;
 
@@ -26,7 +26,7 @@ impl Curves {
         for (run, data) in recording.runs.iter().enumerate() {
             let n = data.len();
             let mut out = vec![0.0; n * problem.channels()];
-            problem.model.predict(data, &fit.shared, &fit.own[run], &mut out)?;
+            problem.model.predict(data, &fit.shared, &fit.nuisance[run], &mut out)?;
             for (c, p) in predictions.iter_mut().enumerate() {
                 p.push(out[c * n..(c + 1) * n].to_vec());
             }

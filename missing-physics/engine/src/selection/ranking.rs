@@ -3,10 +3,10 @@
 
 use rayon::prelude::*;
 
-use crate::adequacy::Adequacy;
-use crate::compare::{Candidate, HeldOut, held_out, nested};
+use crate::adequacy::test::Adequacy;
 use crate::model::PredictError;
 use crate::problem::Problem;
+use crate::selection::compare::{Candidate, HeldOut, held_out, nested};
 
 /// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
 const RIVAL_GAP: f64 = 3.0;
@@ -124,7 +124,7 @@ impl Ranking {
     /// Is one a part of the other with fewer unknowns, and hardly less likely?
     fn simpler(&self, small: usize, large: usize) -> bool {
         let [small, large] = [small, large].map(|i| &self.all[i]);
-        let unknowns = |c: &Candidate| c.selection.shared.len() + c.selection.own.len();
+        let unknowns = |c: &Candidate| c.selection.shared.len() + c.selection.nuisance.len();
         unknowns(small) < unknowns(large) && nested(small, large) && small.evidence > large.evidence - EARNED
     }
 

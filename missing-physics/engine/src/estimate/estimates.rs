@@ -5,11 +5,11 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
-use crate::compare::Candidate;
 use crate::diagnosis::Estimate;
-use crate::fit::{Fit, NoiseRule, NoiseState, covariance, open_shapes, solve};
+use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, covariance, open_shapes, solve};
 use crate::model::{Derived, DerivedPerRun, Mechanism, Over, PredictError, Scope};
 use crate::problem::{Problem, Selection};
+use crate::selection::compare::Candidate;
 
 /// The quantile at which two-sided 95 % intervals end.
 const END: f64 = 0.975;
@@ -26,7 +26,7 @@ fn reach(problem: &Problem<'_>, selection: &Selection, rule: &NoiseRule) -> f64 
     if sized == 0.0 {
         return Z95;
     }
-    let unknowns = (selection.shared.len() + selection.own.len() * problem.rows.len()) as f64;
+    let unknowns = (selection.shared.len() + selection.nuisance.len() * problem.rows.len()) as f64;
     student(sized - unknowns * sized / (sized + fixed))
 }
 
@@ -44,8 +44,8 @@ pub(crate) fn of_mechanism(
     profile: bool,
 ) -> Vec<Estimate> {
     let mut all = estimates(problem, candidate, &mechanism.parameters, &mechanism.derived, rule, profile);
-    for other in &candidate.elsewhere {
-        let other = Candidate { fit: other.clone(), elsewhere: Vec::new(), ..candidate.clone() };
+    for other in &candidate.alternative_modes {
+        let other = Candidate { fit: other.clone(), alternative_modes: Vec::new(), ..candidate.clone() };
         let there = estimates(problem, &other, &mechanism.parameters, &mechanism.derived, rule, profile);
         all.iter_mut().zip(&there).for_each(|(estimate, there)| estimate.reach(there));
     }
@@ -67,7 +67,7 @@ pub(crate) fn with_open_noise(
     let chosen = covariance(&fit.information);
     let mut total = chosen.clone();
     let over = |noise: &NoiseState| -> Result<DMatrix<f64>, PredictError> {
-        let there = solve(problem, selection, noise, &fit.shared, &fit.own)?;
+        let there = solve(problem, selection, noise, &fit.shared, &fit.nuisance)?;
         let moved = |i: usize| there.shared[selection.shared[i]] - fit.shared[selection.shared[i]];
         let by = DMatrix::from_fn(n, n, |i, j| moved(i) * moved(j));
         Ok(covariance(&there.information) + by)
@@ -117,13 +117,13 @@ pub(crate) fn estimates(
             let info = &spec.parameters[p];
             let slot = problem.slots[p];
             if info.scope == Scope::PerRun {
-                let own = DerivedPerRun {
+                let nuisance = DerivedPerRun {
                     name: info.name.clone(),
                     unit: info.unit.clone(),
                     over: Over::Mean,
-                    value: Arc::new(move |_, own: &[f64]| own[slot]),
+                    value: Arc::new(move |_, nuisance: &[f64]| nuisance[slot]),
                 };
-                return over_runs(candidate, &own, reach);
+                return over_runs(candidate, &nuisance, reach);
             }
             let value = candidate.fit.shared[slot];
             let mut ci95 = [f64::NAN; 2];
@@ -187,33 +187,37 @@ fn slopes(slots: &[usize], at: &[f64], errors: &[f64], value: &dyn Fn(&[f64]) ->
 
 /// The variance of a sum of parameters with the given weights, those that are not determined left out.
 fn quadratic(weights: &[f64], covariance: &DMatrix<f64>) -> f64 {
-    let told = |i: &usize| covariance[(*i, *i)].is_finite();
-    let told: Vec<usize> = (0..weights.len()).filter(told).collect();
-    told.iter()
-        .flat_map(|&i| told.iter().map(move |&j| (i, j)))
+    let determined = |i: &usize| covariance[(*i, *i)].is_finite();
+    let determined: Vec<usize> = (0..weights.len()).filter(determined).collect();
+    determined
+        .iter()
+        .flat_map(|&i| determined.iter().map(move |&j| (i, j)))
         .map(|(i, j)| weights[i] * weights[j] * covariance[(i, j)])
         .sum()
 }
 
-/// A value that each run has of its own, over the runs, with what the errors of the runs' own and of the shared parameters make of it,
+/// A value that each run has of its own, over the runs, with what the errors of the runs' nuisance and of the shared parameters make of it,
 /// and with what the runs differ beyond those (DerSimonian and Laird 1986, doi:10.1016/0197-2456(86)90046-2).
 fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun, reach: f64) -> Estimate {
     let (fit, selection) = (&candidate.fit, &candidate.selection);
     let covariance = covariance(&fit.information);
     let shared_errors = errors(&covariance);
-    let mut values = Vec::with_capacity(fit.own.len());
-    let mut own_variances = Vec::with_capacity(fit.own.len());
-    let mut by_shared = Vec::with_capacity(fit.own.len());
-    for (own, told) in fit.own.iter().zip(&fit.own_told) {
-        let by_own = slopes(&selection.own, own, &told.error, &|own| (quantity.value)(&fit.shared, own));
-        let mut along =
-            slopes(&selection.shared, &fit.shared, &shared_errors, &|shared| (quantity.value)(shared, own));
-        for (slope, moved) in by_own.iter().zip(&told.slope) {
+    let mut values = Vec::with_capacity(fit.nuisance.len());
+    let mut nuisance_variances = Vec::with_capacity(fit.nuisance.len());
+    let mut by_shared = Vec::with_capacity(fit.nuisance.len());
+    for (nuisance, errors) in fit.nuisance.iter().zip(&fit.nuisance_errors) {
+        let by_nuisance = slopes(&selection.nuisance, nuisance, &errors.error, &|nuisance| {
+            (quantity.value)(&fit.shared, nuisance)
+        });
+        let mut along = slopes(&selection.shared, &fit.shared, &shared_errors, &|shared| {
+            (quantity.value)(shared, nuisance)
+        });
+        for (slope, moved) in by_nuisance.iter().zip(&errors.slope) {
             along.iter_mut().zip(moved).for_each(|(a, m)| *a += slope * m);
         }
-        let told = by_own.iter().zip(&told.error).filter(|(_, e)| e.is_finite());
-        values.push((quantity.value)(&fit.shared, own));
-        own_variances.push(told.map(|(s, e)| (s * e).powi(2)).sum::<f64>());
+        let determined = by_nuisance.iter().zip(&errors.error).filter(|(_, e)| e.is_finite());
+        values.push((quantity.value)(&fit.shared, nuisance));
+        nuisance_variances.push(determined.map(|(s, e)| (s * e).powi(2)).sum::<f64>());
         by_shared.push(along);
     }
     let (value, half) = match quantity.over {
@@ -223,16 +227,17 @@ fn over_runs(candidate: &Candidate, quantity: &DerivedPerRun, reach: f64) -> Est
             let along: Vec<f64> = (0..selection.shared.len())
                 .map(|k| by_shared.iter().map(|run| run[k]).sum::<f64>() / n)
                 .collect();
-            let differ = between(&values, &own_variances);
-            let told = own_variances.iter().sum::<f64>() / (n * n) + quadratic(&along, &covariance);
+            let differ = between(&values, &nuisance_variances);
+            let determined =
+                nuisance_variances.iter().sum::<f64>() / (n * n) + quadratic(&along, &covariance);
             // What the runs differ by is known from the runs alone (Hartung and Knapp 2001, doi:10.1002/sim.791).
-            (mean, (reach * reach * told.max(0.0) + student(n - 1.0).powi(2) * differ / n).sqrt())
+            (mean, (reach * reach * determined.max(0.0) + student(n - 1.0).powi(2) * differ / n).sqrt())
         }
         Over::Largest => {
             let largest = (0..values.len()).max_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs()));
             largest.map_or((f64::NAN, f64::NAN), |run| {
-                let told = own_variances[run] + quadratic(&by_shared[run], &covariance);
-                (values[run], reach * told.max(0.0).sqrt())
+                let determined = nuisance_variances[run] + quadratic(&by_shared[run], &covariance);
+                (values[run], reach * determined.max(0.0).sqrt())
             })
         }
     };
@@ -285,15 +290,15 @@ impl<'a> Profile<'a> {
     fn at(&self, value: f64) -> Option<Fit> {
         let mut shared = self.fit.shared.clone();
         shared[self.slot] = value;
-        solve(self.problem, &self.others, &self.fit.noise, &shared, &self.fit.own).ok()
+        solve(self.problem, &self.others, &self.fit.noise, &shared, &self.fit.nuisance).ok()
     }
 
     /// By how much a standard error is wider than that of the fit's own noise.
     fn wider(&self, error: f64) -> f64 {
         let at = self.all.shared.iter().position(|&slot| slot == self.slot);
-        let there = solve(self.problem, self.all, &self.fit.noise, &self.fit.shared, &self.fit.own).ok();
-        let own = at.zip(there).map_or(f64::NAN, |(i, fit)| covariance(&fit.information)[(i, i)].sqrt());
-        if own > 0.0 && own.is_finite() { error / own } else { 1.0 }
+        let there = solve(self.problem, self.all, &self.fit.noise, &self.fit.shared, &self.fit.nuisance).ok();
+        let fitted = at.zip(there).map_or(f64::NAN, |(i, fit)| covariance(&fit.information)[(i, i)].sqrt());
+        if fitted > 0.0 && fitted.is_finite() { error / fitted } else { 1.0 }
     }
 
     /// By how much the sum of squares is higher at a value than at the estimate.
@@ -305,7 +310,7 @@ impl<'a> Profile<'a> {
     /// at the value is `most` or more.
     fn top_from(&self, value: f64, most: f64) -> Option<Fit> {
         let near = self.at(value).filter(|f| f.chi2 < most)?;
-        solve(self.problem, self.all, &near.noise, &near.shared, &near.own).ok()
+        solve(self.problem, self.all, &near.noise, &near.shared, &near.nuisance).ok()
     }
 
     fn bound(&self, side: f64) -> f64 {

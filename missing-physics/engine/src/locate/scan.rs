@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::departure::{self, Departure, Left};
 use crate::diagnosis::Location;
-use crate::fit::{Fit, NoiseState, whitened_columns};
-use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward, own_given};
+use crate::fit::gauss_newton::{Fit, NoiseState, whitened_columns};
+use crate::linalg::{RANK_FLOOR, back_substitute, backward, cholesky, dot, forward};
+use crate::locate::departure::{self, Departure, Left};
 use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
@@ -19,11 +19,11 @@ const EARLIER: f64 = 1.2;
 const SMOOTH: usize = 3;
 
 /// What `rows` gain by a variance of their own, at which they miss by `missed`, a sum of squares: twice the log likelihood ratio.
-fn own_variance(rows: f64, missed: f64) -> f64 {
+fn variance_gain(rows: f64, missed: f64) -> f64 {
     missed - rows - rows * (missed / rows).max(1.0).ln()
 }
 
-/// What one run's rows of a channel say, whitened as white noise: Gram matrices of own and shared columns, of the departure's, and of
+/// What one run's rows of a channel say, whitened as white noise: Gram matrices of nuisance and shared columns, of the departure's, and of
 /// the residual.
 struct Normals {
     /// By bin along the variable.
@@ -42,7 +42,7 @@ struct Scan {
     normals: Vec<Normals>,
     /// Rows in each bin.
     rows: Vec<f64>,
-    n_own: usize,
+    n_nuisance: usize,
     n_shared: usize,
     /// Sum of squares that the baseline leaves of all rows.
     whole: f64,
@@ -60,7 +60,7 @@ impl Scan {
     fn new(
         problem: &Problem<'_>,
         columns: &[Vec<Vec<f64>>],
-        (n_own, n_shared): (usize, usize),
+        (n_nuisance, n_shared): (usize, usize),
         channel: usize,
         variable: Option<usize>,
     ) -> Option<Self> {
@@ -75,7 +75,7 @@ impl Scan {
                 rows[bin(value(problem, variable, r, i), &edges)] += 1.0;
             }
         }
-        let mut scan = Self { variable, edges, normals, rows, n_own, n_shared, whole: 0.0 };
+        let mut scan = Self { variable, edges, normals, rows, n_nuisance, n_shared, whole: 0.0 };
         scan.whole = scan.outside((0, 0)).0;
         Some(scan)
     }
@@ -104,8 +104,8 @@ impl Scan {
         }
         let price = self.rows.iter().sum::<f64>().ln();
         let missed = self.whole - self.outside(bins).0;
-        let freed = Interval { worth: own_variance(dropped, missed) - price, gain: missed - dropped, bins };
-        let gain = self.whole - self.departing(bins);
+        let freed = Interval { worth: variance_gain(dropped, missed) - price, gain: missed - dropped, bins };
+        let gain = self.whole - self.perturbation_response(bins);
         let smooth = Interval { worth: gain - SMOOTH as f64 * price, gain: gain - SMOOTH as f64, bins };
         Some(if smooth.worth > freed.worth { smooth } else { freed })
     }
@@ -116,12 +116,12 @@ impl Scan {
             let others = run.others.clone();
             run.binned[..from].iter().chain(&run.binned[to..]).fold(others, |sum, g| sum + g)
         };
-        solve(self.normals.iter().map(gram), self.n_own, self.n_shared)
+        solve(self.normals.iter().map(gram), self.n_nuisance, self.n_shared)
     }
 
     /// Fits the linearised baseline and a smooth departure inside the bins to all rows: sum of squares.
-    fn departing(&self, (from, to): (usize, usize)) -> f64 {
-        let first = self.n_own + self.n_shared;
+    fn perturbation_response(&self, (from, to): (usize, usize)) -> f64 {
+        let first = self.n_nuisance + self.n_shared;
         let last = first + SMOOTH;
         let gram = |run: &Normals| {
             let mut gram = run.whole.clone();
@@ -133,7 +133,7 @@ impl Scan {
             }
             gram
         };
-        solve(self.normals.iter().map(gram), self.n_own, self.n_shared + SMOOTH).0
+        solve(self.normals.iter().map(gram), self.n_nuisance, self.n_shared + SMOOTH).0
     }
 }
 
@@ -146,9 +146,9 @@ pub(crate) fn locate(
 ) -> Result<Vec<Location>, PredictError> {
     let noise = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
     let columns: Vec<Vec<Vec<f64>>> = (0..problem.rows.len())
-        .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.own[r]))
+        .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.nuisance[r]))
         .collect::<Result<_, _>>()?;
-    let sizes = (selection.own.len(), selection.shared.len());
+    let sizes = (selection.nuisance.len(), selection.shared.len());
     let mut found: Vec<(f64, Location)> = Vec::new();
     let mut worth = 0.0;
     for channel in 0..problem.channels() {
@@ -289,7 +289,7 @@ pub(crate) fn bin(value: f64, edges: &[f64]) -> usize {
     edges.partition_point(|e| *e <= value).clamp(1, edges.len() - 1) - 1
 }
 
-/// Columns of a run: own, shared, the departure's powers of the variable, the residual.
+/// Columns of a run: nuisance, shared, the departure's powers of the variable, the residual.
 fn normals(
     problem: &Problem<'_>,
     columns: &[Vec<Vec<f64>>],
@@ -334,11 +334,11 @@ fn normals(
     columns.iter().enumerate().map(of_run).collect()
 }
 
-/// Least squares over runs from the lower triangles of their Gram matrices: `n_own` columns of each run's own, `n_free` of all, the
+/// Least squares over runs from the lower triangles of their Gram matrices: `n_nuisance` columns of each run's nuisance parameters, `n_free` of all, the
 /// residual last. Sum of squares that is left, and each run's coefficients.
 pub(crate) fn solve(
     grams: impl Iterator<Item = DMatrix<f64>>,
-    n_own: usize,
+    n_nuisance: usize,
     n_free: usize,
 ) -> (f64, Vec<Vec<f64>>) {
     let mut information = DMatrix::zeros(n_free, n_free);
@@ -348,21 +348,21 @@ pub(crate) fn solve(
     for gram in grams {
         let last = gram.ncols() - 1;
         total += gram[(last, last)];
-        let mut factor = gram.view((0, 0), (n_own, n_own)).into_owned();
+        let mut factor = gram.view((0, 0), (n_nuisance, n_nuisance)).into_owned();
         let kept = cholesky(&mut factor, RANK_FLOOR);
         let border = |j: usize| {
-            let mut column: Vec<f64> = (0..n_own).map(|i| gram[(j, i)]).collect();
+            let mut column: Vec<f64> = (0..n_nuisance).map(|i| gram[(j, i)]).collect();
             forward(&factor, &kept, &mut column);
             column
         };
-        let borders: Vec<Vec<f64>> = (n_own..n_own + n_free).map(border).collect();
+        let borders: Vec<Vec<f64>> = (n_nuisance..n_nuisance + n_free).map(border).collect();
         let reduced = border(last);
         total -= dot(&reduced, &reduced);
         for i in 0..n_free {
             for j in 0..=i {
-                information[(i, j)] += gram[(n_own + i, n_own + j)] - dot(&borders[i], &borders[j]);
+                information[(i, j)] += gram[(n_nuisance + i, n_nuisance + j)] - dot(&borders[i], &borders[j]);
             }
-            right[i] += gram[(last, n_own + i)] - dot(&borders[i], &reduced);
+            right[i] += gram[(last, n_nuisance + i)] - dot(&borders[i], &reduced);
         }
         parts.push((factor, kept, borders, reduced));
     }
@@ -374,7 +374,7 @@ pub(crate) fn solve(
     let coefficients = parts
         .into_iter()
         .map(|(factor, kept, borders, reduced)| {
-            let mut all = own_given(&factor, &kept, &borders, reduced, &right);
+            let mut all = back_substitute(&factor, &kept, &borders, reduced, &right);
             all.extend_from_slice(&right);
             all
         })

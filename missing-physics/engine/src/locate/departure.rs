@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::locate::{bin, edges, solve, value, variables};
+use crate::locate::scan::{bin, edges, solve, value, variables};
 use crate::model::PredictError;
 use crate::problem::Problem;
 
@@ -27,10 +27,10 @@ pub(crate) struct Departure {
     pub(crate) baseline: Vec<Vec<f64>>,
 }
 
-/// What the baseline leaves: by run, whitened columns of its own and shared parameters and the residual, all as if noise were white.
+/// What the baseline leaves: by run, whitened columns of its nuisance and shared parameters and the residual, all as if noise were white.
 pub(crate) struct Left<'a> {
     pub(crate) columns: &'a [Vec<Vec<f64>>],
-    /// How many of them are own, and how many shared.
+    /// How many of them are of nuisance parameters, and how many shared.
     pub(crate) sizes: (usize, usize),
     pub(crate) shared: &'a [f64],
     pub(crate) sigma: &'a [f64],
@@ -74,7 +74,7 @@ struct Scan<'a> {
     bins: usize,
     /// By run, one column for each bin and power, as long as the residual.
     departing: Vec<Vec<Vec<f64>>>,
-    /// By run: Gram matrix of own and shared columns, those of the departures, and the residual.
+    /// By run: Gram matrix of nuisance and shared columns, those of the departures, and the residual.
     grams: Vec<DMatrix<f64>>,
     /// Sum of squares that the baseline leaves.
     whole: f64,
@@ -130,8 +130,8 @@ impl<'a> Scan<'a> {
 
     /// Fits the linearised baseline and a departure inside the bins: sum of squares that is left, coefficients of each run.
     fn solve(&self, (from, to): (usize, usize), shape: &[[f64; POWERS]]) -> (f64, Vec<Vec<f64>>) {
-        let (n_own, n_shared) = self.left.sizes;
-        let known = n_own + n_shared;
+        let (n_nuisance, n_shared) = self.left.sizes;
+        let known = n_nuisance + n_shared;
         let last = known + self.bins * POWERS;
         let mut gather = DMatrix::zeros(last + 1, known + shape.len() + 1);
         gather.view_mut((0, 0), (known, known)).fill_with_identity();
@@ -144,7 +144,7 @@ impl<'a> Scan<'a> {
             }
         }
         let gathered = self.grams.iter().map(|gram| gather.tr_mul(&(gram * &gather)));
-        solve(gathered, n_own, n_shared + shape.len())
+        solve(gathered, n_nuisance, n_shared + shape.len())
     }
 
     /// By how much each channel's sum of squares falls.
@@ -206,7 +206,9 @@ fn moved(
     };
     let amounts: Vec<Vec<f64>> =
         (0..runs.len()).map(|run| (0..runs[run].len()).map(|row| amount(run, row)).collect()).collect();
-    let Some(moved) = problem.model.departing(runs, left.shared, &amounts)? else { return Ok(None) };
+    let Some(moved) = problem.model.perturbation_response(runs, left.shared, &amounts)? else {
+        return Ok(None);
+    };
     let white = |(run, moved): (usize, Vec<f64>)| {
         let channel = |channel: usize| {
             let picked = problem.pick(run, channel, &moved);

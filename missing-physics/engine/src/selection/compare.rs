@@ -3,15 +3,15 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::adequacy::{draw, residuals};
-use crate::bank::Bank;
+use crate::adequacy::linearised::Linearised;
+use crate::adequacy::test::{draw, residuals};
 use crate::data::Recording;
-use crate::estimate::better_top;
-use crate::fit::{Fit, NoiseRule, NoiseState, UNDETERMINED, covariance, fit, solve};
+use crate::estimate::estimates::better_top;
+use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, UNDETERMINED, covariance, fit, solve};
 use crate::linalg::{cholesky, log_determinant};
 use crate::model::PredictError;
-use crate::own_prior;
 use crate::problem::{Problem, Selection};
+use crate::selection::nuisance_prior;
 
 /// A set of mechanisms, fitted.
 #[derive(Debug, Clone)]
@@ -21,7 +21,7 @@ pub(crate) struct Candidate {
     pub(crate) selection: Selection,
     pub(crate) fit: Fit,
     /// Fits with other whole numbers (which row, which sensor) that the data leave open, likeliest first.
-    pub(crate) elsewhere: Vec<Fit>,
+    pub(crate) alternative_modes: Vec<Fit>,
     /// Log marginal likelihood plus log prior odds of the set.
     pub(crate) evidence: f64,
     /// Why it is no explanation.
@@ -57,19 +57,19 @@ pub(crate) fn candidate(
         selection.shared.iter().zip(&selection.added_shared).filter(|(_, a)| **a).map(|(s, _)| *s).collect();
     // What the neighbour had on and this set does not is off again.
     let mut near = near.clone();
-    let places = problem.places(set);
-    for slot in (0..near.shared.len()).filter(|s| !selection.shared.contains(s) && !places.contains(s)) {
+    let integers = problem.integer_slots(set);
+    for slot in (0..near.shared.len()).filter(|s| !selection.shared.contains(s) && !integers.contains(s)) {
         near.shared[slot] = problem.shared.start[slot];
     }
-    for (run, own) in near.own.iter_mut().enumerate() {
-        for slot in (0..own.len()).filter(|s| !selection.own.contains(s)) {
-            own[slot] = problem.own_start[run][slot];
+    for (run, nuisance) in near.nuisance.iter_mut().enumerate() {
+        for slot in (0..nuisance.len()).filter(|s| !selection.nuisance.contains(s)) {
+            nuisance[slot] = problem.nuisance_start[run][slot];
         }
     }
     let mut starts: Vec<Vec<f64>> = Vec::new();
     for guess in guesses {
         let mut start = near.shared.clone();
-        let mine = |slot: &usize| selection.shared.contains(slot) || places.contains(slot);
+        let mine = |slot: &usize| selection.shared.contains(slot) || integers.contains(slot);
         guess.iter().filter(|(slot, _)| mine(slot)).for_each(|&(slot, value)| start[slot] = value);
         starts.push(start);
     }
@@ -91,8 +91,8 @@ pub(crate) fn candidate(
     let mut tops: Vec<(Vec<f64>, Fit)> = Vec::new();
     let mut failure = None;
     for start in &starts {
-        let numbers: Vec<f64> = places.iter().map(|&slot| start[slot]).collect();
-        match solve(problem, &selection, &near.noise, start, &near.own) {
+        let numbers: Vec<f64> = integers.iter().map(|&slot| start[slot]).collect();
+        match solve(problem, &selection, &near.noise, start, &near.nuisance) {
             Ok(fit) => match tops.iter_mut().find(|(n, _)| *n == numbers) {
                 Some((_, best)) if fit.chi2 < best.chi2 - 1e-9 => *best = fit,
                 Some(_) => {}
@@ -103,7 +103,7 @@ pub(crate) fn candidate(
     }
     let mut fits = Vec::new();
     for (_, top) in tops {
-        match fit(problem, &selection, rule, (&top.shared, &top.own), Some(&top.noise)) {
+        match fit(problem, &selection, rule, (&top.shared, &top.nuisance), Some(&top.noise)) {
             Ok(fit) => fits.push(fit),
             Err(error) => failure = Some(error),
         }
@@ -115,23 +115,23 @@ pub(crate) fn candidate(
             failure.unwrap_or(PredictError { run: "(all)".into(), reason: "no start was possible".into() })
         );
     }
-    let mut elsewhere = fits.split_off(1);
+    let mut alternative_modes = fits.split_off(1);
     let fit = fits.remove(0);
-    elsewhere.retain(|other| likelihood(other) > likelihood(&fit) - OPEN);
+    alternative_modes.retain(|other| likelihood(other) > likelihood(&fit) - OPEN);
     let (mut evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
     evidence += log_prior(problem, rule, &fit);
-    Ok(Candidate { set: set.to_vec(), selection, fit, elsewhere, evidence, ruled_out })
+    Ok(Candidate { set: set.to_vec(), selection, fit, alternative_modes, evidence, ruled_out })
 }
 
 impl Candidate {
     /// The same set better fitted from another start: whole numbers that were open stay so where they are likely still.
     fn in_place_of(mut self, worse: Self, problem: &Problem<'_>, rule: &NoiseRule) -> Self {
-        let places = problem.places(&self.set);
-        let same = |a: &Fit, b: &Fit| places.iter().all(|&slot| a.shared[slot] == b.shared[slot]);
-        for other in std::iter::once(worse.fit).chain(worse.elsewhere) {
-            let known = same(&other, &self.fit) || self.elsewhere.iter().any(|e| same(&other, e));
+        let integers = problem.integer_slots(&self.set);
+        let same = |a: &Fit, b: &Fit| integers.iter().all(|&slot| a.shared[slot] == b.shared[slot]);
+        for other in std::iter::once(worse.fit).chain(worse.alternative_modes) {
+            let known = same(&other, &self.fit) || self.alternative_modes.iter().any(|e| same(&other, e));
             if !known && likelihood(problem, rule, &other) > likelihood(problem, rule, &self.fit) - OPEN {
-                self.elsewhere.push(other);
+                self.alternative_modes.push(other);
             }
         }
         self
@@ -164,7 +164,7 @@ fn evidence(
         return (f64::NEG_INFINITY, Some("these data do not determine it".into()));
     }
     let mut value = marginal(problem, selection, fit, &fit.information);
-    for slot in problem.places(set) {
+    for slot in problem.integer_slots(set) {
         value -= (problem.shared.upper[slot] - problem.shared.lower[slot] + 1.0).ln();
     }
     // Each free parameter's prior belongs to the first mechanism or term that frees it.
@@ -191,7 +191,7 @@ fn evidence(
         if mine.is_empty() {
             continue;
         }
-        let shapes = &set.get(order).map_or(&[][..], |&m| &spec.mechanisms[m].shapes);
+        let shapes = &set.get(order).map_or(&[][..], |&m| &spec.mechanisms[m].shape_parameters);
         let is_shape = |i: &usize| shapes.contains(&problem.shared.index[selection.shared[*i]]);
         let (shapes, mine): (Vec<usize>, Vec<usize>) = mine.into_iter().partition(is_shape);
         for i in shapes {
@@ -231,9 +231,9 @@ fn marginal(problem: &Problem<'_>, selection: &Selection, fit: &Fit, information
     let mut factor = information.clone();
     let kept = cholesky(&mut factor, UNDETERMINED);
     let volume = kept.iter().filter(|k| **k).count() as f64 * std::f64::consts::TAU.ln();
-    let own = (0..selection.own.len()).filter(|&i| selection.added_own[i]);
+    let nuisance = (0..selection.nuisance.len()).filter(|&i| selection.added_nuisance[i]);
     fit.log_likelihood + 0.5 * (volume - log_determinant(&factor, &kept))
-        - own.map(|i| own_prior::cost(problem, selection, fit, i)).sum::<f64>()
+        - nuisance.map(|i| nuisance_prior::cost(problem, selection, fit, i)).sum::<f64>()
 }
 
 /// The same with so wide a normal prior of the shared parameters that no data are needed to bound them.
@@ -351,15 +351,15 @@ fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Vec<
     let shared = |p: usize| problem.shared.index.iter().position(|&i| i == p);
     let mut all: Vec<Vec<(usize, f64)>> = Vec::new();
     for &mechanism in set {
-        let places = problem.places(&[mechanism]);
+        let integers = problem.integer_slots(&[mechanism]);
         let new = !parent.set.contains(&mechanism);
-        if !new && places.is_empty() {
+        if !new && integers.is_empty() {
             continue;
         }
         let mut starts: Vec<Vec<(usize, f64)>> = Vec::new();
         for start in problem.model.starts(mechanism, &problem.recording.runs, &whole) {
             let of_it = start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value)));
-            let start: Vec<_> = of_it.filter(|(slot, _)| new || places.contains(slot)).collect();
+            let start: Vec<_> = of_it.filter(|(slot, _)| new || integers.contains(slot)).collect();
             if !start.is_empty() && !starts.contains(&start) {
                 starts.push(start);
             }
@@ -391,7 +391,7 @@ fn hints(problem: &Problem<'_>, all: &[Candidate], set: &[usize]) -> Vec<(usize,
 /// Whether every parameter that `small` frees is also freed by `large`.
 pub(crate) fn nested(small: &Candidate, large: &Candidate) -> bool {
     small.selection.shared.iter().all(|s| large.selection.shared.contains(s))
-        && small.selection.own.iter().all(|s| large.selection.own.contains(s))
+        && small.selection.nuisance.iter().all(|s| large.selection.nuisance.contains(s))
 }
 
 /// What a fit predicts of data that it has not seen.
@@ -436,14 +436,14 @@ pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<H
             let pick = |ids: &[usize]| -> (Recording, Vec<Vec<f64>>) {
                 let mut recording = problem.recording.clone();
                 recording.runs = ids.iter().map(|&r| problem.recording.runs[r].clone()).collect();
-                (recording, ids.iter().map(|&r| candidate.fit.own[r].clone()).collect())
+                (recording, ids.iter().map(|&r| candidate.fit.nuisance[r].clone()).collect())
             };
-            let (recording, own) = pick(&train);
+            let (recording, nuisance) = pick(&train);
             let seen = problem.with(recording);
-            let trained = solve(&seen, &candidate.selection, noise, &candidate.fit.shared, &own)?;
-            let (recording, own) = pick(&test);
+            let trained = solve(&seen, &candidate.selection, noise, &candidate.fit.shared, &nuisance)?;
+            let (recording, nuisance) = pick(&test);
             let unseen = problem.with(recording);
-            let tested = solve(&unseen, &none, noise, &trained.shared, &own)?;
+            let tested = solve(&unseen, &none, noise, &trained.shared, &nuisance)?;
             log_score += whole - bounded_marginal(&seen, &candidate.selection, &trained);
             add(&residuals(&unseen, &tested)?, &|_, _, _| true);
         }
@@ -459,9 +459,9 @@ pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<H
             };
             let (begin, both) = (cut(seen), cut(until));
             let trained =
-                solve(&begin, &candidate.selection, noise, &candidate.fit.shared, &candidate.fit.own)?;
-            let known = solve(&begin, &none, noise, &trained.shared, &trained.own)?;
-            let longer = solve(&both, &candidate.selection, noise, &trained.shared, &trained.own)?;
+                solve(&begin, &candidate.selection, noise, &candidate.fit.shared, &candidate.fit.nuisance)?;
+            let known = solve(&begin, &none, noise, &trained.shared, &trained.nuisance)?;
+            let longer = solve(&both, &candidate.selection, noise, &trained.shared, &trained.nuisance)?;
             log_score += bounded_marginal(&both, &candidate.selection, &longer)
                 - bounded_marginal(&begin, &candidate.selection, &trained);
             let valid = &both.rows[0].valid;
@@ -480,21 +480,21 @@ pub(crate) fn confusion(
     draws: usize,
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, PredictError> {
-    let observed = |rival: &Candidate| residuals(problem, &rival.fit);
     let mut shapes: Vec<usize> =
         rivals.iter().flat_map(|r| r.fit.noise.shape.iter().copied()).chain([0]).collect();
     shapes.sort_unstable();
     shapes.dedup();
-    let mut banks = Vec::with_capacity(rivals.len());
+    let mut models = Vec::with_capacity(rivals.len());
     let mut constants = Vec::with_capacity(rivals.len());
-    let mut own = Vec::with_capacity(rivals.len());
+    let mut residuals_of = Vec::with_capacity(rivals.len());
     for rival in rivals {
-        let mut bank = Bank::new(problem, &rival.selection, &rival.fit, &[], rule)?.without_alternatives();
-        bank.play(&shapes);
-        let residual = observed(rival)?;
-        constants.push(rival.evidence - bank.read(&residual).score);
-        banks.push(bank);
-        own.push(residual);
+        let mut linearised =
+            Linearised::new(problem, &rival.selection, &rival.fit, &[], rule)?.without_alternatives();
+        linearised.play(&shapes);
+        let residual = residuals(problem, &rival.fit)?;
+        constants.push(rival.evidence - linearised.read(&residual).score);
+        models.push(linearised);
+        residuals_of.push(residual);
     }
     let matrix = (0..rivals.len())
         .map(|truth| {
@@ -513,13 +513,16 @@ pub(crate) fn confusion(
                                     .enumerate()
                                     .map(|(c, column)| {
                                         (0..column.len())
-                                            .map(|i| column[i] + own[j][r][c][i] - own[truth][r][c][i])
+                                            .map(|i| {
+                                                column[i] + residuals_of[j][r][c][i]
+                                                    - residuals_of[truth][r][c][i]
+                                            })
                                             .collect()
                                     })
                                     .collect()
                             })
                             .collect();
-                        banks[j].read(&data).score + constants[j]
+                        models[j].read(&data).score + constants[j]
                     };
                     let scores: Vec<f64> = (0..rivals.len()).map(score).collect();
                     (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).unwrap_or(truth)

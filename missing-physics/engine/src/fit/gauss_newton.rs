@@ -1,13 +1,13 @@
-//! Maximum-likelihood fits: bounded Gauss-Newton with every run's own parameters eliminated run by run.
+//! Maximum-likelihood fits: bounded Gauss-Newton with every run's nuisance parameters eliminated run by run.
 
 use nalgebra::DMatrix;
 
 use crate::data::Run;
+use crate::fit::step::{Eliminated, NormalEquations, Step, reduce};
 use crate::linalg::{backward, cholesky, determined, dot, forward, gram, log_determinant};
 use crate::model::{Model, PredictError};
-use crate::noise::Shape;
+use crate::noise::process::Shape;
 use crate::problem::{Problem, Selection};
-use crate::step::{Eliminated, Linearised, Step, reduce};
 
 /// Central differences of a prediction (one-sided at a bound), the default of [`Model::jacobian`].
 ///
@@ -18,35 +18,35 @@ pub fn finite_differences<M: Model + ?Sized>(
     model: &M,
     run: &Run,
     shared: &[f64],
-    own: &[f64],
+    nuisance: &[f64],
     shared_free: &[usize],
-    own_free: &[usize],
+    nuisance_free: &[usize],
     out: &mut [f64],
     jacobian: &mut [f64],
 ) -> Result<(), PredictError> {
     use crate::model::Scope;
-    model.predict(run, shared, own, out)?;
+    model.predict(run, shared, nuisance, out)?;
     let rows = out.len();
-    let (mut shared, mut own) = (shared.to_vec(), own.to_vec());
+    let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
     let (mut above, mut below) = (vec![0.0; rows], vec![0.0; rows]);
     let parameters = |scope| model.spec().parameters.iter().filter(move |p| p.scope == scope);
     let shared_info: Vec<_> = parameters(Scope::Shared).collect();
-    let own_info: Vec<_> = parameters(Scope::PerRun).collect();
-    let free = shared_free.iter().map(|&s| (true, s)).chain(own_free.iter().map(|&s| (false, s)));
+    let nuisance_info: Vec<_> = parameters(Scope::PerRun).collect();
+    let free = shared_free.iter().map(|&s| (true, s)).chain(nuisance_free.iter().map(|&s| (false, s)));
     for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(rows.max(1))) {
         if is_shared && !model.acts_on(run, slot) {
             column.fill(0.0);
             continue;
         }
-        let info = if is_shared { shared_info[slot] } else { own_info[slot] };
-        let value = if is_shared { shared[slot] } else { own[slot] };
+        let info = if is_shared { shared_info[slot] } else { nuisance_info[slot] };
+        let value = if is_shared { shared[slot] } else { nuisance[slot] };
         let step = model.relative_step() * info.scale.max(1e-3 * value.abs());
         let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
         for (x, out) in [(high, &mut above), (low, &mut below)] {
-            *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = x;
-            model.predict(run, &shared, &own, out)?;
+            *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = x;
+            model.predict(run, &shared, &nuisance, out)?;
         }
-        *(if is_shared { &mut shared[slot] } else { &mut own[slot] }) = value;
+        *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = value;
         for ((d, a), b) in column.iter_mut().zip(&above).zip(&below) {
             *d = (a - b) / (high - low);
         }
@@ -67,57 +67,65 @@ pub(crate) struct NoiseState {
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub(crate) shared: Vec<f64>,
-    pub(crate) own: Vec<Vec<f64>>,
+    pub(crate) nuisance: Vec<Vec<f64>>,
     pub(crate) noise: NoiseState,
     /// Weighted sum of squared residuals.
     pub(crate) chi2: f64,
-    /// Log likelihood with the runs' own parameters integrated out over a wide prior.
+    /// Log likelihood with the runs' nuisance parameters integrated out over a wide prior.
     pub(crate) log_likelihood: f64,
-    /// How well each run tells its own parameters.
-    pub(crate) own_told: Vec<OwnTold>,
-    /// Information matrix of the free shared parameters (own ones eliminated).
+    /// How well each run tells its nuisance parameters.
+    pub(crate) nuisance_errors: Vec<NuisanceErrors>,
+    /// Information matrix of the free shared parameters (nuisance ones eliminated).
     pub(crate) information: DMatrix<f64>,
     pub(crate) converged: bool,
     /// Free shared slots that ended at a bound.
     pub(crate) at_bound: Vec<usize>,
 }
 
-/// How well a run tells its free own parameters, in the order of the selection.
+/// How well a run tells its free nuisance parameters, in the order of the selection.
 #[derive(Debug, Clone)]
-pub(crate) struct OwnTold {
+pub(crate) struct NuisanceErrors {
     /// Standard errors for given shared parameters; infinite where the run does not tell.
     pub(crate) error: Vec<f64>,
     /// How each moves with each free shared parameter: `[own][shared]`.
     pub(crate) slope: Vec<Vec<f64>>,
 }
 
-/// How wide the prior of a run's own parameter is, in units of its scale.
-const OWN_PRIOR: f64 = 1e3;
+/// How wide the prior of a run's nuisance parameter is, in units of its scale.
+const NUISANCE_PRIOR: f64 = 1e3;
 /// The same for one that a mechanism adds.
-const ADDED_OWN_PRIOR: f64 = 10.0;
+const ADDED_NUISANCE_PRIOR: f64 = 10.0;
 
-/// Standard deviation of the prior of the `i`-th free own parameter.
-pub(crate) fn own_prior_width(problem: &Problem<'_>, selection: &Selection, i: usize) -> f64 {
-    let width = if selection.added_own[i] { ADDED_OWN_PRIOR } else { OWN_PRIOR };
-    width * problem.own.scale[selection.own[i]]
+/// Standard deviation of the prior of the `i`-th free nuisance parameter.
+pub(crate) fn nuisance_prior_width(problem: &Problem<'_>, selection: &Selection, i: usize) -> f64 {
+    let width = if selection.added_nuisance[i] { ADDED_NUISANCE_PRIOR } else { NUISANCE_PRIOR };
+    width * problem.nuisance.scale[selection.nuisance[i]]
 }
 
 const MAX_ITERATIONS: usize = 60;
 
-/// Whitened columns of one run: Jacobian by own, by shared, and the residual; channels one after the other.
+/// Whitened columns of one run: Jacobian by nuisance, by shared parameters, and the residual; channels one after the other.
 pub(crate) fn whitened_columns(
     problem: &Problem<'_>,
     selection: &Selection,
     noise: &NoiseState,
     run: usize,
     shared: &[f64],
-    own: &[f64],
+    nuisance: &[f64],
 ) -> Result<Vec<Vec<f64>>, PredictError> {
     let data = &problem.recording.runs[run];
     let rows = problem.channels() * data.len();
-    let free = selection.shared.len() + selection.own.len();
+    let free = selection.shared.len() + selection.nuisance.len();
     let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows * free]);
-    problem.model.jacobian(data, shared, own, &selection.shared, &selection.own, &mut out, &mut jacobian)?;
+    problem.model.jacobian(
+        data,
+        shared,
+        nuisance,
+        &selection.shared,
+        &selection.nuisance,
+        &mut out,
+        &mut jacobian,
+    )?;
     if let Some(bad) = out.iter().chain(&jacobian).find(|v| !v.is_finite()) {
         return Err(PredictError { run: data.label.clone(), reason: format!("the prediction holds {bad}") });
     }
@@ -130,9 +138,12 @@ pub(crate) fn whitened_columns(
             columns[target].extend(picked.into_iter().map(|v| v * inverse_sigma));
         };
         for k in 0..free {
-            // The model lists shared columns first; the normal equations eliminate own ones first.
-            let source =
-                if k < selection.own.len() { selection.shared.len() + k } else { k - selection.own.len() };
+            // The model lists shared columns first; the normal equations eliminate nuisance ones first.
+            let source = if k < selection.nuisance.len() {
+                selection.shared.len() + k
+            } else {
+                k - selection.nuisance.len()
+            };
             push(k, problem.pick(run, channel, &jacobian[source * rows..(source + 1) * rows]));
         }
         let residual: Vec<f64> = problem.rows[run].valid[channel]
@@ -144,20 +155,20 @@ pub(crate) fn whitened_columns(
     Ok(columns)
 }
 
-/// Normal equations of one run with the prior of its own parameters, which come first, then the shared ones, then the residual.
-pub(crate) fn own_normal(
+/// Normal equations of one run with the prior of its nuisance parameters, which come first, then the shared ones, then the residual.
+pub(crate) fn normal_of_run(
     problem: &Problem<'_>,
     selection: &Selection,
     noise: &NoiseState,
     run: usize,
     shared: &[f64],
-    own: &[f64],
+    nuisance: &[f64],
 ) -> Result<DMatrix<f64>, PredictError> {
-    let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, own)?);
+    let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, nuisance)?);
     let last = gram.nrows() - 1;
-    for (i, &slot) in selection.own.iter().enumerate() {
-        let precision = 1.0 / own_prior_width(problem, selection, i).powi(2);
-        let departure = problem.own_start[run][slot] - own[slot];
+    for (i, &slot) in selection.nuisance.iter().enumerate() {
+        let precision = 1.0 / nuisance_prior_width(problem, selection, i).powi(2);
+        let departure = problem.nuisance_start[run][slot] - nuisance[slot];
         gram[(i, i)] += precision;
         gram[(i, last)] += precision * departure;
         gram[(last, i)] += precision * departure;
@@ -171,17 +182,17 @@ fn linearise(
     selection: &Selection,
     noise: &NoiseState,
     shared: &[f64],
-    own: &[Vec<f64>],
-) -> Result<Linearised, PredictError> {
-    let mut normals = Vec::with_capacity(own.len());
+    nuisance: &[Vec<f64>],
+) -> Result<NormalEquations, PredictError> {
+    let mut normals = Vec::with_capacity(nuisance.len());
     let mut chi2 = 0.0;
-    for (run, values) in own.iter().enumerate() {
-        let gram = own_normal(problem, selection, noise, run, shared, values)?;
+    for (run, values) in nuisance.iter().enumerate() {
+        let gram = normal_of_run(problem, selection, noise, run, shared, values)?;
         let last = gram.nrows() - 1;
         chi2 += gram[(last, last)];
         normals.push(gram);
     }
-    Ok(Linearised { normals, chi2 })
+    Ok(NormalEquations { normals, chi2 })
 }
 
 /// Fits the free parameters for a given noise, from a given start.
@@ -190,26 +201,26 @@ pub(crate) fn solve(
     selection: &Selection,
     noise: &NoiseState,
     shared: &[f64],
-    own: &[Vec<f64>],
+    nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
-    let (n_own, n_shared) = (selection.own.len(), selection.shared.len());
-    let (mut shared, mut own) = (shared.to_vec(), own.to_vec());
-    let mut linear = linearise(problem, selection, noise, &shared, &own)?;
+    let (n_nuisance, n_shared) = (selection.nuisance.len(), selection.shared.len());
+    let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
+    let mut linear = linearise(problem, selection, noise, &shared, &nuisance)?;
     let mut damping = 0.0;
     let mut converged = false;
     let mut held = vec![false; n_shared];
     for _ in 0..MAX_ITERATIONS {
-        let step = Step::new(problem, selection, &linear, (&shared, &own), damping);
+        let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping);
         let predicted = step.predicted;
         held = step.held;
         if !(predicted > 1e-9 * (1.0 + 1e-6 * linear.chi2)) {
             converged = true;
             break;
         }
-        match linearise(problem, selection, noise, &step.shared, &step.own) {
+        match linearise(problem, selection, noise, &step.shared, &step.nuisance) {
             Ok(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
                 let gained = linear.chi2 - next.chi2;
-                (shared, own, linear) = (step.shared, step.own, next);
+                (shared, nuisance, linear) = (step.shared, step.nuisance, next);
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
                 if gained < 1e-7 && predicted < 1e-5 {
                     converged = true;
@@ -217,16 +228,16 @@ pub(crate) fn solve(
                 }
             }
             _ if damping > 1e8 => {
-                // No step goes down any more: rounding, a bound of an own parameter, or a kink.
+                // No step goes down any more: rounding, a bound of a nuisance parameter, or a kink.
                 converged = predicted < 1e-4 * (1.0 + linear.chi2);
                 break;
             }
             _ => damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 },
         }
     }
-    let free = vec![false; n_own];
+    let free = vec![false; n_nuisance];
     let eliminated: Vec<Eliminated> = linear.normals.iter().map(|n| Eliminated::new(n, &free, 0.0)).collect();
-    let (information, _) = reduce(&linear, &eliminated, n_own, n_shared);
+    let (information, _) = reduce(&linear, &eliminated, n_nuisance, n_shared);
     let mut log_likelihood = -0.5 * linear.chi2;
     for e in &eliminated {
         log_likelihood -= 0.5 * e.log_determinant;
@@ -237,15 +248,15 @@ pub(crate) fn solve(
             log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
         }
     }
-    let own_told = eliminated.iter().map(|e| e.told(n_shared)).collect();
+    let nuisance_errors = eliminated.iter().map(|e| e.nuisance_errors(n_shared)).collect();
     let at_bound = (0..n_shared).filter(|&i| held[i]).map(|i| selection.shared[i]).collect();
     Ok(Fit {
         shared,
-        own,
+        nuisance,
         noise: noise.clone(),
         chi2: linear.chi2,
         log_likelihood,
-        own_told,
+        nuisance_errors,
         information,
         converged,
         at_bound,
@@ -288,16 +299,16 @@ impl NoiseRule {
     }
 }
 
-/// The likeliest noise of each channel given a fit's residuals (restricted to what the own parameters leave).
+/// The likeliest noise of each channel given a fit's residuals (restricted to what the nuisance parameters leave).
 pub(crate) fn estimate_noise(
     problem: &Problem<'_>,
     selection: &Selection,
     rule: &NoiseRule,
     shared: &[f64],
-    own: &[Vec<f64>],
+    nuisance: &[Vec<f64>],
 ) -> Result<NoiseState, PredictError> {
     let channels = problem.channels();
-    let all = Leftovers::new(problem, selection, shared, own)?;
+    let all = Leftovers::new(problem, selection, shared, nuisance)?;
     let mut state = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
     for channel in 0..channels {
         let left = all.of(problem, rule, channel, selection);
@@ -333,7 +344,7 @@ pub(crate) fn open_shapes(
 ) -> Result<Vec<Vec<OpenShape>>, PredictError> {
     /// Shapes that are less likely than the best by more than this factor are left out.
     const LEAST: f64 = 0.05;
-    let all = Leftovers::new(problem, selection, &fit.shared, &fit.own)?;
+    let all = Leftovers::new(problem, selection, &fit.shared, &fit.nuisance)?;
     let prior = problem.family.indifferent(&rule.allowed);
     let open = |channel: usize| {
         let left = all.of(problem, rule, channel, selection);
@@ -358,7 +369,7 @@ pub(crate) fn open_shapes(
 /// What a fit leaves in all channels, not yet whitened.
 struct Leftovers {
     raw: Vec<Vec<Vec<f64>>>,
-    own_columns: Vec<Vec<Vec<usize>>>,
+    nuisance_columns: Vec<Vec<Vec<usize>>>,
 }
 
 impl Leftovers {
@@ -366,19 +377,19 @@ impl Leftovers {
         problem: &Problem<'_>,
         selection: &Selection,
         shared: &[f64],
-        own: &[Vec<f64>],
+        nuisance: &[Vec<f64>],
     ) -> Result<Self, PredictError> {
         let channels = problem.channels();
         let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
-        let raw = own
+        let raw = nuisance
             .iter()
             .enumerate()
             .map(|(run, values)| whitened_columns(problem, selection, &white, run, shared, values))
             .collect::<Result<Vec<_>, _>>()?;
-        let own_columns = (0..own.len())
-            .map(|run| channel_columns(problem, run, &raw[run][..selection.own.len()]))
+        let nuisance_columns = (0..nuisance.len())
+            .map(|run| channel_columns(problem, run, &raw[run][..selection.nuisance.len()]))
             .collect();
-        Ok(Self { raw, own_columns })
+        Ok(Self { raw, nuisance_columns })
     }
 
     fn of<'a>(
@@ -388,16 +399,16 @@ impl Leftovers {
         channel: usize,
         selection: &'a Selection,
     ) -> Left<'a> {
-        Left { problem, rule, raw: &self.raw, own_columns: &self.own_columns, channel, selection }
+        Left { problem, rule, raw: &self.raw, nuisance_columns: &self.nuisance_columns, channel, selection }
     }
 }
 
-/// What a fit leaves in one channel: residuals and own parameters' columns, not yet whitened.
+/// What a fit leaves in one channel: residuals and nuisance parameters' columns, not yet whitened.
 struct Left<'a> {
     problem: &'a Problem<'a>,
     rule: &'a NoiseRule,
     raw: &'a [Vec<Vec<f64>>],
-    own_columns: &'a [Vec<Vec<usize>>],
+    nuisance_columns: &'a [Vec<Vec<usize>>],
     channel: usize,
     selection: &'a Selection,
 }
@@ -411,8 +422,8 @@ impl Left<'_> {
             let start: usize = (0..channel).map(|c| problem.rows[run].valid[c].len()).sum();
             let end = start + problem.rows[run].valid[channel].len();
             let whitener = problem.whitener(run, channel, shape);
-            let mine = &self.own_columns[run][channel];
-            let n_own = mine.len();
+            let mine = &self.nuisance_columns[run][channel];
+            let n_nuisance = mine.len();
             let whitened: Vec<Vec<f64>> = mine
                 .iter()
                 .copied()
@@ -423,14 +434,14 @@ impl Left<'_> {
                     column
                 })
                 .collect();
-            let residual = &whitened[n_own];
-            let mut own_gram = gram(&whitened[..n_own]);
-            let kept = cholesky(&mut own_gram, 1e-9);
-            // The own parameters are fitted anew under each shape: what they were under another one is no evidence.
-            let mut right: Vec<f64> = whitened[..n_own].iter().map(|c| dot(c, residual)).collect();
-            forward(&own_gram, &kept, &mut right);
+            let residual = &whitened[n_nuisance];
+            let mut nuisance_gram = gram(&whitened[..n_nuisance]);
+            let kept = cholesky(&mut nuisance_gram, 1e-9);
+            // The nuisance parameters are fitted anew under each shape: what they were under another one is no evidence.
+            let mut right: Vec<f64> = whitened[..n_nuisance].iter().map(|c| dot(c, residual)).collect();
+            forward(&nuisance_gram, &kept, &mut right);
             sums.squares += (dot(residual, residual) - dot(&right, &right)).max(0.0);
-            sums.log_determinant += whitener.log_determinant + log_determinant(&own_gram, &kept);
+            sums.log_determinant += whitener.log_determinant + log_determinant(&nuisance_gram, &kept);
             sums.used += kept.iter().filter(|k| **k).count();
             sums.rows += end - start;
         }
@@ -450,7 +461,7 @@ impl Left<'_> {
     }
 }
 
-/// For each channel, which of a run's own columns (all channels one after the other) it determines.
+/// For each channel, which of a run's nuisance columns (all channels one after the other) it determines.
 fn channel_columns(problem: &Problem<'_>, run: usize, columns: &[Vec<f64>]) -> Vec<Vec<usize>> {
     let mut start = 0;
     let squares: Vec<Vec<f64>> = problem.rows[run]
@@ -492,13 +503,13 @@ pub(crate) fn fit(
     };
     let mut best = solve(problem, selection, &first, start.0, start.1)?;
     for _ in 0..6 {
-        let noise = estimate_noise(problem, selection, rule, &best.shared, &best.own)?;
+        let noise = estimate_noise(problem, selection, rule, &best.shared, &best.nuisance)?;
         let still = noise.shape == best.noise.shape
             && noise.sigma.iter().zip(&best.noise.sigma).all(|(a, b)| (a / b - 1.0).abs() < 1e-4);
         if still {
             break;
         }
-        best = solve(problem, selection, &noise, &best.shared, &best.own)?;
+        best = solve(problem, selection, &noise, &best.shared, &best.nuisance)?;
     }
     Ok(best)
 }

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::{Bank, Product, Products};
-use crate::linalg::{RANK_FLOOR, backward, cholesky, cholesky_against, dot, forward, own_given};
+use super::{Linearised, Product, Products};
+use crate::linalg::{RANK_FLOOR, back_substitute, backward, cholesky, cholesky_against, dot, forward};
 
-impl Bank<'_> {
+impl Linearised<'_> {
     pub(super) fn products(&self, data: &[Vec<Vec<f64>>]) -> Products {
         let values = self
             .blocks
@@ -25,10 +25,10 @@ impl Bank<'_> {
                                 let mut y = raw.clone();
                                 self.problem.whitener(run, channel, index).whiten(&mut y);
                                 let with: Vec<f64> = shape.columns.iter().map(|c| dot(c, &y)).collect();
-                                let mut own: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
-                                forward(&shape.own.0, &shape.own.1, &mut own);
+                                let mut nuisance: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
+                                forward(&shape.nuisance.0, &shape.nuisance.1, &mut nuisance);
                                 let total = dot(&y, &y);
-                                Product { with, left: total - dot(&own, &own), own, total }
+                                Product { with, left: total - dot(&nuisance, &nuisance), nuisance, total }
                             })
                             .collect()
                     })
@@ -43,15 +43,15 @@ impl Bank<'_> {
         &self,
         products: &Products,
         noise: &[(usize, f64)],
-        own: &[usize],
+        nuisance: &[usize],
         shared: &[usize],
     ) -> Vec<Vec<f64>> {
-        let (q, s) = (own.len(), shared.len());
+        let (q, s) = (nuisance.len(), shared.len());
         let mut information = DMatrix::zeros(s, s);
         let mut right = vec![0.0; s];
         let mut parts = Vec::with_capacity(self.blocks.len());
         for (row, values) in self.blocks.iter().zip(&products.values) {
-            let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+            let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
             let mut normal = DMatrix::zeros(q + s, q + s);
             let mut b = vec![0.0; q + s];
             for ((block, value), &(shape, sigma)) in row.iter().zip(values).zip(noise) {
@@ -90,7 +90,7 @@ impl Bank<'_> {
         parts
             .into_iter()
             .map(|(factor, kept, borders, reduced)| {
-                let mut all = own_given(&factor, &kept, &borders, reduced, &right);
+                let mut all = back_substitute(&factor, &kept, &borders, reduced, &right);
                 all.extend_from_slice(&right);
                 all
             })
@@ -122,13 +122,13 @@ impl Bank<'_> {
     ) -> (f64, f64) {
         let (mut squares, mut log_determinant) = (0.0, 0.0);
         for ((row, values), x) in self.blocks.iter().zip(&products.values).zip(coefficients) {
-            // The own coefficients are fitted anew under each shape; the others are given.
+            // The nuisance coefficients are fitted anew under each shape; the others are given.
             let block = &row[channel].shapes[shape];
             let product = &values[channel][shape];
             let mut form = product.left;
             let others = || ids.iter().zip(x).filter(|(a, _)| !row[channel].mine.contains(a));
             for (&a, xa) in others() {
-                let mut inner = -2.0 * (product.with[a] - dot(&block.borders[a], &product.own));
+                let mut inner = -2.0 * (product.with[a] - dot(&block.borders[a], &product.nuisance));
                 for (&c, xc) in others() {
                     inner += (block.gram[(a, c)] - dot(&block.borders[a], &block.borders[c])) * xc;
                 }
@@ -153,14 +153,14 @@ impl Bank<'_> {
     pub(super) fn alternate(
         &self,
         products: &Products,
-        own: &[usize],
+        nuisance: &[usize],
         shared: &[usize],
         start: &[(usize, f64)],
         rounds: usize,
     ) -> (f64, Vec<(usize, f64)>, Vec<Vec<f64>>) {
-        let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+        let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
         let mut noise = start.to_vec();
-        let mut coefficients = self.solve(products, &noise, own, shared);
+        let mut coefficients = self.solve(products, &noise, nuisance, shared);
         let mut score = f64::NEG_INFINITY;
         for round in 0..rounds {
             let mut total = 0.0;
@@ -185,7 +185,7 @@ impl Bank<'_> {
             if still || round + 1 == rounds {
                 break;
             }
-            coefficients = self.solve(products, &noise, own, shared);
+            coefficients = self.solve(products, &noise, nuisance, shared);
         }
         (score, noise, coefficients)
     }
@@ -195,11 +195,11 @@ impl Bank<'_> {
         &self,
         products: &Products,
         noise: &[(usize, f64)],
-        own: &[usize],
+        nuisance: &[usize],
         shared: &[usize],
         coefficients: &[Vec<f64>],
     ) -> f64 {
-        let ids: Vec<usize> = own.iter().chain(shared).copied().collect();
+        let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
         noise
             .iter()
             .enumerate()

@@ -6,7 +6,7 @@
 
 use std::sync::LazyLock;
 
-use crate::noise::Shape;
+use crate::noise::process::Shape;
 
 /// Correlations of neighbours in noise that is an autoregression of one row.
 const PHIS: [f64; 8] = [0.2, 0.4, 0.6, 0.75, 0.86, 0.93, 0.97, 0.99];

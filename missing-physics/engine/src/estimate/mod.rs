@@ -1,0 +1,3 @@
+//! Values and intervals of parameters.
+
+pub(crate) mod estimates;

@@ -1,0 +1,4 @@
+//! Where the baseline misses the data.
+
+pub(crate) mod departure;
+pub(crate) mod scan;

@@ -1,0 +1,7 @@
+//! Measurement noise: its law along a run, the shapes among which the data choose, and what is known of it before any fit.
+
+pub(crate) mod family;
+pub(crate) mod process;
+pub(crate) mod rule;
+
+pub use process::{Shape, Whitener, rough_sigma};
