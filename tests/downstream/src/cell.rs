@@ -53,7 +53,7 @@ impl ForceTorque for LoadCell {
     fn read(&mut self) -> Result<Stamped<Wrench>, CellError> {
         self.readings += 1;
         // One reading in fifty is lost on its way.
-        if !self.plugged || self.readings % 50 == 0 {
+        if !self.plugged || self.readings.is_multiple_of(50) {
             return Err(CellError::Silence);
         }
         let row = self.readings - 1 - self.readings / 50;
