@@ -7,13 +7,13 @@
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use statrs::distribution::{Binomial, DiscreteCDF};
-use worlds::flight::{FlightWorld, Seen};
 use worlds::noise::Noise;
+use worlds::physics::flight::{FlightWorld, Measured};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let count = if examples::small() { 4 } else { 286 };
-    let space = FlightWorld::thrown(Seen::Space);
-    let height = FlightWorld::thrown(Seen::Height);
+    let space = FlightWorld::thrown(Measured::Position);
+    let height = FlightWorld::thrown(Measured::Height);
     let with = |world: FlightWorld, noise: Noise| FlightWorld { noise, ..world };
     let kinds = [
         ("height, white noise", with(height, Noise::white(0.002))),

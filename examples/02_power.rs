@@ -7,8 +7,8 @@
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use missing_physics::diagnosis::Verdict;
-use worlds::flight::{Effects, FlightWorld, Seen};
 use worlds::noise::Noise;
+use worlds::physics::flight::{Effects, FlightWorld, Measured};
 
 /// Standard errors by which a gravity-only flight misses one draw: straight lines are fitted to what is left of the
 /// coordinates once gravity is taken away.
@@ -37,7 +37,7 @@ fn size(world: &FlightWorld, seed: u64) -> f64 {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let count = if examples::small() { 3 } else { 60 };
-    let base = FlightWorld::thrown(Seen::Space);
+    let base = FlightWorld::thrown(Measured::Position);
     type Grow = fn(f64) -> Effects;
     let kinds: [(&str, f64, Grow); 4] = [
         ("quadratic drag", 3.24, |s| Effects { quadratic_per_m: 1e-4 * s, ..Effects::default() }),

@@ -7,7 +7,7 @@ use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
 use rayon::prelude::*;
-use worlds::bounce::{BounceWorld, Effects};
+use worlds::physics::bounce::{BounceWorld, Effects};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let none = Effects::default();
@@ -20,11 +20,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("nothing; noise not known", 60, BounceWorld { noise_known: false, ..drops }),
         ("air-drag", 20, of(Effects { drag_per_m: 0.05, ..none })),
         ("velocity-dependent-restitution", 20, of(Effects { slope_s_m: 0.01, ..none })),
-        ("table-tilt", 20, of(Effects { table: [0.01, -0.02], ..none })),
+        ("table-tilt", 20, of(Effects { table_slope: [0.01, -0.02], ..none })),
         ("tangential-friction", 20, of(Effects { friction: 0.25, ..none })),
         ("clock-rate", 20, BounceWorld { effects: Effects { clock_rate: 0.003, ..none }, ..known }),
         ("missed-impact", 20, of(Effects { unheard: 0.2, ..none })),
-        ("unlisted: one side is dead", 20, of(Effects { dead_side: 0.006, ..none })),
+        ("unlisted: one side is dead", 20, of(Effects { softer_side: 0.006, ..none })),
     ];
     println!(
         "{:32} {:>6} {:>8} {:>6} {:>12} {:>8} {:>11}",

@@ -5,7 +5,7 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use worlds::flight::{Effects, FlightWorld, Seen};
+use worlds::physics::flight::{Effects, FlightWorld, Measured};
 
 fn diagnosis(c: &mut Criterion) {
     let mut group = c.benchmark_group("diagnosis");
@@ -13,8 +13,8 @@ fn diagnosis(c: &mut Criterion) {
     for (name, k) in [("null", 0.0), ("drag", 0.02)] {
         for runs in [3_usize, 9] {
             let effects = Effects { quadratic_per_m: k, ..Effects::default() };
-            let world = FlightWorld { runs, effects, ..FlightWorld::thrown(Seen::Space) };
-            let (model, recording) = (examples::model(world.seen), examples::recording(&world, 4));
+            let world = FlightWorld { runs, effects, ..FlightWorld::thrown(Measured::Position) };
+            let (model, recording) = (examples::model(world.measured), examples::recording(&world, 4));
             let run = || diagnose(&model, &recording, &[], &Options::default(), &Silent);
             if let Ok(answer) = run() {
                 println!("diagnosis/{name}/{runs} runs: {} {:?}", answer.verdict.word(), answer.chosen);

@@ -9,7 +9,7 @@ use hw_traits::{ErrorKind, ErrorType};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
-use worlds::press::{Effects, Indenter, PressWorld, Step};
+use worlds::physics::indentation::{Effects, IndentationWorld, Indenter, Step};
 
 use super::{Outcome, Rig, on_log_scale};
 
@@ -172,7 +172,7 @@ fn at(depth_m: f64) -> Pose {
 
 /// A simulated arm with a ball over a soft body.
 struct Ball {
-    world: PressWorld,
+    world: IndentationWorld,
     steps: Vec<Step>,
     now_s: f64,
     depth_m: f64,
@@ -182,7 +182,7 @@ struct Ball {
 
 impl Ball {
     fn new(effects: Effects, seed: u64) -> Outcome<Self> {
-        let world = PressWorld {
+        let world = IndentationWorld {
             indenter: Indenter::Sphere(BALL_M),
             poisson_ratio: 0.5,
             moduli_pa: vec![MODULUS_PA],

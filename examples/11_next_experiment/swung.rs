@@ -9,7 +9,7 @@ use hw_traits::rotary::Rotary;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use worlds::GRAVITY_M_S2;
-use worlds::wave::{Effects, Ring, Start, WaveWorld};
+use worlds::physics::slosh::{Effects, Oscillation, SloshWorld, Start};
 
 use super::wrist::{Load, Turn, Wrist};
 use super::{Outcome, Rig, on_log_scale};
@@ -60,7 +60,7 @@ impl Rig for Swung {
         let size = on_log_scale(rng, [0.3, 3.0]);
         let signed = if rng.random::<bool>() { size } else { -size };
         let none = Effects::default();
-        let ring = |omega_rad_s, share: f64| Ring {
+        let ring = |omega_rad_s, share: f64| Oscillation {
             omega_rad_s,
             damping_ratio: 0.01,
             amplitude: share * size * HIGHEST_NM,
@@ -159,9 +159,9 @@ impl Wave {
         let start = Start {
             amplitude: share * HIGHEST_NM,
             phases_rad: [phase(), phase(), phase(), 0.0],
-            reading: 1.0,
+            lag_error: 1.0,
         };
-        let ring = |r: Ring| Ring { amplitude: share * r.amplitude, ..r };
+        let ring = |r: Oscillation| Oscillation { amplitude: share * r.amplitude, ..r };
         let effects = Effects {
             nonlinear_frequency: share * share * e.nonlinear_frequency,
             second_mode: ring(e.second_mode),
@@ -169,7 +169,7 @@ impl Wave {
             lag_start: share * e.lag_start,
             ..e
         };
-        let world = WaveWorld {
+        let world = SloshWorld {
             radius_m: RADIUS_M,
             mass_kg: MASS_KG,
             volume_m3: VOLUME_M3,

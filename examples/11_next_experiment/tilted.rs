@@ -8,7 +8,7 @@ use liquid_haptics::wrench::{PlanarWrench, world_from_body};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use worlds::GRAVITY_M_S2;
-use worlds::tilt::{Cavity, Effects, Sweep, TiltWorld};
+use worlds::physics::tilt::{Cavity, Effects, Sweep, TiltWorld};
 
 use super::wrist::{Load, Turn, Wrist};
 use super::{Outcome, Rig, on_log_scale};

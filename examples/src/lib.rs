@@ -13,7 +13,7 @@ use missing_physics::model::Quantity;
 use missing_physics::observer::Silent;
 use missing_physics_domains::trajectory::model::{Axes, Setup, TrajectoryModel};
 use rayon::prelude::*;
-use worlds::flight::{FlightWorld, Seen};
+use worlds::physics::flight::{FlightWorld, Measured};
 
 /// Whether the example was called with `--small`.
 pub fn small() -> bool {
@@ -21,11 +21,11 @@ pub fn small() -> bool {
 }
 
 /// The model of a flight of which nothing is known but gravity.
-pub fn model(seen: Seen) -> TrajectoryModel {
-    let axes = match seen {
-        Seen::Height => Axes::Height,
-        Seen::Space => Axes::Space,
-        Seen::Felt => Axes::Accelerometer,
+pub fn model(measured: Measured) -> TrajectoryModel {
+    let axes = match measured {
+        Measured::Height => Axes::Height,
+        Measured::Position => Axes::Space,
+        Measured::SpecificForce => Axes::Accelerometer,
     };
     TrajectoryModel::new(Setup {
         axes,
@@ -40,7 +40,7 @@ pub fn model(seen: Seen) -> TrajectoryModel {
 /// A drawn world as the engine sees it.
 pub fn recording(world: &FlightWorld, seed: u64) -> Recording {
     let drawn = world.draw(seed);
-    let unit = if world.seen == Seen::Felt { "m/s^2" } else { "m" };
+    let unit = if world.measured == Measured::SpecificForce { "m/s^2" } else { "m" };
     Recording {
         channels: drawn.names.iter().map(|n| Quantity::new(*n, unit)).collect(),
         variables: vec![Quantity::new("t_s", "s")],
@@ -66,7 +66,7 @@ pub fn diagnose_many(
     first_seed: u64,
     replicates: usize,
 ) -> Result<Vec<Diagnosis>, DiagnoseError> {
-    let model = model(world(first_seed).seen);
+    let model = model(world(first_seed).measured);
     let style = ProgressStyle::with_template("{msg:40} {bar:30} {pos}/{len} {eta}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = indicatif::ProgressBar::new(count).with_style(style).with_message(name.to_owned());

@@ -1,8 +1,8 @@
 //! The recordings that come with the tool, made from fixed seeds.
 
-use crate::flight::{Effects, FlightWorld, Seen};
 use crate::noise::Noise;
-use crate::pendulum::{Friction, PendulumWorld};
+use crate::physics::flight::{Effects, FlightWorld, Measured};
+use crate::physics::pendulum::{Friction, PendulumWorld};
 
 /// A bundled recording: its folder's name and its files' contents.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,7 +46,7 @@ pub fn all() -> Vec<Bundled> {
             ..Effects::default()
         },
         noise: Noise::white(0.001),
-        ..FlightWorld::thrown(Seen::Space)
+        ..FlightWorld::thrown(Measured::Position)
     };
     let swing = PendulumWorld {
         length_m: 0.52,
@@ -56,7 +56,7 @@ pub fn all() -> Vec<Bundled> {
         rate_hz: 25.0,
         noise: Noise { digit: 0.001, ..Noise::white(0.002) },
     };
-    let steel = FlightWorld { noise: Noise::white(0.0015), ..FlightWorld::thrown(Seen::Space) };
+    let steel = FlightWorld { noise: Noise::white(0.0015), ..FlightWorld::thrown(Measured::Position) };
     vec![
         Bundled {
             name: "dropped-ball",

@@ -3,7 +3,7 @@
 
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use worlds::bounce::{BounceWorld, Effects};
+use worlds::physics::bounce::{BounceWorld, Effects};
 
 /// Times that are all 2 % too long make balls seem to come faster than they can have fallen: not because they come aslant, though
 /// where they come from is fitted with the rest.

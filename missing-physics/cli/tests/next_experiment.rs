@@ -10,8 +10,8 @@ use missing_physics_domains::Loaded;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
-use worlds::press::{Effects, Indenter, PressWorld, Step};
-use worlds::wave::{Start, WaveWorld};
+use worlds::physics::indentation::{Effects, IndentationWorld, Indenter, Step};
+use worlds::physics::slosh::{SloshWorld, Start};
 
 fn load(header: &str, data: &str) -> Loaded {
     let folder = tempfile::tempdir().unwrap();
@@ -27,7 +27,7 @@ fn ask(effects: Effects, curves: &[[f64; 2]], seed: u64) -> Diagnosis {
         let share = row as f64 / (ROWS - 1) as f64;
         Step { delta_m: from + share * (to - from), t_s: share, down: true }
     };
-    let world = PressWorld {
+    let world = IndentationWorld {
         indenter: Indenter::Sphere(0.01),
         poisson_ratio: 0.5,
         moduli_pa: vec![2e4],
@@ -70,7 +70,7 @@ fn an_offset_that_looks_like_adhesion_is_looked_for_above_the_contact() {
 #[test]
 fn a_proposed_swing_says_how_high_and_how_long() {
     let (radius_m, volume_m3, mass_kg) = (0.04, 4e-4, 0.4);
-    let world = WaveWorld {
+    let world = SloshWorld {
         radius_m,
         mass_kg,
         volume_m3,
@@ -78,7 +78,7 @@ fn a_proposed_swing_says_how_high_and_how_long() {
         starts: vec![Start::wave(0.02, 0.5)],
         rows: 121,
         rate_hz: 40.0,
-        effects: worlds::wave::Effects::default(),
+        effects: worlds::physics::slosh::Effects::default(),
     };
     let mut data = "run,t_s,tau_z_nm\n".to_owned();
     for (row, torque_nm) in world.readings().iter().enumerate() {

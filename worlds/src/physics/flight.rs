@@ -9,15 +9,17 @@ use rand_distr::{Distribution, Uniform};
 use crate::GRAVITY_M_S2;
 use crate::noise::Noise;
 
+use super::runge_kutta;
+
 /// What is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seen {
+pub enum Measured {
     /// Height alone.
     Height,
     /// All coordinates.
-    Space,
+    Position,
     /// The specific force along z, on board.
-    Felt,
+    SpecificForce,
 }
 
 /// Everything that may act beside gravity; all zero is a vacuum and a true camera.
@@ -33,16 +35,16 @@ pub struct Effects {
     pub magnus_per_s: [f64; 3],
     /// Velocity of the air in m/s.
     pub wind_m_s: [f64; 2],
-    /// Positions are read this much too large, relative to 1.
+    /// Relative error of the positions' scale.
     pub camera_scale: f64,
     /// Rotation of the readings about x, then y, in rad.
     pub camera_tilt_rad: [f64; 2],
-    /// Stated times are this much too long, relative to 1.
+    /// Relative error of the stated times.
     pub clock_rate: f64,
     /// Unlisted: amplitude in m and frequency in Hz of a swinging mast, its phase new in each run; x swings by the
     /// amplitude, y by 0.3 and z by 0.1 of it.
     pub mast: [f64; 2],
-    /// Unlisted: the drag falls to this share above a speed in m/s (share, speed); (0, 0) for none.
+    /// Unlisted: the drag falls to a fraction above a speed in m/s: fraction, speed; both 0 for none.
     pub drag_crisis: [f64; 2],
     /// Unlisted: a cord that pulls back towards the start, in 1/s^2.
     pub cord_per_s2: f64,
@@ -66,7 +68,7 @@ pub struct Gust {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlightWorld {
     /// What is measured.
-    pub seen: Seen,
+    pub measured: Measured,
     /// Number of runs.
     pub runs: usize,
     /// Fewest and most rows of a run.
@@ -108,9 +110,9 @@ const STEPS: usize = 40;
 
 impl FlightWorld {
     /// Five throws, filmed at 60 Hz for about a second.
-    pub fn thrown(seen: Seen) -> Self {
+    pub fn thrown(measured: Measured) -> Self {
         Self {
-            seen,
+            measured,
             runs: 5,
             rows: [40, 70],
             frame_hz: 60.0,
@@ -129,7 +131,7 @@ impl FlightWorld {
             frame_hz,
             speed_m_s: [0.0, 0.3],
             elevation_rad: [-1.6, -1.5],
-            ..Self::thrown(Seen::Height)
+            ..Self::thrown(Measured::Height)
         }
     }
 
@@ -152,10 +154,10 @@ impl FlightWorld {
                 ([x, y, z, u, v, w], rows, between([0.0, std::f64::consts::TAU]))
             })
             .collect();
-        let names: &[&str] = match self.seen {
-            Seen::Height => &["z_m"],
-            Seen::Space => &["x_m", "y_m", "z_m"],
-            Seen::Felt => &["accel_z_m_s2"],
+        let names: &[&str] = match self.measured {
+            Measured::Height => &["z_m"],
+            Measured::Position => &["x_m", "y_m", "z_m"],
+            Measured::SpecificForce => &["accel_z_m_s2"],
         };
         let runs = plans
             .into_iter()
@@ -189,12 +191,10 @@ impl FlightWorld {
                     - GRAVITY_M_S2,
             ]
         };
-        let rate = |y: &[f64; 6], gust: [f64; 3]| {
+        let rates = |y: &[f64; 6], gust: [f64; 3]| {
             let f = force(y, gust);
             [y[3], y[4], y[5], f[0], f[1], f[2]]
         };
-        let moved =
-            |y: &[f64; 6], k: &[f64; 6], h: f64| -> [f64; 6] { std::array::from_fn(|i| y[i] + h * k[i]) };
         // The clock states (1 + rate) times the true time: frames are that much closer together.
         let frame = 1.0 / self.frame_hz;
         let h = frame / (1.0 + e.clock_rate) / steps as f64;
@@ -206,7 +206,8 @@ impl FlightWorld {
         };
         let mut y = start;
         let mut t_s = Vec::with_capacity(rows);
-        let mut channels = vec![Vec::with_capacity(rows); if self.seen == Seen::Space { 3 } else { 1 }];
+        let mut channels =
+            vec![Vec::with_capacity(rows); if self.measured == Measured::Position { 3 } else { 1 }];
         for i in 0..rows {
             let t = i as f64 * frame;
             t_s.push(t);
@@ -216,23 +217,17 @@ impl FlightWorld {
             if size != 0.0 && t >= knocked_at {
                 seen[2] += size;
             }
-            match self.seen {
-                Seen::Height => channels[0].push(seen[2]),
-                Seen::Space => channels.iter_mut().zip(seen).for_each(|(c, v)| c.push(v)),
+            match self.measured {
+                Measured::Height => channels[0].push(seen[2]),
+                Measured::Position => channels.iter_mut().zip(seen).for_each(|(c, v)| c.push(v)),
                 // Specific force with an offset that every run has of its own.
-                Seen::Felt => {
+                Measured::SpecificForce => {
                     channels[0].push(force(&y, gust_in(i * steps))[2] + GRAVITY_M_S2 + 0.05 * phase.cos())
                 }
             }
             for step in i * steps..(i + 1) * steps {
                 let gust = gust_in(step);
-                let k1 = rate(&y, gust);
-                let k2 = rate(&moved(&y, &k1, 0.5 * h), gust);
-                let k3 = rate(&moved(&y, &k2, 0.5 * h), gust);
-                let k4 = rate(&moved(&y, &k3, h), gust);
-                for i in 0..6 {
-                    y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
-                }
+                y = runge_kutta::step(&y, 0.0, h, |y, _| rates(y, gust));
             }
         }
         (t_s, channels)

@@ -1,27 +1,23 @@
-//! Sloshing with concealed effects.
+//! The domain `slosh`: sloshing liquids with concealed effects.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{self, between, choose, log_between, stated, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use super::draw::{self, between, choose, log_between, stated, whole};
+use super::key::{Hidden, Key, Place};
+use super::nuisances::{Nuisances, difference};
+use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::set_up::{self, Choice, SetUp};
-use crate::sizing::{Basis, change};
-use crate::wave::{Effects, ROOTS, Ring, Start, WaveWorld};
-
-/// The domain `slosh`.
-#[derive(Debug, Clone, Copy)]
-pub struct Waves;
+use crate::physics::slosh::{Effects, Oscillation, ROOTS, SloshWorld, Start};
 
 const LISTED: usize = 7;
 const UNLISTED: usize = 4;
 
-/// A cylinder, its sensor, and what effects will look like before their size is known.
-struct Bottle {
-    world: WaveWorld,
+/// A cylinder on its sensor.
+pub(crate) struct Bottle {
+    world: SloshWorld,
     noise: Noise,
     /// One sigma of a reading.
     sigma: f64,
@@ -29,24 +25,16 @@ struct Bottle {
     sideways: bool,
     /// The second mode's and the arm's angular frequency and damping ratio.
     rings: [[f64; 2]; 2],
-    hardens: f64,
+    /// Sign of the change of the frequency with the amplitude.
+    frequency_sign: f64,
     least_tension_n_m: f64,
     lag_s: f64,
     machine: [f64; 2],
     slip_s: f64,
 }
 
-impl Maker for Waves {
-    fn domain(&self) -> &'static str {
-        "slosh"
-    }
-
-    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        set_up::conceal::<Bottle>(hidden, seed)
-    }
-}
-
-impl SetUp for Bottle {
+impl Rig for Bottle {
+    const DOMAIN: &'static str = "slosh";
     type Effects = Effects;
 
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
@@ -55,41 +43,41 @@ impl SetUp for Bottle {
         (bottle, Choice { listed: choose(rng, LISTED, hidden.listed()), unlisted })
     }
 
-    fn tried(&self) -> Vec<usize> {
+    fn candidates(&self) -> Vec<usize> {
         (0..LISTED).collect()
     }
 
     /// What the amplitude, the phase and the viscosity of each run can do to the readings.
-    fn basis(&self) -> Basis {
+    fn nuisances(&self) -> Nuisances {
         let (w, rows) = (&self.world, self.world.rows);
         let quarter = std::f64::consts::FRAC_PI_2;
         let thicker = 1.02 * w.viscosity_m2_s;
-        let mut basis = Basis::default();
+        let mut nuisances = Nuisances::default();
         for (run, start) in w.starts.iter().enumerate() {
-            let own = |start: Start, viscosity_m2_s: f64| {
-                let alone = WaveWorld { starts: vec![start], viscosity_m2_s, ..w.clone() };
+            let of_run = |start: Start, viscosity_m2_s: f64| {
+                let alone = SloshWorld { starts: vec![start], viscosity_m2_s, ..w.clone() };
                 alone.readings().iter().map(|x| x / self.sigma).collect::<Vec<f64>>()
             };
-            let first = own(*start, w.viscosity_m2_s);
+            let first = of_run(*start, w.viscosity_m2_s);
             let mut turned = *start;
             turned.phases_rad[0] += quarter;
-            let thick = change(&first, &own(*start, thicker));
-            for part in [first, own(turned, w.viscosity_m2_s), thick] {
+            let thick = difference(&first, &of_run(*start, thicker));
+            for part in [first, of_run(turned, w.viscosity_m2_s), thick] {
                 let mut column = vec![0.0; rows * w.starts.len()];
                 column[run * rows..(run + 1) * rows].copy_from_slice(&part);
-                basis.add(&column);
+                nuisances.add(&column);
             }
         }
-        basis
+        nuisances
     }
 
-    fn change(&self, effects: Effects) -> Vec<f64> {
-        let at_work = WaveWorld { effects, ..self.world.clone() };
-        let difference = change(&self.world.readings(), &at_work.readings());
-        difference.iter().map(|x| x / self.sigma).collect()
+    fn response(&self, effects: Effects) -> Vec<f64> {
+        let at_work = SloshWorld { effects, ..self.world.clone() };
+        let moved = difference(&self.world.readings(), &at_work.readings());
+        moved.iter().map(|x| x / self.sigma).collect()
     }
 
-    fn bounds(&self, listed: usize) -> [f64; 2] {
+    fn size_bounds(&self, listed: usize) -> [f64; 2] {
         let largest = self.largest();
         match listed {
             0 => [self.least_tension_n_m, 0.08],
@@ -101,12 +89,15 @@ impl SetUp for Bottle {
         }
     }
 
-    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
-        let ring =
-            |[omega_rad_s, damping_ratio]: [f64; 2]| Ring { omega_rad_s, damping_ratio, amplitude: size };
+    fn apply(&self, e: &mut Effects, listed: usize, size: f64) {
+        let ring = |[omega_rad_s, damping_ratio]: [f64; 2]| Oscillation {
+            omega_rad_s,
+            damping_ratio,
+            amplitude: size,
+        };
         match listed {
             0 => e.surface_tension_n_m = size,
-            1 => e.nonlinear_frequency = self.hardens * size,
+            1 => e.nonlinear_frequency = self.frequency_sign * size,
             2 => e.friction = size,
             3 => e.quadratic = size,
             4 => e.second_mode = ring(self.rings[0]),
@@ -115,8 +106,8 @@ impl SetUp for Bottle {
         }
     }
 
-    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
-        let ring = |r: &Ring, omega: f64| {
+    fn describe(&self, e: &Effects, listed: usize, key: &mut Key) {
+        let ring = |r: &Oscillation, omega: f64| {
             let amplitude = if self.sideways { "amplitude_n" } else { "amplitude_nm" };
             [("omega_rad_s", omega), ("damping_ratio", r.damping_ratio), (amplitude, r.amplitude)]
         };
@@ -133,7 +124,7 @@ impl SetUp for Bottle {
             }
             4 => {
                 // Where there is surface tension it moves the second mode as well.
-                let at_work = WaveWorld { effects: *e, ..self.world.clone() };
+                let at_work = SloshWorld { effects: *e, ..self.world.clone() };
                 let omega = at_work.omega_rad_s(ROOTS[1], at_work.depth_m());
                 key.add("second-mode", &ring(&e.second_mode, omega));
             }
@@ -142,7 +133,7 @@ impl SetUp for Bottle {
         }
     }
 
-    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+    fn unlisted_size_bounds(&self, which: usize) -> [f64; 2] {
         match which {
             0 | 2 => [0.02 * self.sigma, 0.5 * self.largest()],
             1 => [1e-3, 0.08],
@@ -150,17 +141,17 @@ impl SetUp for Bottle {
         }
     }
 
-    fn unlisted(&self, which: usize, turn: f64, size: f64) -> Effects {
+    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
             0 => Effects { machine: [size, self.machine[0], self.machine[1]], ..none },
             1 => Effects { leak: size, ..none },
-            2 => Effects { slip: [turn * size, self.slip_s], slip_run: self.world.starts.len() / 2, ..none },
+            2 => Effects { slip: [sign * size, self.slip_s], slip_run: self.world.starts.len() / 2, ..none },
             _ => Effects { swirl_rad_s: size, ..none },
         }
     }
 
-    fn say_unlisted(&self, which: usize, key: &mut Key) {
+    fn describe_unlisted(&self, which: usize, key: &mut Key) {
         let end = self.world.rows as f64 / self.world.rate_hz;
         let from = |from: f64| Some(Place { variable: "t_s".into(), from, to: end });
         let (what, place) = match which {
@@ -174,7 +165,7 @@ impl SetUp for Bottle {
     }
 
     fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
-        let w = WaveWorld { effects, ..self.world };
+        let w = SloshWorld { effects, ..self.world };
         let channel = if self.sideways { "fx_n" } else { "tau_z_nm" };
         let mut header = String::from("format = 1\ndomain = \"slosh\"\ndata = \"data.csv\"\n");
         if whole(rng, 0, 2) > 0 {
@@ -218,12 +209,12 @@ impl Bottle {
             .map(|_| Start {
                 amplitude: largest * between(rng, 0.5, 1.0),
                 phases_rad: std::array::from_fn(|_| between(rng, 0.0, TAU)),
-                reading: between(rng, -1.0, 1.0),
+                lag_error: between(rng, -1.0, 1.0),
             })
             .collect();
         let rate_hz = [50.0, 100.0, 125.0][whole(rng, 0, 2)];
         let duration_s = between(rng, 5.0, 10.0);
-        let world = WaveWorld {
+        let world = SloshWorld {
             radius_m,
             mass_kg: volume_m3 * between(rng, 780.0, 1300.0),
             volume_m3,
@@ -243,7 +234,7 @@ impl Bottle {
             }
         };
         let rings = [[modes[1], log_between(rng, 0.004, 0.03)], [arm, log_between(rng, 0.003, 0.03)]];
-        let hardens = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
+        let frequency_sign = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
         let machine = [modes[0] * between(rng, 1.15, 1.8), duration_s * between(rng, 0.2, 0.6)];
         let slip_s = duration_s * between(rng, 0.2, 0.8);
         Self {
@@ -254,7 +245,7 @@ impl Bottle {
             world,
             sideways,
             rings,
-            hardens,
+            frequency_sign,
             machine,
             slip_s,
         }
@@ -270,7 +261,7 @@ mod tests {
     use rand::SeedableRng as _;
 
     use super::*;
-    use crate::set_up::tests::every_effect_shows;
+    use crate::concealed::rig::tests::every_effect_shows;
 
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
@@ -289,10 +280,10 @@ mod tests {
         other.starts[0].phases_rad[0] += 0.7;
         other.starts[1].amplitude *= 1.2;
         other.viscosity_m2_s *= 1.01;
-        let moved = change(&bottle.world.readings(), &other.readings());
+        let moved = difference(&bottle.world.readings(), &other.readings());
         let moved: Vec<f64> = moved.iter().map(|x| x / bottle.sigma).collect();
         let whole = moved.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let left = bottle.basis().left(&moved);
+        let left = bottle.nuisances().residual_norm(&moved);
         assert!(whole > 30.0 && left < 0.01 * whole, "{left} of {whole}");
     }
 }

@@ -1,20 +1,21 @@
-//! Flights with concealed effects.
+//! The domain `trajectory`: flights with concealed effects.
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{between, choose, log_between, noise, sign, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
-use crate::flight::{Effects, FlightWorld, Gust, Seen};
+use super::draw::{between, choose, log_between, noise, sign, whole};
+use super::key::{Concealed, Hidden, Key, Place};
+use super::maker::Maker;
+use crate::physics::flight::{Effects, FlightWorld, Gust, Measured};
 
-/// The domain `trajectory`.
+/// Makes worlds of the domain `trajectory`.
 #[derive(Debug, Clone, Copy)]
-pub struct Flights;
+pub(crate) struct Trajectory;
 
 /// Listed effects that a camera can see in space.
 const LISTED: usize = 8;
 
-impl Maker for Flights {
+impl Maker for Trajectory {
     fn domain(&self) -> &'static str {
         "trajectory"
     }
@@ -28,7 +29,7 @@ impl Maker for Flights {
             runs: whole(&mut rng, 4, 8),
             rows: [rows, rows + 15],
             noise: noise(&mut rng, sigma),
-            ..FlightWorld::thrown(Seen::Space)
+            ..FlightWorld::thrown(Measured::Position)
         };
         let effects = &mut world.effects;
         for which in choose(&mut rng, LISTED, hidden.listed()) {
@@ -67,7 +68,7 @@ fn listed(e: &mut Effects, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
             // Moving air acts through drag, which then is at work as well: it comes with the wind, unless a linear drag is there that
             // would pass for the whole of it.
             e.quadratic_per_m = e.quadratic_per_m.max(log_between(rng, 0.02, 0.1));
-            key.without("quadratic-drag");
+            key.remove("quadratic-drag");
             if key.mechanisms.iter().any(|m| m == "linear-drag") {
                 key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]);
             } else {
@@ -128,7 +129,7 @@ mod tests {
     /// A wind brings its drag along, whatever was drawn before it; beside a linear drag the key names both.
     #[test]
     fn the_key_says_the_drag_beside_a_wind() {
-        let keys = (0..600).map(|seed| Flights.conceal(Hidden::Two, seed).key);
+        let keys = (0..600).map(|seed| Trajectory.conceal(Hidden::Two, seed).key);
         let winds: Vec<Key> = keys.filter(|k| k.mechanisms.iter().any(|m| m == "wind")).collect();
         let named = |k: &Key, id: &str| k.mechanisms.iter().any(|m| m == id);
         for key in &winds {

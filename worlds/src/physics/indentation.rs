@@ -1,8 +1,9 @@
 //! An indenter pressed into a soft body: the contact as a row of springs (the method of dimensionality reduction, Popov and Hess
 //! 2015, doi:10.1007/978-3-642-53876-6), which is exact for bodies of revolution without friction, elastic or viscoelastic.
 
-use crate::layer::Layer;
-use crate::quadrature::{gauss, integral};
+use super::bisection::bisect;
+use super::layer::Layer;
+use super::quadrature::{gauss, integral};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
@@ -30,19 +31,19 @@ pub struct Effects {
     pub adhesion_j_m2: f64,
     /// Thickness of the body, bonded to a rigid ground, m; 0 for a half-space (spheres only).
     pub thickness_m: f64,
-    /// Part of the modulus that relaxes.
+    /// Fraction of the modulus that relaxes.
     pub relaxed_fraction: f64,
-    /// Its time constant in s.
+    /// Time constant of the relaxation in s.
     pub tau_s: f64,
-    /// Extra stiffness: beyond a depth in m, N/m.
+    /// A rim that is met at a depth in m, and its stiffness in N/m.
     pub rim: [f64; 2],
-    /// Depth reading that the load cell takes up, m/N.
+    /// Compliance of the load cell, which adds to the depth reading, m/N.
     pub compliance_m_n: f64,
-    /// Force that is always read, N.
+    /// Offset of the load cell, N.
     pub force_offset_n: f64,
     /// The force times 1 + this depth/radius (spheres and cylinders).
     pub stiffening: f64,
-    /// Unlisted: part of the largest depth that stays as a dent.
+    /// Unlisted: fraction of the largest depth that stays as a dent.
     pub dent: f64,
     /// Unlisted: a ripple of the drive: amplitude in N, pitch in m.
     pub ripple: [f64; 2],
@@ -50,7 +51,7 @@ pub struct Effects {
     pub slip: [f64; 2],
 }
 
-/// One reading's place in a run.
+/// Depth and time of a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Depth reading in m.
@@ -63,8 +64,8 @@ pub struct Step {
 
 /// Curves of force over depth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PressWorld {
-    /// What is pressed in.
+pub struct IndentationWorld {
+    /// The indenter.
     pub indenter: Indenter,
     /// Poisson's ratio.
     pub poisson_ratio: f64,
@@ -76,7 +77,7 @@ pub struct PressWorld {
     pub effects: Effects,
 }
 
-/// Exact for the springs of all three indenters.
+/// A quadrature rule that is exact for the springs of all three indenters.
 fn rule() -> &'static [[f64; 2]] {
     static RULE: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
     RULE.get_or_init(|| gauss(4))
@@ -120,27 +121,24 @@ impl Indenter {
     }
 }
 
-/// Force of a sticky sphere (Johnson, Kendall and Roberts): the contact's edge is stretched by `sqrt(2 pi a w/E*)`, and its radius
+/// Force of an adhesive sphere (Johnson, Kendall and Roberts): the contact's edge is stretched by `sqrt(2 pi a w/E*)`, and its radius
 /// is the larger of the two at which that can be; `None` beyond where it tears off.
-pub fn sticky_n(radius_m: f64, plane_pa: f64, work_j_m2: f64, depth_m: f64) -> Option<f64> {
+pub fn jkr_force_n(radius_m: f64, plane_pa: f64, work_j_m2: f64, depth_m: f64) -> Option<f64> {
     let edge = |a: f64| (2.0 * PI * a * work_j_m2 / plane_pa).sqrt();
     let depth_of = |a: f64| a * a / radius_m - edge(a);
     let least = (radius_m * radius_m * 2.0 * PI * work_j_m2 / (16.0 * plane_pa)).cbrt();
     if depth_of(least) > depth_m {
         return None;
     }
-    let (mut low, mut high) = (least, least + (radius_m * depth_m.abs()).sqrt());
+    let (low, mut high) = (least, least + (radius_m * depth_m.abs()).sqrt());
     while depth_of(high) < depth_m {
         high *= 2.0;
     }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if depth_of(middle) < depth_m { low = middle } else { high = middle }
-    }
+    let [_, high] = bisect([low, high], 60, |a| depth_of(a) < depth_m);
     Some(2.0 * plane_pa * (depth_m * high - high.powi(3) / (3.0 * radius_m)))
 }
 
-impl PressWorld {
+impl IndentationWorld {
     /// Forces of all runs without noise, run after run, N.
     pub fn readings(&self) -> Vec<f64> {
         let layer = (self.effects.thickness_m > 0.0).then(|| Layer::new(self.poisson_ratio));
@@ -204,7 +202,7 @@ impl PressWorld {
                 *force *= 1.0 + e.stiffening * depth / radius;
             }
             if let (true, Indenter::Sphere(radius)) = (e.adhesion_j_m2 > 0.0 && touched, self.indenter) {
-                let sticky = sticky_n(radius, plane, e.adhesion_j_m2, inside[i]);
+                let sticky = jkr_force_n(radius, plane, e.adhesion_j_m2, inside[i]);
                 touched = sticky.is_some();
                 *force += sticky.map_or(0.0, |f| f - self.indenter.force_n(plane, depth));
             }
@@ -254,7 +252,7 @@ impl PressWorld {
 mod tests {
     use super::*;
 
-    fn world(indenter: Indenter, effects: Effects) -> PressWorld {
+    fn world(indenter: Indenter, effects: Effects) -> IndentationWorld {
         let down =
             (0..=40).map(|i| Step { delta_m: 1e-4 * f64::from(i), t_s: 0.1 * f64::from(i), down: true });
         let rest = (1..=100).map(|i| Step { delta_m: 4e-3, t_s: 4.0 + 0.1 * f64::from(i), down: true });
@@ -264,7 +262,7 @@ mod tests {
             down: false,
         });
         let runs = vec![(0, down.chain(rest).chain(up).collect())];
-        PressWorld { indenter, poisson_ratio: 0.5, moduli_pa: vec![2e4], runs, effects }
+        IndentationWorld { indenter, poisson_ratio: 0.5, moduli_pa: vec![2e4], runs, effects }
     }
 
     /// Hertz for nu = 0.5: 16/9 E sqrt(R) d^1.5; the cylinder 8/3 E R d; the cone 8/(3 pi) E d^2 / tan.
@@ -291,16 +289,16 @@ mod tests {
         let (radius, plane, work) = (0.01, 3e4, 0.2);
         let unit = PI * work * radius;
         approx::assert_relative_eq!(
-            sticky_n(radius, plane, work, 0.0).unwrap() / unit,
+            jkr_force_n(radius, plane, work, 0.0).unwrap() / unit,
             -4.0 / 3.0,
             max_relative = 1e-9
         );
         let torn = -0.75 * (PI * PI * work * work * radius / (plane * plane)).cbrt();
-        assert!(sticky_n(radius, plane, work, torn * 1.0001).is_none());
-        let last = sticky_n(radius, plane, work, torn * 0.999_999_9).unwrap();
+        assert!(jkr_force_n(radius, plane, work, torn * 1.0001).is_none());
+        let last = jkr_force_n(radius, plane, work, torn * 0.999_999_9).unwrap();
         approx::assert_relative_eq!(last / unit, -5.0 / 6.0, max_relative = 2e-3);
         let least = (0..20_000)
-            .filter_map(|i| sticky_n(radius, plane, work, torn * f64::from(i) / 20_000.0))
+            .filter_map(|i| jkr_force_n(radius, plane, work, torn * f64::from(i) / 20_000.0))
             .fold(0.0, f64::min);
         approx::assert_relative_eq!(least / unit, -1.5, max_relative = 1e-6);
     }

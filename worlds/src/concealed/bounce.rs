@@ -1,19 +1,20 @@
-//! Bouncing balls with concealed effects.
+//! The domain `bounce`, from times and places: bouncing balls with concealed effects.
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::bounce::{BounceWorld, Effects};
-use crate::concealed::draw::{between, choose, log_between, sign, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker};
+use super::draw::{between, choose, log_between, sign, whole};
+use super::key::{Concealed, Hidden, Key};
+use super::maker::Maker;
+use crate::physics::bounce::{BounceWorld, Effects};
 
-/// The domain `bounce`, from events with places.
+/// Makes worlds of the domain `bounce` from times and places of impacts.
 #[derive(Debug, Clone, Copy)]
-pub struct Bounces;
+pub(crate) struct Bounce;
 
 pub(crate) const LISTED: usize = 7;
 
-impl Maker for Bounces {
+impl Maker for Bounce {
     fn domain(&self) -> &'static str {
         "bounce"
     }
@@ -36,7 +37,7 @@ impl Maker for Bounces {
             listed(&mut world, which, &mut key, &mut rng);
         }
         if hidden == Hidden::Unlisted {
-            world.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
+            world.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
         let mut seed = seed ^ 0x5eed;
@@ -47,9 +48,7 @@ impl Maker for Bounces {
             made = world.files_and_unheard(seed);
         }
         let ([header, data], unheard) = made;
-        // The format asks for the share of these very runs.
-        let share = unheard as f64 / world.runs as f64;
-        key.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact").for_each(|p| p.value = share);
+        key.state_missed(unheard, world.runs);
         Concealed::table(header, data, key)
     }
 }
@@ -68,8 +67,8 @@ pub(crate) fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: 
         }
         2 => {
             let size = log_between(rng, 0.002, 0.06);
-            e.table = [0.8 * sign(rng) * size, 0.6 * sign(rng) * size];
-            key.add("table-tilt", &[("slope_x", e.table[0]), ("slope_y", e.table[1])]);
+            e.table_slope = [0.8 * sign(rng) * size, 0.6 * sign(rng) * size];
+            key.add("table-tilt", &[("slope_x", e.table_slope[0]), ("slope_y", e.table_slope[1])]);
         }
         3 => {
             e.friction = log_between(rng, 0.03, 0.4);

@@ -5,19 +5,19 @@ use std::f64::consts::{FRAC_PI_4, PI};
 
 /// The band: its force at a throw and a depth is `(k0 + k1 (throw - throw0)) depth (1 + k2 depth)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Elastic {
-    /// In N/m.
+pub struct Band {
+    /// Stiffness at `throw0_m`, N/m.
     pub k0_n_m: f64,
-    /// In N/m^2.
+    /// Change of the stiffness with the throw, N/m^2.
     pub k1_n_m2: f64,
-    /// In m.
+    /// Throw at which the stiffness is `k0_n_m`, m.
     pub throw0_m: f64,
-    /// In 1/m.
+    /// Relative rise of the stiffness with the depth, 1/m.
     pub k2_per_m: f64,
 }
 
-impl Elastic {
-    /// Force in N.
+impl Band {
+    /// Force in N at a throw and a depth in m.
     pub fn force_n(&self, [throw_m, depth_m]: [f64; 2]) -> f64 {
         let stiffness = self.k0_n_m + self.k1_n_m2 * (throw_m - self.throw0_m);
         stiffness * depth_m * (1.0 + self.k2_per_m * depth_m)
@@ -27,19 +27,19 @@ impl Elastic {
 /// Everything that may have changed since the training rolls; all zero is nothing. A response is what a roll does in the end.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effects {
-    /// By how much every response is larger.
+    /// Relative change of every response.
     pub response: f64,
-    /// The response fades with the time since the dough was made, 1/s.
+    /// Rate at which the response fades with the time since the dough was made, 1/s.
     pub drying_per_s: f64,
-    /// Below this force nothing happens, N.
+    /// Force below which the band slips and nothing is deformed, N.
     pub slip_n: f64,
-    /// The part of a change that is undone before the next roll.
+    /// Fraction of a strain that is undone before the next roll.
     pub springback: f64,
-    /// The part of the volume that each roll leaves on the tool.
+    /// Fraction of the volume that each roll leaves on the tool.
     pub loss: f64,
-    /// The response fades with the rolls of a run.
+    /// Rate at which the response fades with the rolls of a run.
     pub softening_per_roll: f64,
-    /// Unlisted: even rolls answer more, odd ones less, by this part.
+    /// Unlisted: relative change of the response, up at even rolls and down at odd ones.
     pub alternation: f64,
     /// Unlisted: relative change of the response by the throw beyond 80 mm, 1/m.
     pub throw_per_m: f64,
@@ -49,9 +49,9 @@ pub struct Effects {
     pub worked: f64,
 }
 
-/// A piece of dough as it lies there.
+/// Size and shape of a piece of dough.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lying {
+pub struct Shape {
     /// Its volume in m^3.
     pub volume_m3: f64,
     /// Its length in m.
@@ -60,7 +60,7 @@ pub struct Lying {
     pub oval: f64,
 }
 
-impl Lying {
+impl Shape {
     /// Mean diameter in m: `V = pi/4 d^2 (l - d/3)`.
     fn diameter_m(&self) -> f64 {
         let l = self.length_m;
@@ -73,7 +73,7 @@ impl Lying {
         d
     }
 
-    /// This dough, its shape a part of the way to another's: that part of the strain, and of the change of its cross-section.
+    /// This dough with a part of the strain, and of the change of the cross-section, that lead to another's shape.
     fn towards(&self, other: &Self, part: f64) -> Self {
         Self {
             length_m: self.length_m.powf(1.0 - part) * other.length_m.powf(part),
@@ -92,37 +92,37 @@ impl Lying {
 /// One dough and what is done to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
-    /// Before the first roll.
-    pub fresh: Lying,
-    /// Its response over that of the others.
-    pub soft: f64,
+    /// Size and shape before the first roll.
+    pub fresh: Shape,
+    /// The response of this dough over that of the others.
+    pub softness: f64,
     /// Rolls, in order.
-    pub rolls: Vec<Planned>,
+    pub rolls: Vec<PlannedRoll>,
 }
 
-/// A roll that is to be made.
+/// A roll before it is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Planned {
-    /// Where throw and depth lie between the bounds that the dough's width and height give them, in [0, 1].
-    pub place: [f64; 2],
-    /// Since the dough was made, s.
+pub struct PlannedRoll {
+    /// Position of throw and depth between the bounds that the dough's width and height give them, in [0, 1].
+    pub setting: [f64; 2],
+    /// Time since the dough was made, s.
     pub t_s: f64,
-    /// This roll's response over what it should be.
-    pub luck: f64,
+    /// The response to this roll over the one that the laws give.
+    pub scatter: f64,
 }
 
 /// A roll that was made, dimensions in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Made {
-    /// Before it.
+pub struct Roll {
+    /// Length, width and height before the roll.
     pub before: [f64; 3],
     /// Throw and depth in m.
     pub action: [f64; 2],
-    /// After it.
+    /// Length, width and height after the roll.
     pub after: [f64; 3],
-    /// What would be after it had nothing changed since the training.
-    pub usual: [f64; 3],
-    /// Since the dough was made, s.
+    /// Length, width and height after the roll had nothing changed since the training.
+    pub unchanged: [f64; 3],
+    /// Time since the dough was made, s.
     pub t_s: f64,
 }
 
@@ -130,19 +130,19 @@ pub struct Made {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DoughWorld {
     /// The band.
-    pub band: Elastic,
-    /// Its breadth in m.
+    pub band: Band,
+    /// Breadth of the band in m.
     pub breadth_m: f64,
     /// Modulus of the dough under a short load, Pa.
     pub elastic_pa: f64,
     /// Stress below which it does not flow, Pa.
     pub yield_pa: f64,
-    /// Its strain rate at [`EXCESS_PA`] above, 1/s.
+    /// Strain rate at [`EXCESS_PA`] above the yield stress, 1/s.
     pub rate_per_s: f64,
     /// The power of the excess with which it flows.
     pub exponent: f64,
-    /// By how much a cross-section gets oval as the dough gets longer.
-    pub flattens: f64,
+    /// Rise of `oval` with the logarithm of the length.
+    pub flattening: f64,
     /// The doughs.
     pub pieces: Vec<Piece>,
     /// What acts.
@@ -151,7 +151,7 @@ pub struct DoughWorld {
 
 /// Excess of stress at which a strain rate is stated, Pa.
 pub const EXCESS_PA: f64 = 3e3;
-/// There and back at constant speed: m, m/s.
+/// Travel of the band over a dough, there and back, in m, and its speed in m/s.
 const TRAVEL_M: f64 = 0.2;
 const SPEED_M_S: f64 = 0.1;
 const STEPS: usize = 24;
@@ -161,19 +161,19 @@ const LEAST_DEPTH_M: f64 = 5e-3;
 
 impl DoughWorld {
     /// All rolls of all doughs.
-    pub fn rolled(&self) -> Vec<Vec<Made>> {
+    pub fn rolled(&self) -> Vec<Vec<Roll>> {
         self.pieces.iter().map(|p| self.roll_all(p)).collect()
     }
 
-    fn roll_all(&self, piece: &Piece) -> Vec<Made> {
+    fn roll_all(&self, piece: &Piece) -> Vec<Roll> {
         let mut lying = piece.fresh;
         let mut strain_before = 0.0;
         let mut made = Vec::with_capacity(piece.rolls.len());
         for (step, roll) in piece.rolls.iter().enumerate() {
-            let action = within(&lying.dimensions_m(), roll.place);
-            let usual = self.flow(&lying, action, piece.soft * roll.luck);
+            let action = within(&lying.dimensions_m(), roll.setting);
+            let unchanged = self.flow(&lying, action, piece.softness * roll.scatter);
             let response = self.response(step, roll.t_s, action, lying.length_m, strain_before);
-            let mut after = lying.towards(&usual, response);
+            let mut after = lying.towards(&unchanged, response);
             strain_before = (after.length_m / lying.length_m).ln();
             // Each dimension of what is left is smaller alike; what springs back is its strain, and not what was lost.
             let mut unstrained = lying;
@@ -181,11 +181,11 @@ impl DoughWorld {
                 dough.volume_m3 *= 1.0 - self.effects.loss;
                 dough.length_m *= (1.0 - self.effects.loss).cbrt();
             }
-            made.push(Made {
+            made.push(Roll {
                 before: lying.dimensions_m(),
                 action,
                 after: after.dimensions_m(),
-                usual: usual.dimensions_m(),
+                unchanged: unchanged.dimensions_m(),
                 t_s: roll.t_s,
             });
             lying = after.towards(&unstrained, self.effects.springback);
@@ -193,7 +193,7 @@ impl DoughWorld {
         made
     }
 
-    /// The response over the usual one.
+    /// The response over the one without effects.
     fn response(&self, step: usize, t_s: f64, action: [f64; 2], length_m: f64, strain_before: f64) -> f64 {
         let e = &self.effects;
         if self.band.force_n(action) < e.slip_n {
@@ -208,8 +208,8 @@ impl DoughWorld {
         (1.0 + e.response) * faded * worked * law
     }
 
-    /// What a roll makes of a dough that flows so much faster than others.
-    fn flow(&self, lying: &Lying, action: [f64; 2], soft: f64) -> Lying {
+    /// The dough after a roll without effects, for one whose response is this many times that of the others.
+    fn flow(&self, lying: &Shape, action: [f64; 2], softness: f64) -> Shape {
         let mut now = *lying;
         // The band follows the dough down.
         let force = self.band.force_n(action);
@@ -226,8 +226,8 @@ impl DoughWorld {
             // What is squeezed flows along the dough as the way is short.
             let along = 2.0 * half / (2.0 * half + self.breadth_m);
             let rate = self.rate_per_s * (excess / EXCESS_PA).powf(self.exponent);
-            let strain = soft * along * touched / length * rate * (TRAVEL_M / SPEED_M_S / STEPS as f64);
-            now.oval += (self.flattens - 0.2 * now.oval) * strain;
+            let strain = softness * along * touched / length * rate * (TRAVEL_M / SPEED_M_S / STEPS as f64);
+            now.oval += (self.flattening - 0.2 * now.oval) * strain;
             now.length_m *= strain.exp();
         }
         now
@@ -235,12 +235,12 @@ impl DoughWorld {
 }
 
 /// The band at least as long as the dough is wide, and pressed no deeper than it is high.
-fn within(dimensions_m: &[f64; 3], place: [f64; 2]) -> [f64; 2] {
+fn within(dimensions_m: &[f64; 3], setting: [f64; 2]) -> [f64; 2] {
     let shortest = dimensions_m[1].clamp(THROWS_M[0], THROWS_M[1]);
     let deepest = dimensions_m[2].max(LEAST_DEPTH_M);
-    // As a gripper is told: to a tenth of a millimetre.
-    let told = |low: f64, high: f64, u: f64| ((low + u * (high - low)) * 1e4).round() * 1e-4;
-    [told(shortest, THROWS_M[1], place[0]), told(LEAST_DEPTH_M, deepest, place[1])]
+    // A gripper's command is given to a tenth of a millimetre.
+    let command = |low: f64, high: f64, u: f64| ((low + u * (high - low)) * 1e4).round() * 1e-4;
+    [command(shortest, THROWS_M[1], setting[0]), command(LEAST_DEPTH_M, deepest, setting[1])]
 }
 
 #[cfg(test)]
@@ -248,21 +248,21 @@ mod tests {
     use super::*;
 
     fn world(effects: Effects) -> DoughWorld {
-        let fresh = Lying { volume_m3: 4e-5, length_m: 0.044, oval: 0.01 };
-        let roll = |i: u32| Planned {
-            place: [0.5 + 0.4 * f64::from(i).sin(), 0.4 + 0.3 * f64::from(3 * i).cos()],
+        let fresh = Shape { volume_m3: 4e-5, length_m: 0.044, oval: 0.01 };
+        let roll = |i: u32| PlannedRoll {
+            setting: [0.5 + 0.4 * f64::from(i).sin(), 0.4 + 0.3 * f64::from(3 * i).cos()],
             t_s: 7.0 * f64::from(i),
-            luck: 1.0,
+            scatter: 1.0,
         };
         DoughWorld {
-            band: Elastic { k0_n_m: 60.0, k1_n_m2: 900.0, throw0_m: 0.04, k2_per_m: 8.0 },
+            band: Band { k0_n_m: 60.0, k1_n_m2: 900.0, throw0_m: 0.04, k2_per_m: 8.0 },
             breadth_m: 0.04,
             elastic_pa: 3e4,
             yield_pa: 400.0,
             rate_per_s: 0.1,
             exponent: 2.0,
-            flattens: 0.12,
-            pieces: vec![Piece { fresh, soft: 1.0, rolls: (0..40).map(roll).collect() }],
+            flattening: 0.12,
+            pieces: vec![Piece { fresh, softness: 1.0, rolls: (0..40).map(roll).collect() }],
             effects,
         }
     }
@@ -274,9 +274,9 @@ mod tests {
     /// A ball has the volume of a ball, a long roll nearly that of a cylinder.
     #[test]
     fn a_shape_has_its_volume() {
-        let ball = Lying { volume_m3: PI / 6.0 * 0.04f64.powi(3), length_m: 0.04, oval: 0.0 };
+        let ball = Shape { volume_m3: PI / 6.0 * 0.04f64.powi(3), length_m: 0.04, oval: 0.0 };
         ball.dimensions_m().iter().for_each(|d| approx::assert_relative_eq!(*d, 0.04, max_relative = 1e-3));
-        let long = Lying { volume_m3: 1e-4, length_m: 0.2, oval: 0.1 };
+        let long = Shape { volume_m3: 1e-4, length_m: 0.2, oval: 0.1 };
         let [l, w, h] = long.dimensions_m();
         let d = (w * h).sqrt();
         approx::assert_relative_eq!(FRAC_PI_4 * d * d * (l - d / 3.0), 1e-4, max_relative = 1e-9);
@@ -291,7 +291,7 @@ mod tests {
         assert!((0.09..0.2).contains(&end), "{end}");
         for pair in made.windows(2) {
             assert_eq!(pair[0].after, pair[1].before);
-            assert_eq!(pair[0].after, pair[0].usual);
+            assert_eq!(pair[0].after, pair[0].unchanged);
             assert!(pair[1].after[0] > pair[0].after[0] && pair[1].after[2] < pair[0].after[2]);
         }
         assert!(made[0].after[0] - made[0].before[0] < 0.02);
@@ -319,7 +319,7 @@ mod tests {
         assert!(lengths(Effects { response: 0.3, ..none })[39] > plain[39] * 1.03);
         for m in &world(Effects { response: -0.5, ..none }).rolled()[0] {
             let strain = |to: &[f64; 3]| (to[0] / m.before[0]).ln();
-            approx::assert_relative_eq!(strain(&m.after), 0.5 * strain(&m.usual), max_relative = 1e-9);
+            approx::assert_relative_eq!(strain(&m.after), 0.5 * strain(&m.unchanged), max_relative = 1e-9);
         }
         assert!(lengths(Effects { drying_per_s: 2e-3, ..none })[39] < plain[39] * 0.99);
         assert!(lengths(Effects { softening_per_roll: 0.02, ..none })[39] < plain[39] * 0.99);
@@ -333,7 +333,7 @@ mod tests {
         let volume = |m: &[f64; 3]| m.iter().product::<f64>();
         let sticks = &world(Effects { loss: 0.02, ..none }).rolled()[0];
         for m in sticks {
-            approx::assert_relative_eq!(volume(&m.after) / volume(&m.usual), 0.98, max_relative = 1e-9);
+            approx::assert_relative_eq!(volume(&m.after) / volume(&m.unchanged), 0.98, max_relative = 1e-9);
         }
         // What is lost without a strain does not spring back.
         let idle = Effects { loss: 0.02, slip_n: 1e3, springback: 0.4, ..none };
@@ -348,9 +348,9 @@ mod tests {
     #[test]
     fn unlisted_effects_act_where_they_should() {
         let none = Effects::default();
-        let strain = |m: &Made, to: &[f64; 3]| (to[0] / m.before[0]).ln();
+        let strain = |m: &Roll, to: &[f64; 3]| (to[0] / m.before[0]).ln();
         let parts = |effects| -> Vec<f64> {
-            world(effects).rolled()[0].iter().map(|m| strain(m, &m.after) / strain(m, &m.usual)).collect()
+            world(effects).rolled()[0].iter().map(|m| strain(m, &m.after) / strain(m, &m.unchanged)).collect()
         };
         for (i, part) in parts(Effects { alternation: 0.2, ..none }).iter().enumerate() {
             let expected = if i % 2 == 1 { 1.2 } else { 0.8 };
@@ -358,13 +358,13 @@ mod tests {
         }
         let effects = Effects { long: [0.8, 0.07], ..none };
         for m in &world(effects).rolled()[0] {
-            let part = strain(m, &m.after) / strain(m, &m.usual);
+            let part = strain(m, &m.after) / strain(m, &m.unchanged);
             assert_eq!(part < 0.999, m.before[0] > 0.0702, "{part} at {}", m.before[0]);
         }
         let worked = parts(Effects { worked: 0.5, ..none });
         assert!((worked[0] - 1.0).abs() < 1e-12 && worked[1..].iter().all(|p| *p < 0.999));
         for m in &world(Effects { throw_per_m: 5.0, ..none }).rolled()[0] {
-            let part = strain(m, &m.after) / strain(m, &m.usual);
+            let part = strain(m, &m.after) / strain(m, &m.unchanged);
             assert!((part > 1.0) == (m.action[0] > 0.08), "{part} at {}", m.action[0]);
         }
     }

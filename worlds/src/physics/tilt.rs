@@ -4,8 +4,9 @@
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
+use super::bisection::bisect;
+use super::quadrature::gauss;
 use crate::GRAVITY_M_S2;
-use crate::quadrature::gauss;
 
 /// The space inside a cylindrical container, upright on its base.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,11 +66,8 @@ impl Cavity {
     pub fn centre_m(&self, volume_m3: f64, tilt_rad: f64) -> [f64; 2] {
         let (s, c) = tilt_rad.sin_cos();
         let (across, along) = ((self.radius_m * s).abs(), self.length_m * c);
-        let (mut low, mut high) = (along.min(0.0) - across, along.max(0.0) + across);
-        for _ in 0..44 {
-            let middle = 0.5 * (low + high);
-            if self.moments(rule(), tilt_rad, middle)[0] < volume_m3 { low = middle } else { high = middle }
-        }
+        let ends = [along.min(0.0) - across, along.max(0.0) + across];
+        let [low, high] = bisect(ends, 44, |level| self.moments(rule(), tilt_rad, level)[0] < volume_m3);
         let [volume, x, y] = self.moments(rule(), tilt_rad, 0.5 * (low + high));
         [x / volume, y / volume]
     }
@@ -82,7 +80,7 @@ pub struct Effects {
     pub wall_m: f64,
     /// Relative error of the forces.
     pub force_gain: f64,
-    /// Torque that is always added, N m.
+    /// Offset of the torque, N m.
     pub torque_offset_nm: f64,
     /// The container's tilt less the stated one, rad.
     pub angle_offset_rad: f64,
@@ -108,12 +106,12 @@ pub struct Effects {
     pub spilt_kg: f64,
 }
 
-/// One sweep.
+/// A container's liquid and the poses of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
     /// Mass of the liquid in kg.
     pub mass_kg: f64,
-    /// Its volume in m^3.
+    /// Volume of the liquid in m^3.
     pub volume_m3: f64,
     /// Stated tilt of each pose in rad.
     pub tilts_rad: Vec<f64>,
@@ -124,7 +122,7 @@ pub struct Sweep {
 pub struct TiltWorld {
     /// The container from outside.
     pub outside: Cavity,
-    /// Its mass in kg.
+    /// Mass of the empty container in kg.
     pub container_kg: f64,
     /// Mass of the gripper in kg.
     pub gripper_kg: f64,
@@ -142,16 +140,16 @@ impl TiltWorld {
         let e = &self.effects;
         let mut readings = Vec::new();
         for (run, sweep) in self.sweeps.iter().enumerate() {
-            let mut felt = None;
+            let mut reading = None;
             for (pose, &tilt) in sweep.tilts_rad.iter().enumerate() {
                 let late = run == e.slip_at[0] && pose >= e.slip_at[1];
                 let [force, torque] = self.load(sweep, tilt, late);
                 let [taut, from] = e.cable;
                 let torque = torque + taut * (tilt - from).max(0.0);
                 // A play follows only where it is pushed.
-                let followed =
-                    felt.map_or(torque, |before: f64| before.clamp(torque - e.play_nm, torque + e.play_nm));
-                felt = Some(followed);
+                let followed = reading
+                    .map_or(torque, |before: f64| before.clamp(torque - e.play_nm, torque + e.play_nm));
+                reading = Some(followed);
                 let drift = e.drift_nm_per_row * readings.len() as f64;
                 readings.push([force * (1.0 + e.force_gain), followed + e.torque_offset_nm + drift]);
             }

@@ -3,15 +3,16 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::bisection::bisect;
+use super::runge_kutta::step;
 use crate::GRAVITY_M_S2;
-use crate::runge_kutta::step;
 
 /// Roots of the first and second antisymmetric mode of a cylinder (k R).
 pub(crate) const ROOTS: [f64; 2] = [1.841_184, 5.331_443];
 
-/// Another oscillation in the readings.
+/// A further damped oscillation in the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Ring {
+pub struct Oscillation {
     /// Angular frequency without damping, rad/s.
     pub omega_rad_s: f64,
     /// Damping ratio.
@@ -27,21 +28,21 @@ pub struct Effects {
     pub surface_tension_n_m: f64,
     /// Relative change of the frequency at the largest amplitude; it goes with the amplitude squared.
     pub nonlinear_frequency: f64,
-    /// Reading at which the surface sticks: `q'' = ... - omega^2 f sign(q')`.
+    /// Dry friction of the contact line, as the reading below which the surface sticks: `q'' = ... - omega^2 f sign(q')`.
     pub friction: f64,
     /// Quadratic damping in 1/reading: `q'' = ... - c |q'| q'`.
     pub quadratic: f64,
     /// The second antisymmetric mode; its frequency follows from the cylinder.
-    pub second_mode: Ring,
+    pub second_mode: Oscillation,
     /// An arm that rings.
-    pub arm: Ring,
+    pub arm: Oscillation,
     /// Time constant of a sensor of first order, s.
     pub lag_s: f64,
-    /// How far such a sensor's reading may be from the truth at t = 0, when the rotation has just ended.
+    /// Largest error of such a sensor's reading at t = 0, when the rotation has just ended.
     pub lag_start: f64,
     /// Unlisted: a machine near by, from a time on: amplitude, angular frequency in rad/s, time in s.
     pub machine: [f64; 3],
-    /// Unlisted: part of the volume that is lost from run to run.
+    /// Unlisted: fraction of the volume that is lost from run to run.
     pub leak: f64,
     /// Unlisted: the grip slips once: step of the reading, time in s.
     pub slip: [f64; 2],
@@ -51,20 +52,20 @@ pub struct Effects {
     pub swirl_rad_s: f64,
 }
 
-/// How one run begins.
+/// State of the liquid and its sensor at the start of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     /// Amplitude of the reading.
     pub amplitude: f64,
     /// Phase of the first mode, and those of the second mode, the arm, and the swirl.
     pub phases_rad: [f64; 4],
-    /// Where between -`lag_start` and `lag_start` a slow sensor is off at t = 0, in [-1, 1].
-    pub reading: f64,
+    /// Error of a slow sensor's reading at t = 0 over `lag_start`, in [-1, 1].
+    pub lag_error: f64,
 }
 
 /// A cylinder that was brought upright.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WaveWorld {
+pub struct SloshWorld {
     /// Radius in m.
     pub radius_m: f64,
     /// Mass of the liquid in kg.
@@ -91,12 +92,12 @@ struct Run<'a> {
     effects: &'a Effects,
     omega: f64,
     damping_ratio: f64,
-    second: Ring,
+    second: Oscillation,
     /// Relative change of the frequency with the amplitude squared.
-    quickens: f64,
+    frequency_rise: f64,
 }
 
-impl WaveWorld {
+impl SloshWorld {
     /// Depth of the liquid in m.
     pub fn depth_m(&self) -> f64 {
         self.volume_m3 / (PI * self.radius_m * self.radius_m)
@@ -110,7 +111,7 @@ impl WaveWorld {
         (pull * (k * depth_m).tanh()).sqrt()
     }
 
-    /// Damping ratio of the first mode (thesis, eq. 2.4).
+    /// Damping ratio of the first mode [Matl 2021, eq. 2.4].
     #[allow(clippy::approx_constant, reason = "a fitted coefficient, as printed")]
     fn damping_ratio(&self, depth_m: f64) -> f64 {
         let deep = depth_m / self.radius_m;
@@ -133,15 +134,15 @@ impl WaveWorld {
             effects: e,
             omega: self.omega_rad_s(ROOTS[0], depth),
             damping_ratio: self.damping_ratio(depth),
-            second: Ring { omega_rad_s: self.omega_rad_s(ROOTS[1], depth), ..e.second_mode },
-            quickens: e.nonlinear_frequency / (largest * largest),
+            second: Oscillation { omega_rad_s: self.omega_rad_s(ROOTS[1], depth), ..e.second_mode },
+            frequency_rise: e.nonlinear_frequency / (largest * largest),
         };
         let begin = |size: f64, omega: f64, phase: f64| [size * phase.cos(), -omega * size * phase.sin()];
         let [first, second, arm, plane] = start.phases_rad;
         let [q, v] = begin(start.amplitude, run.omega, first);
         let [q2, v2] = begin(run.second.amplitude, run.second.omega_rad_s, second);
         let [q3, v3] = begin(e.arm.amplitude, e.arm.omega_rad_s, arm);
-        let mut state = [q, v, q2, v2, q3, v3, q + q2 + q3 + start.reading * e.lag_start];
+        let mut state = [q, v, q2, v2, q3, v3, q + q2 + q3 + start.lag_error * e.lag_start];
         // 0.05 rad of the fastest oscillation a step: the phase is then true to 1e-8 of itself.
         let fastest =
             run.omega.max(run.second.omega_rad_s).max(e.arm.omega_rad_s).max(1.0 / e.lag_s.max(1e-2));
@@ -151,9 +152,9 @@ impl WaveWorld {
         for row in 0..self.rows {
             let t = row as f64 / self.rate_hz;
             let turned = (e.swirl_rad_s * t + plane).cos();
-            let felt = if e.lag_s > 0.0 { state[6] } else { state[0] + state[2] + state[4] };
-            let felt = if e.swirl_rad_s > 0.0 { felt * turned } else { felt };
-            readings.push(felt + self.disturbed(number, t));
+            let reading = if e.lag_s > 0.0 { state[6] } else { state[0] + state[2] + state[4] };
+            let reading = if e.swirl_rad_s > 0.0 { reading * turned } else { reading };
+            readings.push(reading + self.unlisted_reading(number, t));
             for _ in 0..steps as usize {
                 state = run.advance(state, step_s);
             }
@@ -161,8 +162,8 @@ impl WaveWorld {
         readings
     }
 
-    /// What is on nobody's list.
-    fn disturbed(&self, number: usize, t: f64) -> f64 {
+    /// What unlisted effects add to a reading.
+    fn unlisted_reading(&self, number: usize, t: f64) -> f64 {
         let e = &self.effects;
         let [size, omega, from] = e.machine;
         let machine = if t >= from { size * (omega * (t - from)).sin() } else { 0.0 };
@@ -176,11 +177,11 @@ impl Run<'_> {
     fn rates(&self, x: &State, motion: f64) -> State {
         let [q, v, q2, v2, q3, v3, y] = *x;
         let (e, arm, second) = (self.effects, &self.effects.arm, &self.second);
-        let ring = |r: &Ring, q: f64, v: f64| {
+        let ring = |r: &Oscillation, q: f64, v: f64| {
             -2.0 * r.damping_ratio * r.omega_rad_s * v - r.omega_rad_s * r.omega_rad_s * q
         };
         // Time runs faster or slower with the energy: the shape stays a sine.
-        let pace = 1.0 + self.quickens * (q * q + (v / self.omega).powi(2));
+        let pace = 1.0 + self.frequency_rise * (q * q + (v / self.omega).powi(2));
         let spring = self.omega * self.omega * (pace * q + e.friction * motion);
         let pull = -spring - (2.0 * self.damping_ratio * self.omega + e.quadratic * v.abs()) * v;
         let sticks = e.friction > 0.0 && motion == 0.0;
@@ -189,7 +190,7 @@ impl Run<'_> {
         [dq, dv, v2, ring(second, q2, v2), v3, ring(arm, q3, v3), follow]
     }
 
-    fn classical(&self, x: &State, h: f64, motion: f64) -> State {
+    fn runge_kutta(&self, x: &State, h: f64, motion: f64) -> State {
         step(x, 0.0, h, |x, _| self.rates(x, motion))
     }
 
@@ -197,7 +198,7 @@ impl Run<'_> {
     fn advance(&self, mut x: State, mut h: f64) -> State {
         let friction = self.effects.friction;
         if friction == 0.0 {
-            return self.classical(&x, h, 0.0);
+            return self.runge_kutta(&x, h, 0.0);
         }
         loop {
             let sticks = x[1] == 0.0 && x[0].abs() <= friction;
@@ -206,20 +207,13 @@ impl Run<'_> {
                 (false, true) => -x[0].signum(),
                 (false, false) => x[1].signum(),
             };
-            let end = self.classical(&x, h, motion);
+            let end = self.runge_kutta(&x, h, motion);
             if sticks || end[1] * motion >= 0.0 {
                 return end;
             }
-            let (mut early, mut late) = (0.0, h);
-            for _ in 0..40 {
-                let middle = 0.5 * (early + late);
-                if self.classical(&x, middle, motion)[1] * motion > 0.0 {
-                    early = middle
-                } else {
-                    late = middle
-                }
-            }
-            x = self.classical(&x, late, motion);
+            let moves = |h: f64| self.runge_kutta(&x, h, motion)[1] * motion > 0.0;
+            let [_, late] = bisect([0.0, h], 40, moves);
+            x = self.runge_kutta(&x, late, motion);
             x[1] = 0.0;
             h -= late;
         }
@@ -229,7 +223,7 @@ impl Run<'_> {
 impl Start {
     /// A wave of an amplitude and nothing else, with its phase.
     pub fn wave(amplitude: f64, phase_rad: f64) -> Self {
-        Self { amplitude, phases_rad: [phase_rad.rem_euclid(TAU), 0.0, 0.0, 0.0], reading: 0.0 }
+        Self { amplitude, phases_rad: [phase_rad.rem_euclid(TAU), 0.0, 0.0, 0.0], lag_error: 0.0 }
     }
 }
 
@@ -237,8 +231,8 @@ impl Start {
 mod tests {
     use super::*;
 
-    fn world(effects: Effects) -> WaveWorld {
-        WaveWorld {
+    fn world(effects: Effects) -> SloshWorld {
+        SloshWorld {
             radius_m: 0.04,
             mass_kg: 0.4,
             volume_m3: 4e-4,
@@ -282,8 +276,8 @@ mod tests {
     /// Without viscosity a cycle loses four of the friction's reading, in a straight line, and the surface stays where it stops.
     #[test]
     fn friction_takes_four_of_itself_a_cycle_and_stops() {
-        let w = WaveWorld { viscosity_m2_s: 0.0, ..world(Effects { friction: 2e-4, ..Effects::default() }) };
-        let readings = WaveWorld { rate_hz: 400.0, rows: 4001, ..w }.run(0);
+        let w = SloshWorld { viscosity_m2_s: 0.0, ..world(Effects { friction: 2e-4, ..Effects::default() }) };
+        let readings = SloshWorld { rate_hz: 400.0, rows: 4001, ..w }.run(0);
         let peaks = peaks(&readings);
         for pair in peaks.windows(2).take(8) {
             approx::assert_abs_diff_eq!(pair[0].1 - pair[1].1, 8e-4, epsilon = 2e-6);
@@ -295,14 +289,14 @@ mod tests {
     /// The frequency departs by the coefficient at the largest amplitude, by a quarter of it at half of that.
     #[test]
     fn the_frequency_changes_with_the_amplitude_squared() {
-        let mut w = WaveWorld {
+        let mut w = SloshWorld {
             viscosity_m2_s: 0.0,
             starts: vec![Start::wave(0.01, 0.0), Start::wave(0.005, 0.0)],
             rate_hz: 400.0,
             rows: 4001,
             ..world(Effects::default())
         };
-        let rate = |w: &WaveWorld, run: usize| {
+        let rate = |w: &SloshWorld, run: usize| {
             let p = peaks(&w.run(run));
             (p.len() - 1) as f64 / (p[p.len() - 1].0 - p[0].0)
         };
@@ -315,9 +309,9 @@ mod tests {
     /// Quadratic damping alone: da/dt = -4/(3 pi) c omega a^2, so 1/a grows in a straight line.
     #[test]
     fn quadratic_damping_falls_as_one_over_time() {
-        let w = WaveWorld { viscosity_m2_s: 0.0, ..world(Effects { quadratic: 3.0, ..Effects::default() }) };
+        let w = SloshWorld { viscosity_m2_s: 0.0, ..world(Effects { quadratic: 3.0, ..Effects::default() }) };
         let omega = w.omega_rad_s(ROOTS[0], w.depth_m());
-        let peaks = peaks(&WaveWorld { rate_hz: 400.0, rows: 4001, ..w }.run(0));
+        let peaks = peaks(&SloshWorld { rate_hz: 400.0, rows: 4001, ..w }.run(0));
         let (first, last) = (peaks[0], peaks[peaks.len() - 1]);
         let grown = (1.0 / last.1 - 1.0 / first.1) / ((last.0 - first.0) / 400.0);
         approx::assert_relative_eq!(grown, 4.0 / (3.0 * PI) * 3.0 * omega, max_relative = 0.01);
@@ -326,10 +320,10 @@ mod tests {
     /// A slow sensor turns back a sine by the angle whose tangent is omega tau, once its start is forgotten.
     #[test]
     fn a_slow_sensor_lags() {
-        let w = WaveWorld { viscosity_m2_s: 0.0, ..world(Effects::default()) };
+        let w = SloshWorld { viscosity_m2_s: 0.0, ..world(Effects::default()) };
         let quick = w.run(0);
         let lag_s = 0.05;
-        let slow = WaveWorld { effects: Effects { lag_s, ..Effects::default() }, ..w.clone() }.run(0);
+        let slow = SloshWorld { effects: Effects { lag_s, ..Effects::default() }, ..w.clone() }.run(0);
         let turn = w.omega_rad_s(ROOTS[0], w.depth_m()) * lag_s;
         let size = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
         let [from, to] = [100, 900];

@@ -2,7 +2,7 @@ use super::*;
 use approx::assert_abs_diff_eq;
 
 /// A quiet world of the given effects at 30 Hz.
-fn quiet(seen: Seen, effects: Effects) -> FlightWorld {
+fn quiet(seen: Measured, effects: Effects) -> FlightWorld {
     FlightWorld { frame_hz: 30.0, noise: Noise::white(0.0), effects, ..FlightWorld::thrown(seen) }
 }
 
@@ -11,7 +11,7 @@ const ROWS: usize = 45;
 
 /// Times and coordinates of one flight from `START`.
 fn flight(effects: Effects) -> (Vec<f64>, Vec<Vec<f64>>) {
-    quiet(Seen::Space, effects).fly(START, ROWS, 0.0, STEPS)
+    quiet(Measured::Position, effects).fly(START, ROWS, 0.0, STEPS)
 }
 
 /// How far a coordinate bends over the first frames, as an acceleration.
@@ -21,7 +21,7 @@ fn bend(column: &[f64], at: usize) -> f64 {
 
 #[test]
 fn a_vacuum_gives_parabolas() {
-    let world = FlightWorld { noise: Noise::white(0.0), ..FlightWorld::thrown(Seen::Space) };
+    let world = FlightWorld { noise: Noise::white(0.0), ..FlightWorld::thrown(Measured::Position) };
     for run in world.draw(1).runs {
         for (column, g) in run.channels.iter().zip([0.0, 0.0, GRAVITY_M_S2]) {
             for i in 2..column.len() {
@@ -53,7 +53,7 @@ fn a_drop_under_quadratic_drag_follows_the_closed_form() {
 #[test]
 fn the_integration_is_of_fourth_order() {
     let effects = Effects { quadratic_per_m: 0.3, ..Effects::default() };
-    let world = FlightWorld { frame_hz: 8.0, ..quiet(Seen::Height, effects) };
+    let world = FlightWorld { frame_hz: 8.0, ..quiet(Measured::Height, effects) };
     let (t, _) = world.fly([0.0; 6], 12, 0.0, 1);
     let error = |steps| {
         let (_, channels) = world.fly([0.0; 6], 12, 0.0, steps);
@@ -90,7 +90,7 @@ fn wind_carries_a_flight_with_it() {
     let mut start = START;
     start[3] -= wind[0];
     start[4] -= wind[1];
-    let (_, still) = quiet(Seen::Space, drag).fly(start, ROWS, 0.0, STEPS);
+    let (_, still) = quiet(Measured::Position, drag).fly(start, ROWS, 0.0, STEPS);
     for (i, t) in t_s.iter().enumerate() {
         assert_abs_diff_eq!(seen[0][i], still[0][i] + wind[0] * t, epsilon = 1e-10);
         assert_abs_diff_eq!(seen[1][i], still[1][i] + wind[1] * t, epsilon = 1e-10);
@@ -156,7 +156,7 @@ fn the_drag_crisis_acts_above_its_speed_only() {
     assert_eq!(full, never);
     assert_eq!(always, small);
     // From rest the two are one until the speed is reached, and part after it.
-    let world = |effects| quiet(Seen::Height, effects).fly([0.0; 6], ROWS, 0.0, STEPS).1.remove(0);
+    let world = |effects| quiet(Measured::Height, effects).fly([0.0; 6], ROWS, 0.0, STEPS).1.remove(0);
     let (full, some) = (world(drag), world(Effects { drag_crisis: [0.4, 5.2], ..drag }));
     let parted = full.iter().zip(&some).position(|(a, b)| a != b);
     // 5.2 m/s is reached at vt/g atanh(5.2/vt) = 0.557 s, between rows 16 and 17.
@@ -217,7 +217,7 @@ fn scale_and_clock_change_the_gravity_that_is_seen() {
 #[test]
 fn mast_and_knock_are_added_to_what_is_seen() {
     let (t_s, still) = flight(Effects::default());
-    let world = quiet(Seen::Space, Effects { mast: [0.01, 3.0], ..Effects::default() });
+    let world = quiet(Measured::Position, Effects { mast: [0.01, 3.0], ..Effects::default() });
     let (_, seen) = world.fly(START, ROWS, 0.7, STEPS);
     let (_, knocked) = flight(Effects { camera_step: [0.05, 0.65], ..Effects::default() });
     for (i, t) in t_s.iter().enumerate() {
@@ -233,11 +233,11 @@ fn mast_and_knock_are_added_to_what_is_seen() {
 /// An accelerometer in free fall reads its own offset; under linear drag what the drag exerts besides.
 #[test]
 fn on_board_only_what_is_not_gravity_is_felt() {
-    let free = quiet(Seen::Felt, Effects::default()).fly(START, ROWS, 1.0, STEPS).1.remove(0);
+    let free = quiet(Measured::SpecificForce, Effects::default()).fly(START, ROWS, 1.0, STEPS).1.remove(0);
     assert!(free.iter().all(|a| (a - free[0]).abs() < 1e-12));
     let r = 0.5;
     let effects = Effects { linear_per_s: r, ..Effects::default() };
-    let (t_s, felt) = quiet(Seen::Felt, effects).fly(START, ROWS, 1.0, STEPS);
+    let (t_s, felt) = quiet(Measured::SpecificForce, effects).fly(START, ROWS, 1.0, STEPS);
     for (t, a) in t_s.iter().zip(&felt[0]) {
         let speed = (START[5] + GRAVITY_M_S2 / r) * (-r * t).exp() - GRAVITY_M_S2 / r;
         assert_abs_diff_eq!(a - free[0], -r * speed, epsilon = 1e-9);
@@ -246,7 +246,7 @@ fn on_board_only_what_is_not_gravity_is_felt() {
 
 #[test]
 fn the_same_seed_gives_the_same_bits() {
-    let world = FlightWorld::thrown(Seen::Space);
+    let world = FlightWorld::thrown(Measured::Position);
     assert_eq!(world.draw(5), world.draw(5));
     assert_ne!(world.draw(5), world.draw(6));
 }

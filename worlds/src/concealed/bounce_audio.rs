@@ -1,28 +1,29 @@
-//! Bouncing balls with concealed effects, as microphones around the table record them.
+//! The domain `bounce`, from sound: bouncing balls with concealed effects, as microphones around the table record them.
 
 use std::fmt::Write as _;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use super::bounce::{LISTED, listed};
+use super::draw::{between, choose, log_between, whole};
+use super::key::{Concealed, Hidden, Key};
+use super::maker::Maker;
 use crate::GRAVITY_M_S2;
-use crate::bounce::BounceWorld;
-use crate::bounces::{LISTED, listed};
-use crate::concealed::draw::{between, choose, log_between, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker};
-use crate::sound::{Room, Voice, add_noise, wav};
+use crate::physics::bounce::BounceWorld;
+use crate::physics::sound::{Room, TableModes, add_noise, wav};
 
-/// The domain `bounce`, from sound.
+/// Makes worlds of the domain `bounce` from sound.
 #[derive(Debug, Clone, Copy)]
-pub struct Sounds;
+pub(crate) struct BounceAudio;
 
-/// Of what a [`BounceWorld`] can hide, a fast clock is no effect of its own here: it is a wrong speed of sound as well.
+/// Of the effects of a [`BounceWorld`] a fast clock is none here: it is the same as a wrong speed of sound.
 const CLOCK: usize = 4;
 const SCALE: usize = 5;
-/// Only of sounds.
+/// The effect that only sounds have: a misplaced microphone.
 const MICROPHONE: usize = LISTED;
 
-impl Maker for Sounds {
+impl Maker for BounceAudio {
     fn domain(&self) -> &'static str {
         "bounce"
     }
@@ -40,7 +41,7 @@ impl Maker for Sounds {
             world.hide(which, &mut key, &mut rng);
         }
         if hidden == Hidden::Unlisted {
-            world.ball.effects.dead_side = log_between(&mut rng, 0.02, 0.15);
+            world.ball.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
         let (mut files, mut unheard) = world.files(&mut rng);
@@ -48,9 +49,7 @@ impl Maker for Sounds {
         while unheard == 0 && world.ball.effects.unheard > 0.0 {
             (files, unheard) = world.files(&mut rng);
         }
-        // The format asks for the share of these very runs.
-        let share = unheard as f64 / world.ball.runs as f64;
-        key.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact").for_each(|p| p.value = share);
+        key.state_missed(unheard, world.ball.runs);
         Concealed { files, key }
     }
 }
@@ -67,7 +66,7 @@ struct SoundWorld {
     stated_m: Vec<[f64; 3]>,
     stated_k: f64,
     rate_hz: u32,
-    /// Of the quietest impact's first 5 ms at half a metre, dB.
+    /// Signal-to-noise ratio of the quietest impact's first 5 ms at half a metre, dB.
     snr_db: f64,
     /// Clicks from elsewhere in a run, on average.
     clicks: f64,
@@ -83,7 +82,7 @@ impl SoundWorld {
             restitution: between(rng, 0.7, 0.88),
             kappa: log_between(rng, 1e3, 3e4),
             noise: [0.0; 2],
-            dead_from_m: 0.5 * SIDE_M,
+            soft_from_m: 0.5 * SIDE_M,
             ..BounceWorld::drops()
         };
         let stated_k = between(rng, 285.0, 303.0);
@@ -104,7 +103,7 @@ impl SoundWorld {
         world
     }
 
-    /// To a millimetre, as people measure them.
+    /// Places the microphones, to a millimetre, as people measure them.
     fn place_microphones(&mut self, four: bool, rng: &mut ChaCha8Rng) {
         let corners: &[[f64; 2]] = if four {
             &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -141,14 +140,13 @@ impl SoundWorld {
 
     /// The files, and in how many of them an impact cannot be heard.
     fn files(&self, rng: &mut ChaCha8Rng) -> (Vec<(String, Vec<u8>)>, usize) {
-        let voice = Voice::new(0.42 * self.room.rate_hz.min(22e3), rng);
+        let table = TableModes::new(0.42 * self.room.rate_hz.min(22e3), rng);
         let mut unheard = 0;
         let mut files = Vec::new();
         for run in 0..self.ball.runs {
-            let silent = (rng.random::<f64>() < self.ball.effects.unheard)
-                .then(|| rng.random_range(1..self.ball.impacts.max(3) - 1));
+            let silent = self.ball.unheard(rng);
             unheard += usize::from(silent.is_some());
-            files.push((format!("drop-{run:02}.wav"), self.sound(&voice, silent, rng)));
+            files.push((format!("drop-{run:02}.wav"), self.sound(&table, silent, rng)));
         }
         let names: Vec<String> = files.iter().map(|(name, _)| format!("{name:?}")).collect();
         let mut header = format!(
@@ -164,8 +162,8 @@ impl SoundWorld {
         (files, unheard)
     }
 
-    /// One run; an impact of this number makes no sound.
-    fn sound(&self, voice: &Voice, silent: Option<usize>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    /// The sound of one run, in which the impact of a number may be silent.
+    fn sound(&self, table: &TableModes, silent: Option<usize>, rng: &mut ChaCha8Rng) -> Vec<u8> {
         let from = [between(rng, 0.25, 0.75) * SIDE_M, between(rng, 0.25, 0.75) * SIDE_M];
         let height = self.ball.height_m * if self.ball.height_known { 1.0 } else { between(rng, 0.7, 1.3) };
         let impacts = self.ball.impacts + usize::from(silent.is_some());
@@ -182,7 +180,7 @@ impl SoundWorld {
                 speed = 0.5 * GRAVITY_M_S2 * (next[0] - t) / self.ball.restitution;
             }
             if Some(number) != silent {
-                let burst = voice.struck(speed, self.room.rate_hz, rng);
+                let burst = table.strike(speed, self.room.rate_hz, rng);
                 loudness = burst.loudness();
                 // The microphones stand on the table, and tilt with it.
                 self.room.play(&burst, [*x, *y, 0.0], *t, rng, &mut channels);
@@ -203,7 +201,8 @@ impl SoundWorld {
             [0.5 * SIDE_M + away * turn.cos(), 0.5 * SIDE_M + away * turn.sin(), between(rng, 0.2, 1.0)];
         let gap = whole(rng, 0, events.len() - 2);
         let t = events[gap][0] + between(rng, 0.35, 0.65) * (events[gap + 1][0] - events[gap][0]);
-        let burst = Voice::new(0.42 * self.room.rate_hz.min(22e3), rng).struck(1.0, self.room.rate_hz, rng);
+        let burst =
+            TableModes::new(0.42 * self.room.rate_hz.min(22e3), rng).strike(1.0, self.room.rate_hz, rng);
         self.room.play(&burst, place, t, rng, channels);
     }
 }
@@ -215,7 +214,7 @@ mod tests {
     /// An impact that is said to go unheard in some of the drops does so in one at least: the first drops of this seed were heard whole.
     #[test]
     fn what_is_hidden_is_there() {
-        let key = Sounds.conceal(Hidden::One, 137).key;
+        let key = BounceAudio.conceal(Hidden::One, 137).key;
         assert_eq!(key.mechanisms, ["missed-impact"]);
         assert!(key.parameters[0].value > 0.0, "{:?}", key.parameters);
     }

@@ -8,14 +8,14 @@ use rand_distr::{Distribution as _, StandardNormal};
 
 type Vec3 = [f64; 3];
 
-/// Reflections are followed one by one for this long after the sound itself, s; later ones are drawn.
+/// Reflections are computed one by one for this long after the direct sound, s; later ones are drawn.
 const EARLY_S: f64 = 0.04;
 /// Late reflections in a second, until they are 40 dB down.
 const LATE_PER_S: f64 = 3e3;
-/// How long a burst is followed, s.
+/// Length of a burst, s.
 const BURST_S: f64 = 0.012;
-/// Samples of a burst for each of the recording.
-const FINER: f64 = 8.0;
+/// Samples of a burst for each sample of the recording.
+const OVERSAMPLING: f64 = 8.0;
 
 /// A room with a table and microphones.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,37 +45,37 @@ impl Room {
         channels: &mut [Vec<f64>],
     ) {
         for (channel, microphone) in channels.iter_mut().zip(&self.microphones_m) {
-            for (delay_s, gain) in self.ways(place_m, *microphone, rng) {
+            for (delay_s, gain) in self.paths(place_m, *microphone, rng) {
                 burst.add(t_s + delay_s, gain, self.rate_hz, channel);
             }
         }
     }
 
-    /// Part of a sound's pressure that a wall gives back (Eyring 1930, doi:10.1121/1.1915175).
+    /// Reflection coefficient of the walls for pressure (Eyring 1930, doi:10.1121/1.1915175).
     fn reflection(&self) -> f64 {
         let [a, b, c] = self.size_m;
         let walls = 2.0 * (a * b + b * c + c * a);
         (-12.0 * std::f64::consts::LN_10 * a * b * c / (self.speed_m_s * walls * self.rt60_s)).exp()
     }
 
-    /// Delay (s) and gain of every way from a place to a microphone: image sources (Allen and Berkley 1979,
+    /// Delay (s) and gain of every path from a place to a microphone: image sources (Allen and Berkley 1979,
     /// doi:10.1121/1.382599), and later a diffuse field of the same energy.
-    fn ways(&self, place: Vec3, microphone: Vec3, rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
+    fn paths(&self, place: Vec3, microphone: Vec3, rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
         let between = |a: Vec3, b: Vec3| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
         let direct_m = between(place, microphone);
         let far_m = direct_m + EARLY_S * self.speed_m_s;
         let beta = self.reflection();
         let [source, ear]: [Vec3; 2] =
             [place, microphone].map(|p| std::array::from_fn(|k| p[k] + self.table_m[k]));
-        let mut ways = Vec::new();
-        let axis = |k: usize| mirrored(source[k], ear[k], self.size_m[k], far_m);
+        let mut paths = Vec::new();
+        let axis = |k: usize| image_offsets(source[k], ear[k], self.size_m[k], far_m);
         let [xs, ys, zs] = [axis(0), axis(1), axis(2)];
         for (x, nx) in &xs {
             for (y, ny) in &ys {
                 for (z, nz) in &zs {
                     let r = (x * x + y * y + z * z).sqrt();
                     if r <= far_m {
-                        ways.push((r / self.speed_m_s, beta.powi(nx + ny + nz) / r.max(0.02)));
+                        paths.push((r / self.speed_m_s, beta.powi(nx + ny + nz) / r.max(0.02)));
                     }
                 }
             }
@@ -86,14 +86,14 @@ impl Room {
             t -= (1.0 - rng.random::<f64>()).ln() / LATE_PER_S;
             let energy =
                 4.0 * PI * self.speed_m_s / (volume * LATE_PER_S) * 10f64.powf(-6.0 * t / self.rt60_s);
-            ways.push((t, if rng.random::<bool>() { energy.sqrt() } else { -energy.sqrt() }));
+            paths.push((t, if rng.random::<bool>() { energy.sqrt() } else { -energy.sqrt() }));
         }
-        ways
+        paths
     }
 }
 
 /// Differences along one axis between an ear and all images of a source that are near enough, with the walls on their way.
-fn mirrored(source: f64, ear: f64, length: f64, far: f64) -> Vec<(f64, i32)> {
+fn image_offsets(source: f64, ear: f64, length: f64, far: f64) -> Vec<(f64, i32)> {
     let most = (far / length) as i32 + 1;
     (-most..=most)
         .flat_map(|n| {
@@ -105,16 +105,16 @@ fn mirrored(source: f64, ear: f64, length: f64, far: f64) -> Vec<(f64, i32)> {
         .collect()
 }
 
-/// What a table sounds like when something hits it: modes that ring and fade.
+/// The modes of a table, which ring and fade when something hits it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Voice {
+pub struct TableModes {
     /// Frequency (Hz), time to fade by 1/e (s) and gain of each mode.
     modes: Vec<Vec3>,
-    /// How long a ball touches it at 1 m/s, s.
+    /// How long a ball at 1 m/s touches the table, s.
     contact_s: f64,
 }
 
-impl Voice {
+impl TableModes {
     /// Thirty modes below a frequency, drawn at random.
     pub fn new(highest_hz: f64, rng: &mut ChaCha8Rng) -> Self {
         let mode = |_| {
@@ -124,12 +124,12 @@ impl Voice {
         Self { modes: (0..30).map(mode).collect(), contact_s: 1.5e-4 }
     }
 
-    /// An impact at a speed (m/s), no two of them alike: where it hits decides how much each mode rings.
+    /// The sound of an impact at a speed (m/s); no two are alike, since the place of the impact decides how much each mode rings.
     ///
     /// The force is that of a sphere on a flat surface (Hertz 1882): as the sine to the power 3/2, to the peak as speed to the
     /// power 6/5, in a time as speed to the power -1/5.
-    pub fn struck(&self, speed_m_s: f64, rate_hz: f64, rng: &mut ChaCha8Rng) -> Burst {
-        let step = 1.0 / (FINER * rate_hz);
+    pub fn strike(&self, speed_m_s: f64, rate_hz: f64, rng: &mut ChaCha8Rng) -> Burst {
+        let step = 1.0 / (OVERSAMPLING * rate_hz);
         let contact = self.contact_s * speed_m_s.powf(-0.2);
         let peak = speed_m_s.powf(1.2) / self.contact_s;
         let mut samples = vec![0.0; (BURST_S / step) as usize];
@@ -167,7 +167,7 @@ impl Burst {
     fn add(&self, begin_s: f64, gain: f64, rate_hz: f64, into: &mut [f64]) {
         let first = (begin_s * rate_hz).ceil().max(0.0);
         let at = |k: isize| usize::try_from(k).ok().and_then(|k| self.samples.get(k)).copied().unwrap_or(0.0);
-        let mut fine = (first / rate_hz - begin_s) * rate_hz * FINER;
+        let mut fine = (first / rate_hz - begin_s) * rate_hz * OVERSAMPLING;
         for v in into.iter_mut().skip(first as usize) {
             if fine as usize > self.samples.len() {
                 break;
@@ -176,7 +176,7 @@ impl Burst {
             let [a, b, c, d] = [at(k - 1), at(k), at(k + 1), at(k + 2)];
             let bend = s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a));
             *v += gain * (b + 0.5 * s * (c - a + bend));
-            fine += FINER;
+            fine += OVERSAMPLING;
         }
     }
 }
@@ -241,16 +241,16 @@ mod tests {
     fn the_first_way_is_the_straight_one_and_energy_falls_by_60_db_in_rt60() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let room = room();
-        let mut ways = room.ways([0.3, 0.4, 0.0], room.microphones_m[0], &mut rng);
-        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut paths = room.paths([0.3, 0.4, 0.0], room.microphones_m[0], &mut rng);
+        paths.sort_by(|a, b| a.0.total_cmp(&b.0));
         let r = (0.25f64 + 0.0064).sqrt();
-        approx::assert_relative_eq!(ways[0].0, r / 343.0, max_relative = 1e-12);
-        approx::assert_relative_eq!(ways[0].1, 1.0 / r, max_relative = 1e-12);
+        approx::assert_relative_eq!(paths[0].0, r / 343.0, max_relative = 1e-12);
+        approx::assert_relative_eq!(paths[0].1, 1.0 / r, max_relative = 1e-12);
         // In decibels a second, images and what is drawn later alike, by least squares over slices of 10 ms.
         let slices: Vec<[f64; 2]> = (1..18)
             .map(|k| {
                 let (from, to) = (0.01 * f64::from(k), 0.01 * f64::from(k + 1));
-                let energy: f64 = ways.iter().filter(|w| (from..to).contains(&w.0)).map(|w| w.1 * w.1).sum();
+                let energy: f64 = paths.iter().filter(|w| (from..to).contains(&w.0)).map(|w| w.1 * w.1).sum();
                 [0.5 * (from + to), 10.0 * energy.log10()]
             })
             .collect();
@@ -264,12 +264,12 @@ mod tests {
     #[test]
     fn a_burst_that_begins_between_samples_is_the_burst_of_a_finer_recording() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let burst = Voice::new(8e3, &mut rng).struck(1.0, 48e3, &mut rng);
+        let burst = TableModes::new(8e3, &mut rng).strike(1.0, 48e3, &mut rng);
         let (mut coarse, mut fine) = (vec![0.0; 400], vec![0.0; 3200]);
         let begin = 1.3 / 48e3;
         burst.add(begin, 1.0, 48e3, &mut coarse);
         // As many samples as the burst itself has: no interpolation but of the beginning.
-        let shift = begin * 48e3 * FINER;
+        let shift = begin * 48e3 * OVERSAMPLING;
         for (k, v) in fine.iter_mut().enumerate() {
             let at = k as f64 - shift;
             if at >= 0.0 {

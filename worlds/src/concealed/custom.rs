@@ -1,4 +1,4 @@
-//! Simulators of other people beside recordings of rigs that do more than they know: columns `sim_<channel>` of a pendulum, a tank
+//! The domain `custom`: simulators of other people beside recordings of rigs that do more than the simulators know: columns `sim_<channel>` of a pendulum, a tank
 //! or a heated plate, all of whose constants are known.
 
 use std::fmt::Write as _;
@@ -6,20 +6,21 @@ use std::fmt::Write as _;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
+use super::draw::{self, between, log_between, sign, stated, strength, whole};
+use super::key::{Concealed, Hidden, Key, Place};
+use super::maker::Maker;
+use super::nuisances::{difference, size_of_strength};
 use crate::GRAVITY_M_S2;
-use crate::concealed::draw::{self, between, log_between, sign, stated, strength, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
 use crate::noise::Noise;
-use crate::runge_kutta::step;
-use crate::sizing::{change, sized};
+use crate::physics::runge_kutta::step;
 
-/// The domain `custom`.
+/// Makes worlds of the domain `custom`.
 #[derive(Debug, Clone, Copy)]
-pub struct Customs;
+pub(crate) struct Custom;
 
-/// What is simulated: position (or level, or temperature) and its rate of change.
+/// The plant, whose state is a position (or level, or temperature) and its rate of change.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Rig {
+enum Plant {
     /// Swings with this angular frequency (rad/s) when it swings little.
     Pendulum { omega_rad_s: f64 },
     /// Drains by `h' = -k sqrt(h)`, k in sqrt(m)/s.
@@ -28,7 +29,7 @@ enum Rig {
     Plate { heater_k_s: f64, cooling_per_s: f64 },
 }
 
-/// What the simulator does not know.
+/// The effect that the simulator lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Effect {
     Nothing,
@@ -42,9 +43,9 @@ enum Effect {
 
 /// One recording.
 struct World {
-    rig: Rig,
+    plant: Plant,
     effect: Effect,
-    turn: f64,
+    sign: f64,
     at_s: f64,
     starts: Vec<f64>,
     rows: usize,
@@ -57,7 +58,7 @@ const STEPS: usize = 20;
 /// How long a knock lasts, s.
 const KNOCK_S: f64 = 0.04;
 
-impl Maker for Customs {
+impl Maker for Custom {
     fn domain(&self) -> &'static str {
         "custom"
     }
@@ -75,9 +76,9 @@ impl Maker for Customs {
         let mut size = 0.0;
         if hidden == Hidden::Unlisted {
             let wanted = strength(&mut rng);
-            size = sized(wanted, [1e-7, 10.0], |size| world.strength(size));
+            size = size_of_strength(wanted, [1e-7, 10.0], |size| world.strength(size));
             key.strength = Some(world.strength(size));
-            world.say(&mut key);
+            world.describe(&mut key);
         }
         let [header, data] = world.files(size, &mut rng);
         Concealed::table(header, data, key)
@@ -86,32 +87,32 @@ impl Maker for Customs {
 
 impl World {
     fn drawn(hidden: Hidden, rng: &mut ChaCha8Rng) -> Self {
-        let (rig, duration_s, level, sigma) = match whole(rng, 0, 2) {
+        let (plant, duration_s, level, sigma) = match whole(rng, 0, 2) {
             0 => {
                 let omega_rad_s = (GRAVITY_M_S2 / between(rng, 0.2, 1.2)).sqrt();
                 let duration_s = between(rng, 3.0, 10.0);
-                (Rig::Pendulum { omega_rad_s }, duration_s, 0.5, log_between(rng, 5e-4, 5e-3))
+                (Plant::Pendulum { omega_rad_s }, duration_s, 0.5, log_between(rng, 5e-4, 5e-3))
             }
             1 => {
                 let duration_s = between(rng, 40.0, 120.0);
                 // Two thirds of the level are gone in the end.
                 let outlet = 0.42 * 0.5 / duration_s;
-                (Rig::Tank { outlet }, duration_s, 0.25, log_between(rng, 5e-4, 3e-3))
+                (Plant::Tank { outlet }, duration_s, 0.25, log_between(rng, 5e-4, 3e-3))
             }
             _ => {
                 let duration_s = between(rng, 200.0, 900.0);
                 let cooling_per_s = between(rng, 1.0, 4.0) / duration_s;
                 let heater_k_s = cooling_per_s * between(rng, 0.0, 40.0);
-                (Rig::Plate { heater_k_s, cooling_per_s }, duration_s, 30.0, log_between(rng, 0.05, 0.4))
+                (Plant::Plate { heater_k_s, cooling_per_s }, duration_s, 30.0, log_between(rng, 0.05, 0.4))
             }
         };
         let runs = whole(rng, 2, 6);
         let rows = whole(rng, 60, 250);
         let effects = [Effect::First, Effect::Second, Effect::Sudden];
         Self {
-            rig,
+            plant,
             effect: if hidden == Hidden::Nothing { Effect::Nothing } else { effects[whole(rng, 0, 2)] },
-            turn: sign(rng),
+            sign: sign(rng),
             at_s: duration_s * between(rng, 0.2, 0.7),
             starts: (0..runs).map(|_| level * between(rng, 0.6, 1.4)).collect(),
             rows,
@@ -124,9 +125,9 @@ impl World {
     fn rates(&self, &[x, v]: &[f64; 2], t: f64, size: f64) -> [f64; 2] {
         use Effect::{First, Nothing, Second, Sudden};
         let after = if t >= self.at_s { 1.0 } else { 0.0 };
-        match self.rig {
-            Rig::Pendulum { omega_rad_s } => {
-                let knock = self.turn * (-0.5 * ((t - self.at_s) / KNOCK_S).powi(2)).exp() / KNOCK_S;
+        match self.plant {
+            Plant::Pendulum { omega_rad_s } => {
+                let knock = self.sign * (-0.5 * ((t - self.at_s) / KNOCK_S).powi(2)).exp() / KNOCK_S;
                 let push = size
                     * match self.effect {
                         Nothing => 0.0,
@@ -136,7 +137,7 @@ impl World {
                     };
                 [v, -omega_rad_s * omega_rad_s * x.sin() + push]
             }
-            Rig::Tank { outlet } => {
+            Plant::Tank { outlet } => {
                 let level = x.max(0.0);
                 let lost = match self.effect {
                     Nothing => 0.0,
@@ -146,7 +147,7 @@ impl World {
                 };
                 [-outlet * level.sqrt() - size * lost, 0.0]
             }
-            Rig::Plate { heater_k_s, cooling_per_s } => {
+            Plant::Plate { heater_k_s, cooling_per_s } => {
                 let lost = match self.effect {
                     Nothing => 0.0,
                     First => cooling_per_s * 0.1 * x.abs() * x,
@@ -158,7 +159,7 @@ impl World {
         }
     }
 
-    /// What one run reads without noise, by a classical Runge-Kutta method.
+    /// The readings of one run without noise.
     fn run(&self, start: f64, size: f64) -> Vec<f64> {
         let h = 1.0 / (self.rate_hz * STEPS as f64);
         let mut state = [start, 0.0];
@@ -173,25 +174,25 @@ impl World {
         readings
     }
 
-    /// What an effect of this size does to the readings, in sigmas.
+    /// Size of an effect's response, in sigmas.
     fn strength(&self, size: f64) -> f64 {
         let sigma = draw::sigma(&self.noise);
-        let squares = self.starts.iter().flat_map(|s| change(&self.run(*s, 0.0), &self.run(*s, size)));
+        let squares = self.starts.iter().flat_map(|s| difference(&self.run(*s, 0.0), &self.run(*s, size)));
         squares.map(|d| (d / sigma).powi(2)).sum::<f64>().sqrt()
     }
 
-    fn say(&self, key: &mut Key) {
-        let what = match (self.rig, self.effect) {
+    fn describe(&self, key: &mut Key) {
+        let what = match (self.plant, self.effect) {
             (_, Effect::Nothing) => return,
-            (Rig::Pendulum { .. }, Effect::First) => "grease in the bearing",
-            (Rig::Pendulum { .. }, Effect::Second) => "drag of the air",
-            (Rig::Pendulum { .. }, Effect::Sudden) => "a knock",
-            (Rig::Tank { .. }, Effect::First) => "evaporation",
-            (Rig::Tank { .. }, Effect::Second) => "an outlet that clogs",
-            (Rig::Tank { .. }, Effect::Sudden) => "a second outlet that opens",
-            (Rig::Plate { .. }, Effect::First) => "cooling that grows with the temperature",
-            (Rig::Plate { .. }, Effect::Second) => "a heater that weakens",
-            (Rig::Plate { .. }, Effect::Sudden) => "a draught from a window that is opened",
+            (Plant::Pendulum { .. }, Effect::First) => "grease in the bearing",
+            (Plant::Pendulum { .. }, Effect::Second) => "drag of the air",
+            (Plant::Pendulum { .. }, Effect::Sudden) => "a knock",
+            (Plant::Tank { .. }, Effect::First) => "evaporation",
+            (Plant::Tank { .. }, Effect::Second) => "an outlet that clogs",
+            (Plant::Tank { .. }, Effect::Sudden) => "a second outlet that opens",
+            (Plant::Plate { .. }, Effect::First) => "cooling that grows with the temperature",
+            (Plant::Plate { .. }, Effect::Second) => "a heater that weakens",
+            (Plant::Plate { .. }, Effect::Sudden) => "a draught from a window that is opened",
         };
         key.unlisted = Some(what.into());
         if self.effect == Effect::Sudden {
@@ -201,10 +202,10 @@ impl World {
     }
 
     fn files(&self, size: f64, rng: &mut ChaCha8Rng) -> [String; 2] {
-        let (channel, unit) = match self.rig {
-            Rig::Pendulum { .. } => ("angle_rad", "rad"),
-            Rig::Tank { .. } => ("level_m", "m"),
-            Rig::Plate { .. } => ("warmer_k", "K"),
+        let (channel, unit) = match self.plant {
+            Plant::Pendulum { .. } => ("angle_rad", "rad"),
+            Plant::Tank { .. } => ("level_m", "m"),
+            Plant::Plate { .. } => ("warmer_k", "K"),
         };
         let mut header = format!(
             "format = 1\ndomain = \"custom\"\ndata = \"data.csv\"\n\n[[input]]\nname = \"t_s\"\nunit = \"s\"\n\n[[channel]]\nname = \"{channel}\"\nunit = \"{unit}\"\n"
@@ -230,11 +231,11 @@ impl World {
 mod tests {
     use super::*;
 
-    fn world(rig: Rig, effect: Effect) -> World {
+    fn world(plant: Plant, effect: Effect) -> World {
         World {
-            rig,
+            plant,
             effect,
-            turn: 1.0,
+            sign: 1.0,
             at_s: 2.0,
             starts: vec![0.25],
             rows: 101,
@@ -246,7 +247,7 @@ mod tests {
     /// Torricelli: the root of the level falls in a straight line.
     #[test]
     fn a_tank_drains_as_torricelli_says() {
-        let level = world(Rig::Tank { outlet: 0.05 }, Effect::Nothing).run(0.25, 0.0);
+        let level = world(Plant::Tank { outlet: 0.05 }, Effect::Nothing).run(0.25, 0.0);
         for (row, h) in level.iter().enumerate() {
             let t = row as f64 / 20.0;
             approx::assert_relative_eq!(h.sqrt(), 0.5 - 0.025 * t, epsilon = 1e-10);
@@ -256,12 +257,12 @@ mod tests {
     /// Newton's law of cooling, and a swing of little amplitude that grease slows.
     #[test]
     fn plates_cool_and_pendulums_fade() {
-        let plate = Rig::Plate { heater_k_s: 0.5, cooling_per_s: 0.2 };
+        let plate = Plant::Plate { heater_k_s: 0.5, cooling_per_s: 0.2 };
         for (row, x) in world(plate, Effect::Nothing).run(30.0, 0.0).iter().enumerate() {
             let t = row as f64 / 20.0;
             approx::assert_relative_eq!(*x, 2.5 + 27.5 * (-0.2 * t).exp(), epsilon = 1e-7);
         }
-        let swing = world(Rig::Pendulum { omega_rad_s: 4.0 }, Effect::First).run(1e-3, 0.3);
+        let swing = world(Plant::Pendulum { omega_rad_s: 4.0 }, Effect::First).run(1e-3, 0.3);
         for (row, x) in swing.iter().enumerate() {
             let (t, damped) = (row as f64 / 20.0, (16.0f64 - 0.09).sqrt());
             let shape = (damped * t).cos() + 0.3 / damped * (damped * t).sin();
@@ -272,11 +273,11 @@ mod tests {
     /// Nothing is hidden before a sudden effect begins, but something after it, and more of it is seen.
     #[test]
     fn what_is_sudden_begins_in_time() {
-        for rig in [Rig::Tank { outlet: 0.02 }, Rig::Plate { heater_k_s: 0.5, cooling_per_s: 0.2 }] {
-            let w = world(rig, Effect::Sudden);
-            let difference = change(&w.run(0.25, 0.0), &w.run(0.25, 0.02));
-            assert!(difference[..40].iter().all(|d| *d == 0.0));
-            assert!(difference[60].abs() > 1e-5, "{rig:?}");
+        for plant in [Plant::Tank { outlet: 0.02 }, Plant::Plate { heater_k_s: 0.5, cooling_per_s: 0.2 }] {
+            let w = world(plant, Effect::Sudden);
+            let moved = difference(&w.run(0.25, 0.0), &w.run(0.25, 0.02));
+            assert!(moved[..40].iter().all(|d| *d == 0.0));
+            assert!(moved[60].abs() > 1e-5, "{plant:?}");
             assert!(w.strength(0.02) > 1.5 * w.strength(0.01));
         }
     }

@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use crate::quadrature::gauss;
+use super::quadrature::gauss;
 
 const NODES: usize = 14;
 
@@ -103,6 +103,7 @@ fn eliminate(rows: &mut [Vec<f64>]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bisection::bisect;
     use super::*;
 
     /// Dimitriadis et al. (2002, doi:10.1016/S0006-3495(02)75620-8): 1 + 1.133 x + 1.283 x^2 + 0.769 x^3 + 0.0975 x^4 for thin
@@ -131,11 +132,7 @@ mod tests {
         let layer = Layer::new(0.45);
         for x in [0.013, 0.21, 0.52, 1.1] {
             let direct = {
-                let (mut low, mut high) = (1e-3, 1.6);
-                for _ in 0..40 {
-                    let middle = 0.5 * (low + high);
-                    if solve(middle, 0.45)[0] < x { low = middle } else { high = middle }
-                }
+                let [low, _] = bisect([1e-3, 1.6], 40, |contact| solve(contact, 0.45)[0] < x);
                 solve(low, 0.45)[1]
             };
             approx::assert_relative_eq!(layer.factor(x), direct, max_relative = 2e-5);

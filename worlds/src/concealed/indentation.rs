@@ -1,19 +1,15 @@
-//! Indentations with concealed effects.
+//! The domain `indentation`: curves of force over depth with concealed effects.
 
 use std::fmt::Write as _;
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{self, between, choose, log_between, sign, stated, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use super::draw::{self, between, choose, log_between, sign, stated, whole};
+use super::key::{Hidden, Key, Place};
+use super::nuisances::{Nuisances, difference};
+use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::press::{Effects, Indenter, PressWorld, Step};
-use crate::set_up::{self, Choice, SetUp};
-use crate::sizing::{Basis, change};
-
-/// The domain `indentation`.
-#[derive(Debug, Clone, Copy)]
-pub struct Presses;
+use crate::physics::indentation::{Effects, IndentationWorld, Indenter, Step};
 
 /// Listed effects; the last three act on spheres only, and viscoelasticity needs times.
 const LISTED: usize = 10;
@@ -24,18 +20,18 @@ const UNLISTED: usize = 3;
 /// Conditions: name of the column, and their labels.
 type Conditions = (&'static str, Vec<String>);
 
-/// An indenter with its load cell, and what effects will look like before their size is known.
-struct Press {
-    world: PressWorld,
+/// An indenter with its load cell.
+pub(crate) struct Press {
+    world: IndentationWorld,
     conditions: Option<Conditions>,
     timed: bool,
     noise: Noise,
     /// One sigma of a reading.
     sigma: f64,
     deepest_m: f64,
-    /// Force at the deepest of the softest condition without effects.
+    /// Force at the largest depth without effects, in the softest condition.
     force_n: f64,
-    /// The same of the stiffest.
+    /// Force at the largest depth without effects, in the stiffest condition.
     stiffest_n: f64,
     signs: [f64; 2],
     tau_s: f64,
@@ -44,17 +40,8 @@ struct Press {
     pitch_m: f64,
 }
 
-impl Maker for Presses {
-    fn domain(&self) -> &'static str {
-        "indentation"
-    }
-
-    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        set_up::conceal::<Press>(hidden, seed)
-    }
-}
-
-impl SetUp for Press {
+impl Rig for Press {
+    const DOMAIN: &'static str = "indentation";
     type Effects = Effects;
 
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
@@ -66,34 +53,34 @@ impl SetUp for Press {
         (press, Choice { listed, unlisted })
     }
 
-    fn tried(&self) -> Vec<usize> {
+    fn candidates(&self) -> Vec<usize> {
         let count = if matches!(self.world.indenter, Indenter::Sphere(_)) { LISTED } else { FOR_ALL };
         (0..count).filter(|listed| self.timed || *listed != RELAXES).collect()
     }
 
-    /// Each of them has one sign.
-    fn turn(_: &mut ChaCha8Rng) -> f64 {
+    /// Each unlisted effect has one sign.
+    fn unlisted_sign(_: &mut ChaCha8Rng) -> f64 {
         1.0
     }
 
     /// What the moduli can do to the readings.
-    fn basis(&self) -> Basis {
+    fn nuisances(&self) -> Nuisances {
         let plain = self.whitened(Effects::default(), &self.world.moduli_pa);
-        let mut basis = Basis::default();
+        let mut nuisances = Nuisances::default();
         for condition in 0..self.world.moduli_pa.len() {
             let mut moduli_pa = self.world.moduli_pa.clone();
             moduli_pa[condition] *= 1.01;
-            basis.add(&change(&plain, &self.whitened(Effects::default(), &moduli_pa)));
+            nuisances.add(&difference(&plain, &self.whitened(Effects::default(), &moduli_pa)));
         }
-        basis
+        nuisances
     }
 
-    fn change(&self, effects: Effects) -> Vec<f64> {
+    fn response(&self, effects: Effects) -> Vec<f64> {
         let moduli = &self.world.moduli_pa;
-        change(&self.whitened(Effects::default(), moduli), &self.whitened(effects, moduli))
+        difference(&self.whitened(Effects::default(), moduli), &self.whitened(effects, moduli))
     }
 
-    fn bounds(&self, listed: usize) -> [f64; 2] {
+    fn size_bounds(&self, listed: usize) -> [f64; 2] {
         let (d, f) = (self.deepest_m, self.force_n);
         match listed {
             0 => [1e-3 * d, 0.15 * d],
@@ -109,7 +96,7 @@ impl SetUp for Press {
         }
     }
 
-    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
+    fn apply(&self, e: &mut Effects, listed: usize, size: f64) {
         match listed {
             0 => e.contact_offset_m = self.signs[0] * size,
             1 => e.tension_n_m = size,
@@ -128,14 +115,14 @@ impl SetUp for Press {
         }
     }
 
-    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
+    fn describe(&self, e: &Effects, listed: usize, key: &mut Key) {
         match listed {
             0 => key.add("contact-offset", &[("offset_m", e.contact_offset_m)]),
             1 => key.add("membrane-tension", &[("stiffness_n_m", e.tension_n_m)]),
             2 => key.add("membrane-stretching", &[("coefficient_n_m3", e.stretching_n_m3)]),
             3 => {
                 key.add("rim-contact", &[("depth_m", e.rim[0]), ("stiffness_n_m", e.rim[1])]);
-                key.place = Some(self.deep());
+                key.place = Some(self.beyond_depth());
             }
             4 => key.add("load-cell-compliance", &[("compliance_m_n", e.compliance_m_n)]),
             5 => key.add("force-offset", &[("offset_n", e.force_offset_n)]),
@@ -148,7 +135,7 @@ impl SetUp for Press {
         }
     }
 
-    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+    fn unlisted_size_bounds(&self, which: usize) -> [f64; 2] {
         match which {
             0 => [2e-3, 0.6],
             1 => [0.05 * self.sigma, 0.2 * self.force_n],
@@ -156,7 +143,7 @@ impl SetUp for Press {
         }
     }
 
-    fn unlisted(&self, which: usize, _turn: f64, size: f64) -> Effects {
+    fn unlisted(&self, which: usize, _sign: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
             0 => Effects { dent: size, ..none },
@@ -165,18 +152,18 @@ impl SetUp for Press {
         }
     }
 
-    fn say_unlisted(&self, which: usize, key: &mut Key) {
+    fn describe_unlisted(&self, which: usize, key: &mut Key) {
         let (what, place) = match which {
             0 => ("a dent that stays: the way back is another", None),
             1 => ("a ripple of the drive, periodic in depth", None),
-            _ => ("a membrane that slips at a depth", Some(self.slipped())),
+            _ => ("a membrane that slips at a depth", Some(self.after_slip())),
         };
         key.unlisted = Some(what.into());
         key.place = place;
     }
 
     fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
-        let w = PressWorld { effects, ..self.world };
+        let w = IndentationWorld { effects, ..self.world };
         let mut header = String::from("format = 1\ndomain = \"indentation\"\ndata = \"data.csv\"\n");
         if whole(rng, 0, 2) > 0 {
             let _ = write!(header, "\n[noise]\nforce_n = {:.3e}\n", stated(rng, &self.noise));
@@ -250,7 +237,7 @@ impl Press {
         Self {
             force_n,
             stiffest_n: force_n * moduli_pa[kinds - 1] / softest,
-            world: PressWorld { indenter, poisson_ratio, moduli_pa, runs, effects: Effects::default() },
+            world: IndentationWorld { indenter, poisson_ratio, moduli_pa, runs, effects: Effects::default() },
             conditions,
             timed: timed || returns,
             sigma: draw::sigma(&noise),
@@ -265,21 +252,21 @@ impl Press {
 
     /// Readings in sigmas.
     fn whitened(&self, effects: Effects, moduli_pa: &[f64]) -> Vec<f64> {
-        let world = PressWorld { effects, moduli_pa: moduli_pa.to_vec(), ..self.world.clone() };
+        let world = IndentationWorld { effects, moduli_pa: moduli_pa.to_vec(), ..self.world.clone() };
         world.readings().iter().map(|force| force / self.sigma).collect()
     }
 
-    fn deep(&self) -> Place {
+    fn beyond_depth(&self) -> Place {
         Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
     }
 
-    /// What has slipped stays so on the way back: then it is from a time on, not from a depth.
-    fn slipped(&self) -> Place {
+    /// Where a membrane that slipped shows: it stays slipped on the way back, so where there is one from a time on, else from a depth on.
+    fn after_slip(&self) -> Place {
         let path = &self.world.runs[0].1;
         let slips =
             path.iter().find(|step| step.delta_m >= self.depth_m).filter(|_| path.iter().any(|s| !s.down));
         slips.map_or_else(
-            || self.deep(),
+            || self.beyond_depth(),
             |slips| Place { variable: "t_s".into(), from: slips.t_s, to: f64::INFINITY },
         )
     }
@@ -328,7 +315,7 @@ mod tests {
     use rand::SeedableRng as _;
 
     use super::*;
-    use crate::set_up::tests::every_effect_shows;
+    use crate::concealed::rig::tests::every_effect_shows;
 
     /// An effect at a place moves the readings there and nowhere else.
     #[test]
@@ -337,13 +324,13 @@ mod tests {
         for seed in 0..20 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let press = Press::drawn(seed % 2 == 0, false, false, &mut rng);
-            let rim = press.alone(3, press.bounds(3)[1]);
-            let slip = press.unlisted(2, 1.0, press.unlisted_bounds(2)[1]);
-            for (effects, place) in [(rim, press.deep()), (slip, press.slipped())] {
+            let rim = press.alone(3, press.size_bounds(3)[1]);
+            let slip = press.unlisted(2, 1.0, press.unlisted_size_bounds(2)[1]);
+            for (effects, place) in [(rim, press.beyond_depth()), (slip, press.after_slip())] {
                 let in_time = place.variable == "t_s";
                 ways_back += u32::from(in_time);
                 let steps = press.world.runs.iter().flat_map(|(_, path)| path);
-                for (step, moved) in steps.zip(press.change(effects)) {
+                for (step, moved) in steps.zip(press.response(effects)) {
                     let at = if in_time { step.t_s } else { step.delta_m };
                     assert_eq!(moved != 0.0, at >= place.from && at <= place.to, "seed {seed}, {step:?}");
                 }

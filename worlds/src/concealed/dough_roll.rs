@@ -1,27 +1,23 @@
-//! Rolled doughs with concealed effects.
+//! The domain `dough-roll`: rolled doughs with concealed effects.
 
 use std::fmt::Write as _;
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::concealed::draw::{self, between, choose, log_between, sign, stated, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
-use crate::dough::{DoughWorld, Effects, Elastic, Lying, Made, Piece, Planned};
+use super::draw::{self, between, choose, log_between, sign, stated, whole};
+use super::key::{Hidden, Key, Place};
+use super::nuisances::Nuisances;
+use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::set_up::{self, Choice, SetUp};
-use crate::sizing::Basis;
-
-/// The domain `dough-roll`.
-#[derive(Debug, Clone, Copy)]
-pub struct Doughs;
+use crate::physics::dough::{Band, DoughWorld, Effects, Piece, PlannedRoll, Roll, Shape};
 
 const LISTED: usize = 6;
 const DRYING: usize = 1;
 const UNLISTED: usize = 4;
 
 /// A table on which doughs were rolled: some to learn from, and some since.
-struct Table {
+pub(crate) struct Table {
     /// The doughs of the recording.
     world: DoughWorld,
     training: Vec<Piece>,
@@ -32,59 +28,50 @@ struct Table {
     /// Noise of length, width and height.
     noise: [Noise; 3],
     density_kg_m3: f64,
-    /// Whether it is another band than most people have.
-    own_band: bool,
-    /// Signs of the effects that have one.
-    turn: f64,
+    /// Whether the band is not the usual one, so that the header states it.
+    unusual_band: bool,
+    /// Sign of a change of the response.
+    sign: f64,
     long_from_m: f64,
 }
 
-impl Maker for Doughs {
-    fn domain(&self) -> &'static str {
-        "dough-roll"
-    }
-
-    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        set_up::conceal::<Table>(hidden, seed)
-    }
-}
-
-impl SetUp for Table {
+impl Rig for Table {
+    const DOMAIN: &'static str = "dough-roll";
     type Effects = Effects;
 
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
         let table = Self::drawn(rng);
-        let tried = table.tried();
+        let tried = table.candidates();
         let listed = choose(rng, tried.len(), hidden.listed()).into_iter().map(|k| tried[k]).collect();
         let unlisted = if hidden == Hidden::Unlisted { whole(rng, 0, UNLISTED - 1) } else { 0 };
         (table, Choice { listed, unlisted })
     }
 
-    fn tried(&self) -> Vec<usize> {
+    fn candidates(&self) -> Vec<usize> {
         (0..LISTED).filter(|l| self.timed || *l != DRYING).collect()
     }
 
-    /// The baseline has no unknown of its own: what training left open is not counted.
-    fn basis(&self) -> Basis {
-        Basis::default()
+    /// The baseline has no nuisance parameter: what training left open is not counted.
+    fn nuisances(&self) -> Nuisances {
+        Nuisances::default()
     }
 
-    /// Of each roll the state after it against the usual one, and the next measurement of the same state.
-    fn change(&self, effects: Effects) -> Vec<f64> {
+    /// For each roll: the state after it less the state without the effects, and the next measurement of that state less this one.
+    fn response(&self, effects: Effects) -> Vec<f64> {
         let at_work = DoughWorld { effects, ..self.world.clone() };
         let sigma = self.noise.map(|n| draw::sigma(&n) * std::f64::consts::SQRT_2);
         let mut all = Vec::new();
         for rolls in at_work.rolled() {
             for (i, m) in rolls.iter().enumerate() {
                 let again = rolls.get(i + 1).map_or(m.after, |next| next.before);
-                all.extend((0..3).map(|k| (m.after[k] - m.usual[k]) / sigma[k]));
+                all.extend((0..3).map(|k| (m.after[k] - m.unchanged[k]) / sigma[k]));
                 all.extend((0..3).map(|k| (again[k] - m.after[k]) / sigma[k]));
             }
         }
         all
     }
 
-    fn bounds(&self, listed: usize) -> [f64; 2] {
+    fn size_bounds(&self, listed: usize) -> [f64; 2] {
         let last = self.world.pieces.iter().flat_map(|p| &p.rolls).map(|r| r.t_s).fold(1.0, f64::max);
         let rolls = self.world.pieces.iter().map(|p| p.rolls.len()).max().unwrap_or(1) as f64;
         match listed {
@@ -97,9 +84,9 @@ impl SetUp for Table {
         }
     }
 
-    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
+    fn apply(&self, e: &mut Effects, listed: usize, size: f64) {
         match listed {
-            0 => e.response = self.turn * size,
+            0 => e.response = self.sign * size,
             DRYING => e.drying_per_s = size,
             2 => e.slip_n = size,
             3 => e.springback = size,
@@ -108,7 +95,7 @@ impl SetUp for Table {
         }
     }
 
-    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
+    fn describe(&self, e: &Effects, listed: usize, key: &mut Key) {
         match listed {
             0 => key.add("stiffness-change", &[("factor", 1.0 + e.response)]),
             DRYING => key.add("drying", &[("rate_per_s", e.drying_per_s)]),
@@ -119,7 +106,7 @@ impl SetUp for Table {
         }
     }
 
-    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+    fn unlisted_size_bounds(&self, which: usize) -> [f64; 2] {
         match which {
             0 => [5e-3, 0.8],
             1 => [0.1, 12.0],
@@ -128,17 +115,17 @@ impl SetUp for Table {
         }
     }
 
-    fn unlisted(&self, which: usize, turn: f64, size: f64) -> Effects {
+    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
-            0 => Effects { alternation: turn * size, ..none },
-            1 => Effects { throw_per_m: turn * size, ..none },
+            0 => Effects { alternation: sign * size, ..none },
+            1 => Effects { throw_per_m: sign * size, ..none },
             2 => Effects { long: [size, self.long_from_m], ..none },
             _ => Effects { worked: size, ..none },
         }
     }
 
-    fn say_unlisted(&self, which: usize, key: &mut Key) {
+    fn describe_unlisted(&self, which: usize, key: &mut Key) {
         let what = match which {
             0 => "a response that alternates from roll to roll",
             1 => "a band that answers the throw in another way",
@@ -156,7 +143,7 @@ impl SetUp for Table {
         let mut data = self.columns();
         let mut before = 0;
         if !self.apart {
-            data += &self.rows(&self.before().rolled(), 0, rng);
+            data += &self.rows(&self.trained_on().rolled(), 0, rng);
             before = self.training.len();
         }
         let at_work = DoughWorld { effects, ..self.world.clone() };
@@ -164,11 +151,11 @@ impl SetUp for Table {
         [self.header(rng), data]
     }
 
-    fn beside(&self, rng: &mut ChaCha8Rng) -> Vec<(String, String)> {
+    fn further_files(&self, rng: &mut ChaCha8Rng) -> Vec<(String, String)> {
         if !self.apart {
             return Vec::new();
         }
-        vec![("train.csv".into(), self.columns() + &self.rows(&self.before().rolled(), 0, rng))]
+        vec![("train.csv".into(), self.columns() + &self.rows(&self.trained_on().rolled(), 0, rng))]
     }
 }
 
@@ -178,7 +165,7 @@ impl Table {
         let density_kg_m3 = between(rng, 1150.0, 1300.0);
         let bowl = Bowl {
             volume_m3: between(rng, 0.04, 0.06) / density_kg_m3,
-            differ: between(rng, 0.0, 0.02),
+            softness_spread: between(rng, 0.0, 0.02),
             scatter: if whole(rng, 0, 1) == 0 { 0.0 } else { log_between(rng, 0.005, 0.05) },
         };
         let doughs = whole(rng, 6, 12);
@@ -189,9 +176,9 @@ impl Table {
         let pieces = bowl.pieces([doughs, rolls], favourite, spread, rng);
         let learned = if apart { whole(rng, 8, 12) } else { doughs };
         let training = bowl.pieces([learned, whole(rng, 40, 50)], favourite, f64::INFINITY, rng);
-        let own_band = whole(rng, 0, 3) == 0;
-        let mut band = Elastic { k0_n_m: 60.0, k1_n_m2: 900.0, throw0_m: 0.04, k2_per_m: 8.0 };
-        if own_band {
+        let unusual_band = whole(rng, 0, 3) == 0;
+        let mut band = Band { k0_n_m: 60.0, k1_n_m2: 900.0, throw0_m: 0.04, k2_per_m: 8.0 };
+        if unusual_band {
             band.k0_n_m = between(rng, 45.0, 80.0).round();
             band.k1_n_m2 = between(rng, 600.0, 1200.0).round();
             band.k2_per_m = between(rng, 4.0, 12.0).round();
@@ -208,7 +195,7 @@ impl Table {
             yield_pa: between(rng, 200.0, 700.0),
             rate_per_s: log_between(rng, 0.06, 0.11),
             exponent: between(rng, 1.7, 2.1),
-            flattens: between(rng, 0.08, 0.16),
+            flattening: between(rng, 0.08, 0.16),
             pieces,
             effects: Effects::default(),
         };
@@ -219,8 +206,8 @@ impl Table {
             timed: whole(rng, 0, 6) > 0,
             noise,
             density_kg_m3,
-            own_band,
-            turn: sign(rng),
+            unusual_band,
+            sign: sign(rng),
             long_from_m: 0.0,
         };
         table.long_from_m = table.between_lengths(between(rng, 0.25, 0.55));
@@ -228,11 +215,11 @@ impl Table {
     }
 
     /// The doughs that were learned from.
-    fn before(&self) -> DoughWorld {
+    fn trained_on(&self) -> DoughWorld {
         DoughWorld { pieces: self.training.clone(), effects: Effects::default(), ..self.world.clone() }
     }
 
-    /// A length that is a part of the way from the shortest to the longest, to a tenth of a millimetre.
+    /// The length that is a part of the way from the shortest dough's to the longest's, to a tenth of a millimetre.
     fn between_lengths(&self, part: f64) -> f64 {
         let lengths = || self.world.rolled().into_iter().flatten().map(|m| m.before[0]).collect::<Vec<_>>();
         let low = lengths().into_iter().fold(f64::INFINITY, f64::min);
@@ -247,8 +234,8 @@ impl Table {
         )
     }
 
-    /// Rolls as they were measured, each state by two pictures, after so many runs.
-    fn rows(&self, doughs: &[Vec<Made>], runs: usize, rng: &mut ChaCha8Rng) -> String {
+    /// Rows of the rolls as they were measured, each state by two pictures; the first run's number follows so many others.
+    fn rows(&self, doughs: &[Vec<Roll>], runs: usize, rng: &mut ChaCha8Rng) -> String {
         let measured: Vec<[f64; 3]> = doughs.iter().flatten().flat_map(|m| [m.before, m.after]).collect();
         let mut pictures = vec![[0.0; 3]; measured.len()];
         for k in 0..3 {
@@ -296,7 +283,7 @@ impl Table {
         if self.apart {
             header += "training = \"train.csv\"\n";
         }
-        if self.own_band {
+        if self.unusual_band {
             let b = &self.world.band;
             let _ = writeln!(
                 header,
@@ -311,9 +298,9 @@ impl Table {
 /// Dough for several pieces.
 struct Bowl {
     volume_m3: f64,
-    /// Relative sigma of how soft pieces are.
-    differ: f64,
-    /// Relative sigma of what each roll does.
+    /// Relative sigma of the pieces' softness.
+    softness_spread: f64,
+    /// Relative sigma of the response to each roll.
     scatter: f64,
 }
 
@@ -331,24 +318,24 @@ impl Bowl {
         let mut piece = || {
             let volume_m3 = self.volume_m3 * (1.0 + 0.01 * normal(rng));
             let length_m = (6.0 * volume_m3 / std::f64::consts::PI).cbrt() * between(rng, 1.02, 1.1);
-            let fresh = Lying { volume_m3, length_m, oval: 0.01 + 0.01 * normal(rng) };
-            let soft = 1.0 + self.differ * normal(rng);
+            let fresh = Shape { volume_m3, length_m, oval: 0.01 + 0.01 * normal(rng) };
+            let softness = 1.0 + self.softness_spread * normal(rng);
             let mut roll = |_| {
                 now_s += between(rng, 5.5, 7.5);
-                let place = favourite.map(|middle| {
+                let setting = favourite.map(|middle| {
                     if spread.is_finite() {
                         (middle + spread * normal(rng)).clamp(0.0, 1.0)
                     } else {
                         between(rng, 0.0, 1.0)
                     }
                 });
-                let luck = (1.0 + self.scatter * normal(rng)).max(0.1);
-                Planned { place, t_s: (now_s * 100.0).round() * 0.01, luck }
+                let scatter = (1.0 + self.scatter * normal(rng)).max(0.1);
+                PlannedRoll { setting, t_s: (now_s * 100.0).round() * 0.01, scatter }
             };
             let rolls = (0..rolls).map(&mut roll).collect();
             // The next ball is made and laid down.
             now_s += between(rng, 30.0, 60.0);
-            Piece { fresh, soft, rolls }
+            Piece { fresh, softness, rolls }
         };
         (0..count).map(|_| piece()).collect()
     }
@@ -359,7 +346,8 @@ mod tests {
     use rand::SeedableRng as _;
 
     use super::*;
-    use crate::set_up::tests::every_effect_shows;
+    use crate::concealed::maker::Maker as _;
+    use crate::concealed::rig::{RigMaker, tests::every_effect_shows};
 
     #[test]
     fn every_effect_changes_the_rolls() {
@@ -375,7 +363,7 @@ mod tests {
     fn doughs_get_as_long_as_people_have_them() {
         for seed in 0..20 {
             let table = Table::drawn(&mut ChaCha8Rng::seed_from_u64(seed));
-            for made in table.before().rolled() {
+            for made in table.trained_on().rolled() {
                 let [from, to] = [made[0].before[0], made[made.len() - 1].after[0]];
                 assert!((0.038..0.052).contains(&from) && (0.09..0.26).contains(&to), "{seed}: {from} {to}");
                 assert!(made.iter().all(|m| m.action[0] >= m.before[1] - 1e-4 && m.action[1] >= 5e-3 - 1e-9));
@@ -389,14 +377,14 @@ mod tests {
         let table = Table::drawn(&mut ChaCha8Rng::seed_from_u64(5));
         let keyed = |effects: &Effects, listed| {
             let mut key = Key::new(Hidden::One);
-            table.say(effects, listed, &mut key);
+            table.describe(effects, listed, &mut key);
             key.parameters[0].value
         };
-        let check = |effects: Effects, expected: &dyn Fn(usize, &Made) -> f64| {
+        let check = |effects: Effects, expected: &dyn Fn(usize, &Roll) -> f64| {
             for rolls in (DoughWorld { effects, ..table.world.clone() }).rolled() {
                 for (step, m) in rolls.iter().enumerate() {
-                    let [now, usual] = [m.after, m.usual].map(|then| (then[0] / m.before[0]).ln());
-                    approx::assert_relative_eq!(now, expected(step, m) * usual, max_relative = 1e-6);
+                    let [now, unchanged] = [m.after, m.unchanged].map(|then| (then[0] / m.before[0]).ln());
+                    approx::assert_relative_eq!(now, expected(step, m) * unchanged, max_relative = 1e-6);
                 }
             }
         };
@@ -417,7 +405,7 @@ mod tests {
     fn there_is_something_to_learn_from() {
         let mut inside = 0;
         for seed in 0..24 {
-            let world = Doughs.conceal(Hidden::One, seed);
+            let world = RigMaker::<Table>::NEW.conceal(Hidden::One, seed);
             let file = |name: &str| {
                 world
                     .files

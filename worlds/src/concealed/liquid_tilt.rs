@@ -1,26 +1,22 @@
-//! Tilted containers with concealed effects.
+//! The domain `liquid-tilt`: tilted containers with concealed effects.
 
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::concealed::draw::{self, between, choose, log_between, sign, stated, whole};
-use crate::concealed::{Concealed, Hidden, Key, Maker, Place};
+use super::draw::{self, between, choose, log_between, sign, stated, whole};
+use super::key::{Hidden, Key, Place};
+use super::nuisances::{Nuisances, difference};
+use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::set_up::{self, Choice, SetUp};
-use crate::sizing::{Basis, change};
-use crate::tilt::{Cavity, Effects, Sweep, TiltWorld};
-
-/// The domain `liquid-tilt`.
-#[derive(Debug, Clone, Copy)]
-pub struct Tilts;
+use crate::physics::tilt::{Cavity, Effects, Sweep, TiltWorld};
 
 const LISTED: usize = 9;
 const UNLISTED: usize = 4;
 
-/// A container in a gripper with its sensor, and what effects will look like before their size is known.
-struct Container {
+/// A container in a gripper with its sensor.
+pub(crate) struct Container {
     world: TiltWorld,
     density_kg_m3: f64,
     density_known: bool,
@@ -35,17 +31,8 @@ struct Container {
     taut_from_rad: f64,
 }
 
-impl Maker for Tilts {
-    fn domain(&self) -> &'static str {
-        "liquid-tilt"
-    }
-
-    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        set_up::conceal::<Container>(hidden, seed)
-    }
-}
-
-impl SetUp for Container {
+impl Rig for Container {
+    const DOMAIN: &'static str = "liquid-tilt";
     type Effects = Effects;
 
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
@@ -55,14 +42,14 @@ impl SetUp for Container {
         (container, Choice { listed, unlisted })
     }
 
-    fn tried(&self) -> Vec<usize> {
+    fn candidates(&self) -> Vec<usize> {
         (0..LISTED).collect()
     }
 
-    /// What is not known of the liquid can be anything: mass and volume of each run, as far as they are not stated.
-    fn basis(&self) -> Basis {
+    /// What mass and volume of each run can do to the readings, as far as they are not stated.
+    fn nuisances(&self) -> Nuisances {
         let plain = self.whitened(&self.world);
-        let mut basis = Basis::default();
+        let mut nuisances = Nuisances::default();
         for run in 0..self.world.sweeps.len() {
             for part in [0, 1] {
                 let mut moved = self.world.clone();
@@ -76,18 +63,18 @@ impl SetUp for Container {
                     }
                     _ => continue,
                 }
-                basis.add(&change(&plain, &self.whitened(&moved)));
+                nuisances.add(&difference(&plain, &self.whitened(&moved)));
             }
         }
-        basis
+        nuisances
     }
 
-    fn change(&self, effects: Effects) -> Vec<f64> {
+    fn response(&self, effects: Effects) -> Vec<f64> {
         let at_work = TiltWorld { effects, ..self.world.clone() };
-        change(&self.whitened(&self.world), &self.whitened(&at_work))
+        difference(&self.whitened(&self.world), &self.whitened(&at_work))
     }
 
-    fn bounds(&self, listed: usize) -> [f64; 2] {
+    fn size_bounds(&self, listed: usize) -> [f64; 2] {
         match listed {
             0 => [1e-4, 4e-3],
             1 => [2e-4, 0.1],
@@ -99,7 +86,7 @@ impl SetUp for Container {
         }
     }
 
-    fn set(&self, e: &mut Effects, listed: usize, size: f64) {
+    fn apply(&self, e: &mut Effects, listed: usize, size: f64) {
         let signed = self.signs[listed] * size;
         match listed {
             0 => e.wall_m = size,
@@ -114,7 +101,7 @@ impl SetUp for Container {
         }
     }
 
-    fn say(&self, e: &Effects, listed: usize, key: &mut Key) {
+    fn describe(&self, e: &Effects, listed: usize, key: &mut Key) {
         match listed {
             0 => key.add("wall-thickness", &[("thickness_m", e.wall_m)]),
             1 => key.add("force-gain", &[("gain", e.force_gain)]),
@@ -124,14 +111,14 @@ impl SetUp for Container {
             5 => key.add("cap-mass", &[("shift_m", e.cap_shift_m)]),
             6 => {
                 key.add("grasp-slip", &[("slip_m", e.slip_m)]);
-                key.place = Some(self.late());
+                key.place = Some(self.after_slip());
             }
             7 => key.add("sensor-drift", &[("rate_nm_per_row", e.drift_nm_per_row)]),
             _ => key.add("surface-lag", &[("angle_rad", e.surface_lag_rad)]),
         }
     }
 
-    fn unlisted_bounds(&self, which: usize) -> [f64; 2] {
+    fn unlisted_size_bounds(&self, which: usize) -> [f64; 2] {
         match which {
             0 => [1e-4, 0.05],
             1 => [2e-5, 0.01],
@@ -140,17 +127,17 @@ impl SetUp for Container {
         }
     }
 
-    fn unlisted(&self, which: usize, turn: f64, size: f64) -> Effects {
+    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
-            0 => Effects { cable: [turn * size, self.taut_from_rad], ..none },
+            0 => Effects { cable: [sign * size, self.taut_from_rad], ..none },
             1 => Effects { play_nm: size, ..none },
-            2 => Effects { flex: turn * size, ..none },
+            2 => Effects { flex: sign * size, ..none },
             _ => Effects { spilt_kg: size, slip_at: self.slip_at, ..none },
         }
     }
 
-    fn say_unlisted(&self, which: usize, key: &mut Key) {
+    fn describe_unlisted(&self, which: usize, key: &mut Key) {
         let (what, place) = match which {
             0 => {
                 let to = self.world.sweeps[0].tilts_rad.iter().copied().fold(0.0, f64::max);
@@ -159,7 +146,7 @@ impl SetUp for Container {
             }
             1 => ("hysteresis of the torque sensor", None),
             2 => ("a gripper that gives way with the torque squared", None),
-            _ => ("liquid that is spilt once", Some(self.late())),
+            _ => ("liquid that is spilt once", Some(self.after_slip())),
         };
         key.unlisted = Some(what.into());
         key.place = place;
@@ -268,8 +255,8 @@ impl Container {
         self.world.sweeps.iter().map(|s| s.tilts_rad.len() as f64).sum()
     }
 
-    /// From the pose of the slip to the end of its run.
-    fn late(&self) -> Place {
+    /// Where the poses of a run from its slip on are.
+    fn after_slip(&self) -> Place {
         let [run, pose] = self.slip_at;
         let late = &self.world.sweeps[run].tilts_rad[pose..];
         Place {
@@ -294,7 +281,7 @@ mod tests {
     use rand::SeedableRng as _;
 
     use super::*;
-    use crate::set_up::tests::every_effect_shows;
+    use crate::concealed::rig::tests::every_effect_shows;
 
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
@@ -314,7 +301,7 @@ mod tests {
         let gain = Effects { force_gain: 0.002, ..Effects::default() };
         let mut left = |density, volumes| {
             (container.density_known, container.volumes_known) = (density, volumes);
-            container.basis().left(&container.change(gain))
+            container.nuisances().residual_norm(&container.response(gain))
         };
         let [nothing, density, both] = [left(false, false), left(true, false), left(true, true)];
         assert!(both > density && density > nothing, "{both} {density} {nothing}");

@@ -9,6 +9,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::GRAVITY_M_S2;
 
+use super::bisection::bisect;
+use super::runge_kutta;
+
 type Vec3 = [f64; 3];
 
 /// Everything that may act beside gravity and a constant restitution; all zero is a level table in a vacuum.
@@ -16,20 +19,20 @@ type Vec3 = [f64; 3];
 pub struct Effects {
     /// Quadratic drag in 1/m.
     pub drag_per_m: f64,
-    /// By how much the restitution falls for each m/s above 1 m/s, in s/m.
+    /// Fall of the restitution with the speed, from 1 m/s on, in s/m.
     pub slope_s_m: f64,
     /// Slopes of the table along x and y.
-    pub table: [f64; 2],
-    /// Share of the speed along the table that each impact takes.
+    pub table_slope: [f64; 2],
+    /// Fraction of the tangential speed that each impact takes.
     pub friction: f64,
-    /// Stated times are this much too long, relative to 1.
+    /// Relative error of the stated times.
     pub clock_rate: f64,
-    /// Stated places are this much too far apart, relative to 1.
+    /// Relative error of the stated places' scale.
     pub position_scale: f64,
-    /// Share of the runs in which one impact after the first goes unheard.
+    /// Fraction of the runs in which one impact after the first goes unheard.
     pub unheard: f64,
-    /// Unlisted: the restitution is less by this much where x is above [`BounceWorld::dead_from_m`].
-    pub dead_side: f64,
+    /// Unlisted: fall of the restitution where x is above [`BounceWorld::soft_from_m`].
+    pub softer_side: f64,
 }
 
 /// How drops are recorded.
@@ -51,10 +54,10 @@ pub struct BounceWorld {
     pub release_m_s: f64,
     /// One sigma of the times in s, and of the places in m.
     pub noise: [f64; 2],
-    /// Whether these are stated.
+    /// Whether the header states the noise.
     pub noise_known: bool,
-    /// Where the dead side of the table begins, if it has one, along x in m; balls are let go above 0.
-    pub dead_from_m: f64,
+    /// Where the softer side of the table begins, if it has one, along x in m; balls are let go above 0.
+    pub soft_from_m: f64,
     /// What acts.
     pub effects: Effects,
 }
@@ -72,7 +75,7 @@ impl BounceWorld {
             release_m_s: 0.05,
             noise: [3e-5, 6e-3],
             noise_known: true,
-            dead_from_m: 0.02,
+            soft_from_m: 0.02,
             effects: Effects::default(),
         }
     }
@@ -82,7 +85,7 @@ impl BounceWorld {
         self.files_and_unheard(seed).0
     }
 
-    /// The same, and the number of runs in which an impact went unheard.
+    /// The contents of `recording.toml` and `data.csv`, and the number of runs in which an impact went unheard.
     pub fn files_and_unheard(&self, seed: u64) -> ([String; 2], usize) {
         let mut runs_unheard = 0;
         let mut header = String::from("format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n");
@@ -97,8 +100,7 @@ impl BounceWorld {
         let mut data = String::from("run,bounce,t_s,x_m,y_m\n");
         for run in 1..=self.runs {
             let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
-            let unheard = (rng.random::<f64>() < self.effects.unheard)
-                .then(|| rng.random_range(1..self.impacts.max(3) - 1));
+            let unheard = self.unheard(&mut rng);
             runs_unheard += usize::from(unheard.is_some());
             let impacts = self.impacts + usize::from(unheard.is_some());
             let heard = self.drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
@@ -108,6 +110,11 @@ impl BounceWorld {
             }
         }
         ([header, data], runs_unheard)
+    }
+
+    /// The impact of a run that goes unheard, if one does.
+    pub(crate) fn unheard(&self, rng: &mut ChaCha8Rng) -> Option<usize> {
+        (rng.random::<f64>() < self.effects.unheard).then(|| rng.random_range(1..self.impacts.max(3) - 1))
     }
 
     /// Time and place of each impact, as they are heard, of a ball that is let go above a place at some time in `begin_s`.
@@ -126,12 +133,12 @@ impl BounceWorld {
         let mut velocity = [self.release_m_s * normal(rng), self.release_m_s * normal(rng), 0.0];
         let mut t = rng.random_range(begin_s);
         let mut level = Self { effects: *e, ..*self };
-        level.effects.table = [0.0; 2];
+        level.effects.table_slope = [0.0; 2];
         let mut heard = Vec::with_capacity(impacts);
         for impact in 0..impacts {
             let table = if impact == 0 { &level } else { self };
             t += table.fly(&mut place, &mut velocity);
-            place[2] = e.table[0] * place[0] + e.table[1] * place[1];
+            place[2] = e.table_slope[0] * place[0] + e.table_slope[1] * place[1];
             heard.push([
                 t * (1.0 + e.clock_rate) + self.noise[0] * normal(rng),
                 place[0] * (1.0 + e.position_scale) + self.noise[1] * normal(rng),
@@ -145,7 +152,7 @@ impl BounceWorld {
     /// Flies until the table is reached; the time it took.
     fn fly(&self, place: &mut Vec3, velocity: &mut Vec3) -> f64 {
         const STEP_S: f64 = 1e-3;
-        let [sx, sy] = self.effects.table;
+        let [sx, sy] = self.effects.table_slope;
         let above = |p: &Vec3| p[2] - sx * p[0] - sy * p[1];
         let mut t = 0.0;
         loop {
@@ -156,33 +163,21 @@ impl BounceWorld {
             (*place, *velocity) = (p, v);
             t += STEP_S;
         }
-        let (mut early, mut late) = (0.0, STEP_S);
-        for _ in 0..50 {
-            let middle = 0.5 * (early + late);
-            if above(&self.step(place, velocity, middle).0) > 0.0 { early = middle } else { late = middle }
-        }
+        let in_flight = |h: f64| above(&self.step(place, velocity, h).0) > 0.0;
+        let [_, late] = bisect([0.0, STEP_S], 50, in_flight);
         (*place, *velocity) = self.step(place, velocity, late);
         t + late
     }
 
-    /// One step of a classical Runge-Kutta method.
+    /// Place and velocity a step later.
     fn step(&self, place: &Vec3, velocity: &Vec3, h: f64) -> (Vec3, Vec3) {
-        let pull = |v: &Vec3| {
-            let k = self.effects.drag_per_m * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-            [-k * v[0], -k * v[1], -k * v[2] - GRAVITY_M_S2]
+        let rates = |&[_, _, _, u, v, w]: &[f64; 6], _| {
+            let k = self.effects.drag_per_m * norm(&[u, v, w]);
+            [u, v, w, -k * u, -k * v, -k * w - GRAVITY_M_S2]
         };
-        let add = |v: &Vec3, a: &Vec3, h: f64| [v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]];
-        let a1 = pull(velocity);
-        let v2 = add(velocity, &a1, 0.5 * h);
-        let a2 = pull(&v2);
-        let v3 = add(velocity, &a2, 0.5 * h);
-        let a3 = pull(&v3);
-        let v4 = add(velocity, &a3, h);
-        let a4 = pull(&v4);
-        let mean =
-            |a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3, i: usize| (a[i] + 2.0 * (b[i] + c[i]) + d[i]) / 6.0;
-        let moved = std::array::from_fn(|i| place[i] + h * mean(velocity, &v2, &v3, &v4, i));
-        (moved, std::array::from_fn(|i| velocity[i] + h * mean(&a1, &a2, &a3, &a4, i)))
+        let [[x, y, z], [u, v, w]] = [*place, *velocity];
+        let [x, y, z, u, v, w] = runge_kutta::step(&[x, y, z, u, v, w], 0.0, h, rates);
+        ([x, y, z], [u, v, w])
     }
 
     /// The velocity after an impact.
@@ -190,15 +185,15 @@ impl BounceWorld {
         let e = &self.effects;
         let speed = norm(v);
         let mut restitution = self.restitution - e.slope_s_m * (speed - 1.0);
-        if place[0] > self.dead_from_m {
-            restitution -= e.dead_side;
+        if place[0] > self.soft_from_m {
+            restitution -= e.softer_side;
         }
-        let up = unit(&[-e.table[0], -e.table[1], 1.0]);
+        let up = unit(&[-e.table_slope[0], -e.table_slope[1], 1.0]);
         let into = v[0] * up[0] + v[1] * up[1] + v[2] * up[2];
         let mirrored: Vec3 =
             std::array::from_fn(|i| (1.0 - e.friction) * (v[i] - into * up[i]) - into * up[i]);
         let size = restitution * norm(&mirrored);
-        scattered(&unit(&mirrored), self.kappa, rng).map(|x| size * x)
+        von_mises_fisher(&unit(&mirrored), self.kappa, rng).map(|x| size * x)
     }
 }
 
@@ -212,7 +207,7 @@ fn unit(v: &Vec3) -> Vec3 {
 }
 
 /// A direction about a mean one (von Mises and Fisher; Ulrich 1984, doi:10.2307/2347441, in closed form on the sphere).
-fn scattered(mean: &Vec3, kappa: f64, rng: &mut ChaCha8Rng) -> Vec3 {
+fn von_mises_fisher(mean: &Vec3, kappa: f64, rng: &mut ChaCha8Rng) -> Vec3 {
     let u: f64 = rng.random();
     let along = 1.0 + (u + (1.0 - u) * (-2.0 * kappa).exp()).ln() / kappa;
     let across = (1.0 - along * along).max(0.0).sqrt();
@@ -258,7 +253,7 @@ mod tests {
         let n = 20_000;
         let square = (0..n)
             .map(|_| {
-                let d = scattered(&[0.0, 0.0, 1.0], 400.0, &mut rng);
+                let d = von_mises_fisher(&[0.0, 0.0, 1.0], 400.0, &mut rng);
                 d[0] * d[0]
             })
             .sum::<f64>()

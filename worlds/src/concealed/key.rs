@@ -1,0 +1,123 @@
+//! What is hidden in a recording, and the answer that goes with it.
+
+/// What is hidden in a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Hidden {
+    /// Nothing: noise and nuisances alone.
+    Nothing,
+    /// One mechanism of the domain's list.
+    One,
+    /// Two of them.
+    Two,
+    /// Something that is not on the list.
+    Unlisted,
+}
+
+impl Hidden {
+    /// How many mechanisms of the list are at work.
+    pub(crate) const fn listed(self) -> usize {
+        match self {
+            Self::Nothing | Self::Unlisted => 0,
+            Self::One => 1,
+            Self::Two => 2,
+        }
+    }
+}
+
+/// A recording with its answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Concealed {
+    /// The files of the recording's folder: name and contents.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The answer.
+    pub key: Key,
+}
+
+impl Concealed {
+    /// A recording of one table.
+    pub(crate) fn table(header: String, data: String, key: Key) -> Self {
+        let files = [("recording.toml", header), ("data.csv", data)];
+        Self { files: files.map(|(name, text)| (name.to_owned(), text.into_bytes())).into(), key }
+    }
+}
+
+/// What was hidden.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Key {
+    /// The kind of world.
+    pub hidden: Hidden,
+    /// Identifiers of the listed mechanisms at work, in alphabetical order.
+    pub mechanisms: Vec<String>,
+    /// Identifiers that may be named beside them or not, which is the same model (the drag through which a wind acts).
+    pub beside: Vec<String>,
+    /// Their parameters, by the names of the recordings' format.
+    pub parameters: Vec<HiddenParameter>,
+    /// What an unlisted effect is, in words.
+    pub unlisted: Option<String>,
+    /// Where a local effect acts.
+    pub place: Option<Place>,
+    /// How strong what is hidden is, where the maker knows it: the root of the sum of squares, in sigmas of white noise, of what
+    /// it does to the readings beyond what the baseline's own unknowns can take away (and, where it is unlisted, any two listed
+    /// mechanisms with them).
+    pub strength: Option<f64>,
+}
+
+impl Key {
+    /// An answer without parameters or place.
+    pub fn new(hidden: Hidden) -> Self {
+        Self {
+            hidden,
+            mechanisms: Vec::new(),
+            beside: Vec::new(),
+            parameters: Vec::new(),
+            unlisted: None,
+            place: None,
+            strength: None,
+        }
+    }
+
+    /// Adds a mechanism at work, with its parameters.
+    pub fn add(&mut self, mechanism: &str, parameters: &[(&str, f64)]) {
+        self.mechanisms.push(mechanism.into());
+        self.mechanisms.sort();
+        self.parameters.extend(parameters.iter().map(|&(name, value)| HiddenParameter {
+            mechanism: mechanism.into(),
+            name: name.into(),
+            value,
+        }));
+    }
+
+    /// States the share of the runs in which an impact went unheard, as the format asks for: that of these very runs.
+    pub(crate) fn state_missed(&mut self, unheard: usize, runs: usize) {
+        let missed = self.parameters.iter_mut().filter(|p| p.mechanism == "missed-impact");
+        missed.for_each(|p| p.value = unheard as f64 / runs as f64);
+    }
+
+    /// Takes a mechanism and its parameters out again.
+    pub(crate) fn remove(&mut self, mechanism: &str) {
+        self.mechanisms.retain(|m| m != mechanism);
+        self.parameters.retain(|p| p.mechanism != mechanism);
+    }
+}
+
+/// A parameter of a hidden mechanism.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HiddenParameter {
+    /// Identifier of the mechanism.
+    pub mechanism: String,
+    /// Name with its unit as a suffix.
+    pub name: String,
+    /// True value.
+    pub value: f64,
+}
+
+/// Where a local effect acts: readings change at an end of the interval that lies within the recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// Name of the variable.
+    pub variable: String,
+    /// Start of the interval; `-inf` for the beginning.
+    pub from: f64,
+    /// End of the interval; `inf` for the end.
+    pub to: f64,
+}

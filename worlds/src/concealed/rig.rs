@@ -1,0 +1,164 @@
+//! Rigs whose effects are sized by their strength in sigmas, and the one way in which an effect is concealed in them.
+
+use std::marker::PhantomData;
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::draw::{sign, strength};
+use super::key::{Concealed, Hidden, Key};
+use super::maker::Maker;
+use super::nuisances::{Nuisances, size_of_strength};
+
+/// Which effects a world hides, by their numbers.
+pub(crate) struct Choice {
+    /// Those of the domain's list.
+    pub(crate) listed: Vec<usize>,
+    /// The one that is not on the list; looked at where something unlisted is hidden.
+    pub(crate) unlisted: usize,
+}
+
+/// A rig with its sensors, and what effects will look like before their size is known.
+pub(crate) trait Rig: Sized {
+    /// The domain of its recordings.
+    const DOMAIN: &'static str;
+
+    /// Sizes of all effects; none at work by default.
+    type Effects: Copy + Default;
+
+    /// Draws a rig that can show what is to be hidden, and which effects are hidden.
+    fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice);
+
+    /// All that the baseline's nuisance parameters can do to the readings.
+    fn nuisances(&self) -> Nuisances;
+
+    /// What effects do to the readings, in sigmas.
+    fn response(&self, effects: Self::Effects) -> Vec<f64>;
+
+    /// The listed effects that a model of such a recording can have.
+    fn candidates(&self) -> Vec<usize>;
+
+    /// The smallest and the largest plausible size of a listed effect.
+    fn size_bounds(&self, listed: usize) -> [f64; 2];
+
+    /// Puts a listed effect of this size to work.
+    fn apply(&self, effects: &mut Self::Effects, listed: usize, size: f64);
+
+    /// Writes a listed effect into the key.
+    fn describe(&self, effects: &Self::Effects, listed: usize, key: &mut Key);
+
+    /// The smallest and the largest plausible size of an unlisted effect.
+    fn unlisted_size_bounds(&self, which: usize) -> [f64; 2];
+
+    /// An unlisted effect of this size and sign.
+    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Self::Effects;
+
+    /// Writes an unlisted effect into the key.
+    fn describe_unlisted(&self, which: usize, key: &mut Key);
+
+    /// The sign of an unlisted effect.
+    fn unlisted_sign(rng: &mut ChaCha8Rng) -> f64 {
+        sign(rng)
+    }
+
+    /// Header and data of the recording with these effects at work.
+    fn files(self, effects: Self::Effects, rng: &mut ChaCha8Rng) -> [String; 2];
+
+    /// Further files of the recording: name and contents.
+    fn further_files(&self, _rng: &mut ChaCha8Rng) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    /// One listed effect alone.
+    fn alone(&self, listed: usize, size: f64) -> Self::Effects {
+        let mut effects = Self::Effects::default();
+        self.apply(&mut effects, listed, size);
+        effects
+    }
+
+    /// What each listed effect does to the readings at a size in the middle of the plausible ones.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        let middle = |[low, high]: [f64; 2]| (low * high).sqrt();
+        self.candidates()
+            .into_iter()
+            .map(|l| self.response(self.alone(l, middle(self.size_bounds(l)))))
+            .collect()
+    }
+
+    /// Sizes what is hidden by the part of its response that no baseline can take away, and writes it into the key.
+    fn hide(&self, hidden: Hidden, choice: &Choice, key: &mut Key, rng: &mut ChaCha8Rng) -> Self::Effects {
+        let nuisances = self.nuisances();
+        let mut effects = Self::Effects::default();
+        for &listed in &choice.listed {
+            let wanted = strength(rng);
+            let strength_of = |size| nuisances.residual_norm(&self.response(self.alone(listed, size)));
+            self.apply(&mut effects, listed, size_of_strength(wanted, self.size_bounds(listed), strength_of));
+            self.describe(&effects, listed, key);
+        }
+        if !choice.listed.is_empty() {
+            key.strength = Some(nuisances.residual_norm(&self.response(effects)));
+        }
+        if hidden == Hidden::Unlisted {
+            let which = choice.unlisted;
+            let spaces = nuisances.with_pairs(&self.directions());
+            let strength_of = |effects| {
+                let response = self.response(effects);
+                spaces.iter().map(|s| s.residual_norm(&response)).fold(f64::INFINITY, f64::min)
+            };
+            let (wanted, sign) = (strength(rng), Self::unlisted_sign(rng));
+            let unlisted = |size| self.unlisted(which, sign, size);
+            let bounds = self.unlisted_size_bounds(which);
+            effects = unlisted(size_of_strength(wanted, bounds, |size| strength_of(unlisted(size))));
+            key.strength = Some(strength_of(effects));
+            self.describe_unlisted(which, key);
+        }
+        effects
+    }
+}
+
+/// Makes worlds of a kind of rig.
+pub(crate) struct RigMaker<R>(PhantomData<fn() -> R>);
+
+impl<R> RigMaker<R> {
+    /// The one value of this type.
+    pub(crate) const NEW: Self = Self(PhantomData);
+}
+
+impl<R: Rig> Maker for RigMaker<R> {
+    fn domain(&self) -> &'static str {
+        R::DOMAIN
+    }
+
+    fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut key = Key::new(hidden);
+        let (rig, choice) = R::draw(hidden, &mut rng);
+        let effects = rig.hide(hidden, &choice, &mut key, &mut rng);
+        let further = rig.further_files(&mut rng);
+        let [header, data] = rig.files(effects, &mut rng);
+        let mut concealed = Concealed::table(header, data, key);
+        concealed.files.extend(further.into_iter().map(|(name, text)| (name, text.into_bytes())));
+        concealed
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// Fails where an effect of the largest plausible size leaves less than `least` sigmas beyond what a baseline takes, or not
+    /// `ratio` times what the smallest leaves.
+    pub(crate) fn every_effect_shows<R: Rig>(rig: &R, unlisted: usize, ratio: f64, least: [f64; 2]) {
+        let nuisances = rig.nuisances();
+        let left = |effects| nuisances.residual_norm(&rig.response(effects));
+        for listed in rig.candidates() {
+            let [weak, strong] = rig.size_bounds(listed).map(|size| left(rig.alone(listed, size)));
+            assert!(strong > ratio * weak && strong > least[0], "{listed}: {weak} {strong}");
+        }
+        for which in 0..unlisted {
+            let strong = left(rig.unlisted(which, 1.0, rig.unlisted_size_bounds(which)[1]));
+            assert!(strong > least[1], "{which}: {strong}");
+        }
+        assert!(left(R::Effects::default()) < 1e-9);
+    }
+}
