@@ -1,6 +1,6 @@
-//! How faint an effect the tool still sees, beside the likelihood-ratio test that is told which effect it is.
+//! How faint an effect the tool still sees, beside an oracle: the likelihood-ratio test that knows which effect it is.
 //!
-//! The told test knows mechanism, noise level and whiteness; at 5 % it detects 3.24 standard errors in 90 % of worlds (3.56 for
+//! The oracle knows mechanism, noise level and whiteness; at 5 % it detects 3.24 standard errors in 90 % of worlds (3.56 for
 //! two parameters, 3.76 for three: noncentral chi-square). The tool knows none of these. Size is measured by least squares on worlds without noise.
 //!
 //! `cargo run --release -p examples --example 02_power` (`--small`: few worlds)
@@ -10,8 +10,8 @@ use missing_physics::diagnosis::Verdict;
 use worlds::noise::Noise;
 use worlds::physics::flight::{Effects, FlightWorld, Measured};
 
-/// Standard errors by which a gravity-only flight misses one draw: straight lines are fitted to what is left of the
-/// coordinates once gravity is taken away.
+/// Standard errors by which a gravity-only flight misses one draw: straight lines are fitted to the
+/// coordinates less the fall.
 fn size(world: &FlightWorld, seed: u64) -> f64 {
     let quiet = FlightWorld { noise: Noise::white(0.0), ..*world };
     let squares: f64 = quiet
@@ -39,19 +39,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let count = if examples::small() { 3 } else { 60 };
     let base = FlightWorld::thrown(Measured::Position);
     type Grow = fn(f64) -> Effects;
+    // Name, the oracle's size in standard errors, and the effect of a size.
     let kinds: [(&str, f64, Grow); 4] = [
         ("quadratic drag", 3.24, |s| Effects { quadratic_per_m: 1e-4 * s, ..Effects::default() }),
         ("linear drag", 3.24, |s| Effects { linear_per_s: 1e-3 * s, ..Effects::default() }),
         ("Magnus lift", 3.76, |s| Effects { magnus_per_s: [0.0, 3e-4 * s, 3e-4 * s], ..Effects::default() }),
         ("camera tilt", 3.56, |s| Effects { camera_tilt_rad: [1e-4 * s, 0.0], ..Effects::default() }),
     ];
-    println!("{:16} {:>28} {:>12}", "effect", "times the told test's size", "detected");
-    for (k, (name, told, grow)) in kinds.iter().enumerate() {
+    println!("{:16} {:>28} {:>12}", "effect", "times the oracle's size", "detected");
+    for (k, (name, oracle, grow)) in kinds.iter().enumerate() {
         for (j, factor) in [1.0, 1.5, 2.0].into_iter().enumerate() {
             // Each throw is another one: the effect is grown until this one misses by the wanted size.
             let world = |seed| {
                 let unit = size(&FlightWorld { effects: grow(1.0), ..base }, seed);
-                FlightWorld { effects: grow(factor * told / unit), ..base }
+                FlightWorld { effects: grow(factor * oracle / unit), ..base }
             };
             let seed = 1_000_000 + 10_000 * (3 * k + j) as u64;
             let answers = examples::diagnose_many(name, &world, count, seed, 399)?;

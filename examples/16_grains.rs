@@ -130,9 +130,10 @@ fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error>> {
         ])
     };
     let errors: Vec<[f64; 4]> = (0..heaps).into_par_iter().filter_map(one).collect();
-    println!("\nErrors over {} unseen heaps (section 3.6)      here               thesis", errors.len());
-    let thesis = [(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148), (1.582, 0.336)];
-    for (k, (name, (m, s))) in ["mu_s", "ln mu_r", "e", "L2 of statistics"].iter().zip(thesis).enumerate() {
+    println!("\nErrors over {} unseen heaps (section 3.6)      here          [Matl 2021]", errors.len());
+    let published = [(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148), (1.582, 0.336)];
+    for (k, (name, (m, s))) in ["mu_s", "ln mu_r", "e", "L2 of statistics"].iter().zip(published).enumerate()
+    {
         let n = errors.len() as f64;
         let mean = errors.iter().map(|e| e[k]).sum::<f64>() / n;
         let sd = (errors.iter().map(|e| (e[k] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
@@ -144,7 +145,7 @@ fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error>> {
 /// Three rings at three places, each asked for by its two radii; the fake pours, the camera compares.
 fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error>> {
     let (scene, view) = (Scene::default(), View::default());
-    // What is wanted is what somebody's couscous made once; from where is not told.
+    // The wanted radii are those that couscous made once, from heights that the planner does not know.
     let makes = [0.025, 0.06, 0.11];
     let count = if examples::small() { 1 } else { makes.len() };
     let kind = Kind { grain: COUSCOUS, shape: None, size_variation: 0.0, work_of_adhesion_j_m2: 0.0 };

@@ -106,7 +106,33 @@ impl Panel {
         }
     }
 
+    /// Writes this panel with its upper left corner at a place.
     fn draw(&self, svg: &mut String, [left, top]: [f64; 2]) -> std::fmt::Result {
+        let title = [left + 8.0, top + 16.0];
+        writeln!(svg, "<text x='{}' y='{}' font-weight='bold'>{}</text>", title[0], title[1], self.title)?;
+        let axes = self.axes([left, top]);
+        for (mark, colour) in &self.marks {
+            axes.draw_mark(svg, mark, colour)?;
+        }
+        axes.draw_ticks(svg)?;
+        let [from, to] = axes.corners;
+        writeln!(
+            svg,
+            "<text x='{:.1}' y='{:.1}' text-anchor='end'>{}</text>",
+            to[0],
+            to[1] + 30.0,
+            self.labels[0]
+        )?;
+        writeln!(svg, "<text x='{:.1}' y='{:.1}'>{}</text>", left + 8.0, top + 28.0, self.labels[1])?;
+        for (k, (name, colour)) in self.legend.iter().enumerate() {
+            let (u, v) = (from[0] + 8.0, from[1] + 14.0 + 12.0 * k as f64);
+            writeln!(svg, "<text x='{u:.1}' y='{v:.1}' fill='{colour}'>{name}</text>")?;
+        }
+        Ok(())
+    }
+
+    /// The axes within a panel whose upper left corner is at a place.
+    fn axes(&self, [left, top]: [f64; 2]) -> Axes {
         let [before, after, above, below] = FREE;
         let frame = [SIZE[0] - before - after, SIZE[1] - above - below];
         let mut ranges = [self.range(0), self.range(1)];
@@ -119,78 +145,71 @@ impl Panel {
                 ranges[k] = [ranges[k][0] - more, ranges[k][1] + more];
             }
         }
-        let x = |v: f64| left + before + frame[0] * (v - ranges[0][0]) / (ranges[0][1] - ranges[0][0]);
-        let y = |v: f64| top + above + frame[1] * (ranges[1][1] - v) / (ranges[1][1] - ranges[1][0]);
-        writeln!(
-            svg,
-            "<text x='{}' y='{}' font-weight='bold'>{}</text>",
-            left + 8.0,
-            top + 16.0,
-            self.title
-        )?;
-        for (mark, colour) in &self.marks {
-            match mark {
-                Mark::Line(points) => {
-                    let points: String =
-                        points.iter().map(|p| format!("{:.1},{:.1} ", x(p[0]), y(p[1]))).collect();
-                    writeln!(svg, "<polyline points='{points}' fill='none' stroke='{colour}'/>")?;
-                }
-                Mark::Dots(points) => {
-                    for p in points {
-                        writeln!(
-                            svg,
-                            "<circle cx='{:.1}' cy='{:.1}' r='2' fill='{colour}'/>",
-                            x(p[0]),
-                            y(p[1])
-                        )?;
-                    }
-                }
-                Mark::Cell(c, s) => writeln!(
+        let from = [left + before, top + above];
+        Axes { ranges, corners: [from, [from[0] + frame[0], from[1] + frame[1]]] }
+    }
+}
+
+/// Where values lie in the picture.
+struct Axes {
+    /// Smallest and largest value along each axis.
+    ranges: [[f64; 2]; 2],
+    /// The frame's upper left and lower right corner, px.
+    corners: [[f64; 2]; 2],
+}
+
+impl Axes {
+    fn x(&self, v: f64) -> f64 {
+        let [[low, high], _] = self.ranges;
+        let [[left, _], [right, _]] = self.corners;
+        left + (right - left) * (v - low) / (high - low)
+    }
+
+    fn y(&self, v: f64) -> f64 {
+        let [_, [low, high]] = self.ranges;
+        let [[_, top], [_, bottom]] = self.corners;
+        top + (bottom - top) * (high - v) / (high - low)
+    }
+
+    fn draw_mark(&self, svg: &mut String, mark: &Mark, colour: &str) -> std::fmt::Result {
+        let place = |[x, y]: [f64; 2]| [self.x(x), self.y(y)];
+        match mark {
+            Mark::Line(points) => {
+                let points = points.iter().map(|p| place(*p));
+                let points: String = points.map(|[x, y]| format!("{x:.1},{y:.1} ")).collect();
+                writeln!(svg, "<polyline points='{points}' fill='none' stroke='{colour}'/>")
+            }
+            Mark::Dots(points) => points.iter().map(|p| place(*p)).try_for_each(|[x, y]| {
+                writeln!(svg, "<circle cx='{x:.1}' cy='{y:.1}' r='2' fill='{colour}'/>")
+            }),
+            Mark::Cell(centre, sides) => {
+                let corner = |h: f64| place([centre[0] + h * sides[0], centre[1] - h * sides[1]]);
+                let ([x, y], [right, bottom]) = (corner(-0.5), corner(0.5));
+                let (width, height) = (right - x + 0.2, bottom - y + 0.2);
+                writeln!(
                     svg,
-                    "<rect x='{:.1}' y='{:.1}' width='{:.1}' height='{:.1}' fill='{colour}'/>",
-                    x(c[0] - 0.5 * s[0]),
-                    y(c[1] + 0.5 * s[1]),
-                    x(c[0] + 0.5 * s[0]) - x(c[0] - 0.5 * s[0]) + 0.2,
-                    y(c[1] - 0.5 * s[1]) - y(c[1] + 0.5 * s[1]) + 0.2
-                )?,
-                Mark::Text(at, text) => writeln!(
-                    svg,
-                    "<text x='{:.1}' y='{:.1}' font-size='9' text-anchor='middle'>{text}</text>",
-                    x(at[0]),
-                    y(at[1]) + 3.0
-                )?,
+                    "<rect x='{x:.1}' y='{y:.1}' width='{width:.1}' height='{height:.1}' fill='{colour}'/>"
+                )
+            }
+            Mark::Text(at, text) => {
+                let [x, y] = place(*at);
+                let y = y + 3.0;
+                writeln!(svg, "<text x='{x:.1}' y='{y:.1}' font-size='9' text-anchor='middle'>{text}</text>")
             }
         }
-        let [right, bottom] = [left + before + frame[0], top + above + frame[1]];
-        writeln!(
-            svg,
-            "<path d='M{:.1},{:.1} V{bottom:.1} H{right:.1}' stroke='black' fill='none'/>",
-            left + before,
-            top + above
-        )?;
-        for v in ticks(ranges[0]) {
-            let u = x(v);
-            writeln!(
-                svg,
-                "<text x='{u:.1}' y='{:.1}' text-anchor='middle'>{}</text>",
-                bottom + 14.0,
-                short(v)
-            )?;
+    }
+
+    /// The frame's left and lower side with round numbers.
+    fn draw_ticks(&self, svg: &mut String) -> std::fmt::Result {
+        let [[left, top], [right, bottom]] = self.corners;
+        writeln!(svg, "<path d='M{left:.1},{top:.1} V{bottom:.1} H{right:.1}' stroke='black' fill='none'/>")?;
+        for v in ticks(self.ranges[0]) {
+            let (x, y) = (self.x(v), bottom + 14.0);
+            writeln!(svg, "<text x='{x:.1}' y='{y:.1}' text-anchor='middle'>{}</text>", short(v))?;
         }
-        for v in ticks(ranges[1]) {
-            let (u, w) = (left + before - 4.0, y(v) + 4.0);
-            writeln!(svg, "<text x='{u:.1}' y='{w:.1}' text-anchor='end'>{}</text>", short(v))?;
-        }
-        writeln!(
-            svg,
-            "<text x='{right:.1}' y='{:.1}' text-anchor='end'>{}</text>",
-            bottom + 30.0,
-            self.labels[0]
-        )?;
-        writeln!(svg, "<text x='{:.1}' y='{:.1}'>{}</text>", left + 8.0, top + 28.0, self.labels[1])?;
-        for (k, (name, colour)) in self.legend.iter().enumerate() {
-            let (u, v) = (left + before + 8.0, top + above + 14.0 + 12.0 * k as f64);
-            writeln!(svg, "<text x='{u:.1}' y='{v:.1}' fill='{colour}'>{name}</text>")?;
+        for v in ticks(self.ranges[1]) {
+            let (x, y) = (left - 4.0, self.y(v) + 4.0);
+            writeln!(svg, "<text x='{x:.1}' y='{y:.1}' text-anchor='end'>{}</text>", short(v))?;
         }
         Ok(())
     }
