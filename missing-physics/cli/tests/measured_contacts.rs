@@ -1,5 +1,5 @@
 //! The tool on measured soft bodies: none of them is an elastic half-space, and none is explained by what the tool knows; what it says
-//! of each is defended in `docs/soft-bodies.md`.
+//! of each is defended in `docs/evidence/soft-bodies.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
