@@ -6,6 +6,11 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 
 /// A model whose prediction is written in any number.
 pub(super) trait InDuals: Model {
+    /// Whether the shared parameter at a slot can change this run at all; where it cannot, its derivative is zero without a prediction.
+    fn acts_on(&self, _run: &Run, _shared_slot: usize) -> bool {
+        true
+    }
+
     /// As [`Model::predict`]; `moving` are the shared slots that carry a derivative.
     fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,

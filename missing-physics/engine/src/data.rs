@@ -1,6 +1,6 @@
 //! A recording as the engine sees it: runs of rows, with known inputs and measured channels.
 
-use crate::model::Quantity;
+use crate::quantity::Quantity;
 
 /// One run: the unit that is left out when a fit is judged on data that it has not seen.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +79,14 @@ pub enum RecordingError {
         /// The value.
         value: f64,
     },
+    /// The variable along which noise may be correlated is none of the recording's.
+    #[error("noise is said to run along variable {index}, the recording has {variables}")]
+    NoiseAlong {
+        /// The index.
+        index: usize,
+        /// Number of variables.
+        variables: usize,
+    },
     /// A calibration that is not above zero.
     #[error("the calibrated sigma of {channel} is {value}, expected a number above zero")]
     Calibration {
@@ -105,17 +113,21 @@ impl Recording {
                 return Err(RecordingError::Calibration { channel: channel.name.clone(), value });
             }
         }
+        let variables = self.variables.len();
+        if let Some(index) = self.noise_along.filter(|&index| index >= variables) {
+            return Err(RecordingError::NoiseAlong { index, variables });
+        }
         for run in &self.runs {
             let expected = run.len();
             let columns =
                 self.variables.iter().zip(&run.inputs).chain(self.channels.iter().zip(&run.outputs));
-            let counted = run.inputs.len() + run.outputs.len();
-            if counted != self.variables.len() + self.channels.len() {
+            let counts = [(run.inputs.len(), self.variables.len()), (run.outputs.len(), self.channels.len())];
+            if counts.iter().any(|(got, expected)| got != expected) {
                 return Err(RecordingError::Shape {
                     run: run.label.clone(),
                     column: "(number of columns)".into(),
-                    expected: self.variables.len() + self.channels.len(),
-                    got: counted,
+                    expected: counts[0].1 + counts[1].1,
+                    got: counts[0].0 + counts[1].0,
                 });
             }
             for (quantity, column) in columns {

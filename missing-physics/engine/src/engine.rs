@@ -9,7 +9,7 @@ use crate::experiment;
 use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, fit, solve};
 use crate::law;
 use crate::locate::scan::locate;
-use crate::model::{Experiment, Model, PredictError};
+use crate::model::{Experiment, Model, PredictError, Scope, Spec, SpecError};
 use crate::noise::process::{median, rough_sigma};
 use crate::noise::rule::noise_rule;
 use crate::observer::{Observer, Progress};
@@ -37,6 +37,9 @@ impl Default for Options {
 /// Why there is no diagnosis.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DiagnoseError {
+    /// The model's specification makes no sense.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
     /// The recording is not sound.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -62,6 +65,18 @@ pub enum DiagnoseError {
         value: f64,
         /// What is allowed.
         expected: &'static str,
+    },
+    /// An experiment that the model cannot predict.
+    #[error("experiment \"{words}\": {got} {what}, expected {expected}")]
+    Experiment {
+        /// The action in words.
+        words: String,
+        /// What is miscounted.
+        what: &'static str,
+        /// Number found.
+        got: usize,
+        /// Number expected.
+        expected: usize,
     },
     /// A mechanism that the model has not.
     #[error("the model has no mechanism {id}")]
@@ -90,7 +105,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let diagnosis = diagnose_with(model, recording, experiments, options, observer);
     // A simulation that broke half way leaves an answer that may rest on what it did not say.
-    match model.fatal_error() {
+    match model.extensions().program.and_then(|program| program.fatal_error()) {
         Some(error) => Err(error.into()),
         None => diagnosis,
     }
@@ -112,6 +127,7 @@ fn begin<'a>(
     recording: &Recording,
     options: &Options,
 ) -> Result<Begun<'a>, DiagnoseError> {
+    model.spec().check()?;
     check(recording, options)?;
     let problem = Problem::new(model, recording.clone());
     enough_rows(&problem)?;
@@ -143,6 +159,8 @@ fn diagnose_with(
     observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
     tell(observer, "reading the noise", 0.0)?;
+    model.spec().check()?;
+    experiments.iter().try_for_each(|e| check_experiment(model.spec(), recording, e))?;
     let begun = begin(model, recording, options)?;
     let least_squares = least_squares_baseline(&begun)?;
     Course { begun: &begun, least_squares: &least_squares, experiments, options, observer }.run()
@@ -339,6 +357,28 @@ fn check(recording: &Recording, options: &Options) -> Result<(), DiagnoseError> 
     if options.replicates < 19 {
         let value = options.replicates as f64;
         return Err(DiagnoseError::Option { name: "replicates", value, expected: "at least 19" });
+    }
+    Ok(())
+}
+
+/// An experiment's runs have the recording's inputs, and values for the model's nuisance parameters.
+fn check_experiment(
+    spec: &Spec,
+    recording: &Recording,
+    experiment: &Experiment,
+) -> Result<(), DiagnoseError> {
+    let equal = |what, got: usize, expected: usize| {
+        if got == expected {
+            return Ok(());
+        }
+        Err(DiagnoseError::Experiment { words: experiment.words.clone(), what, got, expected })
+    };
+    equal("lists of nuisance parameters", experiment.nuisance.len(), experiment.runs.len())?;
+    let unknowns = spec.count(Scope::PerRun);
+    experiment.nuisance.iter().try_for_each(|n| equal("nuisance parameters of a run", n.len(), unknowns))?;
+    for run in &experiment.runs {
+        equal("inputs of a run", run.inputs.len(), recording.variables.len())?;
+        run.inputs.iter().try_for_each(|column| equal("rows of an input", column.len(), run.len()))?;
     }
     Ok(())
 }

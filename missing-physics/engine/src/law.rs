@@ -320,30 +320,8 @@ impl Model for Extended<'_> {
         self.inner.relative_step()
     }
 
-    fn start(&self, run: &Run, nuisance: &mut [f64]) {
-        self.inner.start(run, &mut nuisance[..self.inner_nuisance]);
-    }
-
-    fn jacobian(
-        &self,
-        run: &Run,
-        shared: &[f64],
-        nuisance: &[f64],
-        shared_free: &[usize],
-        nuisance_free: &[usize],
-        out: &mut [f64],
-        jacobian: &mut [f64],
-    ) -> Result<(), PredictError> {
-        crate::fit::gauss_newton::finite_differences(
-            self,
-            run,
-            shared,
-            nuisance,
-            shared_free,
-            nuisance_free,
-            out,
-            jacobian,
-        )
+    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
+        self.inner.nuisance_start(run, &mut nuisance[..self.inner_nuisance]);
     }
 }
 

@@ -16,6 +16,7 @@ pub mod noise;
 pub mod observer;
 pub mod oracle;
 mod problem;
+mod quantity;
 pub mod repaired;
 mod selection;
 pub mod synthetic;

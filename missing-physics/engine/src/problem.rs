@@ -98,7 +98,7 @@ impl<'a> Problem<'a> {
             .iter()
             .map(|run| {
                 let mut start = nuisance.start.clone();
-                model.start(run, &mut start);
+                model.nuisance_start(run, &mut start);
                 for (i, value) in start.iter_mut().enumerate() {
                     *value = if value.is_finite() {
                         value.clamp(nuisance.lower[i], nuisance.upper[i])

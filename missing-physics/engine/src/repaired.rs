@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::data::{Recording, RecordingError};
 use crate::fit::gauss_newton::{NoiseState, normal_of_run, solve};
 use crate::linalg::inverse;
-use crate::model::{Model, PredictError, Quantity};
+use crate::model::{Model, PredictError, Quantity, SpecError};
 use crate::noise::family::Family;
 use crate::problem::{Problem, Selection};
 use crate::selection::compare::Candidate;
@@ -77,6 +77,9 @@ pub enum RepairedError {
         /// Its nuisance parameters.
         expected: usize,
     },
+    /// The simulation's specification makes no sense.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
     /// The recording is not sound.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -131,6 +134,7 @@ impl Repaired {
         model: &dyn Model,
         recording: &Recording,
     ) -> Result<Vec<PredictedRun>, RepairedError> {
+        model.spec().check()?;
         recording.check()?;
         let mut problem = Problem::new(model, recording.clone());
         problem.step = self.noise_step;

@@ -6,7 +6,7 @@ mod common;
 use common::{mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{Options, diagnose};
-use missing_physics::model::{Model, PredictError, Spec};
+use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Spec};
 use missing_physics::observer::Silent;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -32,6 +32,12 @@ impl Model for Threshold {
         Ok(())
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { modes: Some(self), ..Extensions::default() }
+    }
+}
+
+impl MultimodalModel for Threshold {
     fn starts(&self, _: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         self.forces.windows(2).map(|w| vec![(0, 0.5 * (w[0] + w[1]))]).collect()
     }

@@ -7,7 +7,7 @@ use common::{parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Location;
 use missing_physics::engine::{Options, diagnose};
-use missing_physics::model::{Model, Parameter, PredictError, Scope, Spec};
+use missing_physics::model::{CoupledRows, Extensions, Model, Parameter, PredictError, Scope, Spec};
 use missing_physics::observer::Silent;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -37,16 +37,22 @@ impl Model for Steps {
         Ok(())
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { coupled_rows: self.tells.then_some(self as &dyn CoupledRows), ..Extensions::default() }
+    }
+}
+
+impl CoupledRows for Steps {
     fn perturbation_response(
         &self,
         runs: &[Run],
         _: &[f64],
         amounts: &[Vec<f64>],
-    ) -> Result<Option<Vec<Vec<f64>>>, PredictError> {
+    ) -> Result<Vec<Vec<f64>>, PredictError> {
         let change = |(run, amounts): (&Run, &Vec<f64>)| {
             sums(0.0, run.inputs[0].iter().zip(amounts).map(|(x, amount)| x * amount)).collect()
         };
-        Ok(self.tells.then(|| runs.iter().zip(amounts).map(change).collect()))
+        Ok(runs.iter().zip(amounts).map(change).collect())
     }
 }
 

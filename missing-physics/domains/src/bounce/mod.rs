@@ -76,7 +76,7 @@ impl Domain for Bounce {
             unheard: [1, 10],
             microphones: 4,
         };
-        spec::build(&setup, 0.8).0.spec
+        spec::build(&setup, 0.8).0.build_unchecked()
     }
 
     fn template(&self) -> Template {

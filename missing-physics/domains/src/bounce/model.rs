@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Spec};
+use missing_physics::model::{ErrorModel, Extensions, Model, MultimodalModel, PredictError, Spec};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -97,7 +97,7 @@ impl BounceModel {
         }
         Self {
             setup,
-            spec: builder.spec,
+            spec: builder.build_unchecked(),
             places,
             spread,
             plausible,
@@ -244,30 +244,6 @@ impl Model for BounceModel {
         &self.spec
     }
 
-    fn starts(&self, mechanism: usize, _runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        match self.places.microphone {
-            Some([.., which])
-                if self.spec.mechanisms[mechanism].integer_parameters.contains(&which.index) =>
-            {
-                (0..self.setup.microphones).map(|k| vec![(which.index, k as f64)]).collect()
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    fn prediction_is_clean(&self) -> bool {
-        false
-    }
-
-    fn null_samples(&self, run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
-        self.drops.get(&run.label).map_or(&[], |known| &known.null_samples)
-    }
-
-    /// Errors come apart by their own covariance.
-    fn longest_noise(&self) -> f64 {
-        0.0
-    }
-
     fn predict(
         &self,
         run: &Run,
@@ -309,6 +285,38 @@ impl Model for BounceModel {
             }
         }
         Ok(())
+    }
+
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { errors: Some(self), modes: Some(self), ..Extensions::default() }
+    }
+}
+
+impl MultimodalModel for BounceModel {
+    fn starts(&self, mechanism: usize, _runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
+        match self.places.microphone {
+            Some([.., which])
+                if self.spec.mechanisms[mechanism].integer_parameters.contains(&which.index) =>
+            {
+                (0..self.setup.microphones).map(|k| vec![(which.index, k as f64)]).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+impl ErrorModel for BounceModel {
+    fn prediction_is_clean(&self) -> bool {
+        false
+    }
+
+    fn null_samples(&self, run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
+        self.drops.get(&run.label).map_or(&[], |known| &known.null_samples)
+    }
+
+    /// Errors come apart by their own covariance.
+    fn longest_correlation(&self) -> f64 {
+        0.0
     }
 }
 

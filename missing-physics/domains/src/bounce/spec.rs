@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use missing_physics::model::{Derived, Quantity, Term};
+use missing_physics::model::{Derived, Quantity};
 
 use super::drop::Effects;
 use super::model::Setup;
@@ -34,7 +34,7 @@ pub(super) struct Places {
 /// The specification of a set-up, the restitution starting at a value.
 pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
     let mut b = Builder::default();
-    b.spec.baseline = "ballistic flight from impact to impact, a constant restitution, a level table".into();
+    b.baseline("ballistic flight from impact to impact, a constant restitution, a level table");
     let mut p = Places {
         restitution: b.shared("restitution", "", restitution, [1e-2, 2.0], 0.02),
         ..Places::default()
@@ -218,12 +218,7 @@ fn microphone(b: &mut Builder, p: &mut Places, count: usize) {
 fn terms(b: &mut Builder, p: &mut Places, placed: bool) {
     let mut term = |name: &str, unit: &str, scale: f64, formula: &str, variable: &str| {
         let at = b.shared(name, unit, 0.0, [-1e3 * scale, 1e3 * scale], scale);
-        b.spec.terms.push(Term {
-            parameter: at.index,
-            formula: formula.into(),
-            adds_to: Quantity::new("ln(restitution)", ""),
-            variables: vec![variable.into()],
-        });
+        b.term(at, formula, Quantity::new("ln(restitution)", ""), vec![variable.into()]);
         at
     };
     p.squared = term("per_v2_s2_m2", "s^2/m^2", 1e-3, "v^2", "v");

@@ -4,7 +4,7 @@
 //! errors of times are correlated, and the engine finds by how much where there are drops enough.
 
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Scope, Spec};
+use missing_physics::model::{ErrorModel, Extensions, Model, PredictError, Scope, Spec};
 
 use bounce_audio::impact::{rebound, speed_after_drop};
 
@@ -129,17 +129,12 @@ fn build_times(setup: &Setup, restitution: f64) -> (Spec, Places, At, Option<At>
     let (mut b, places) = build(setup, restitution);
     let begins = b.nuisance("first_impact_s", "s", ANY, 0.1);
     let leaves = (!setup.dropped).then(|| b.nuisance("leaves_m_s", "m/s", [0.0, 1e3], 0.5));
-    (b.spec, places, begins, leaves)
+    (b.build_unchecked(), places, begins, leaves)
 }
 
 impl Model for TimesModel {
     fn spec(&self) -> &Spec {
         &self.spec
-    }
-
-    /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
-    fn longest_noise(&self) -> f64 {
-        self.longest_noise
     }
 
     fn predict(
@@ -153,7 +148,7 @@ impl Model for TimesModel {
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
-    fn start(&self, run: &Run, nuisance: &mut [f64]) {
+    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
         let heard: Vec<(usize, f64)> =
             run.outputs[0].iter().copied().enumerate().filter(|(_, t)| t.is_finite()).collect();
         let [(first, t0), (second, t1), ..] = heard.as_slice() else { return };
@@ -162,5 +157,16 @@ impl Model for TimesModel {
             let flights = (run.inputs[FOUND][*second] - run.inputs[FOUND][*first]) + (second - first) as f64;
             nuisance[at.slot] = 0.5 * self.setup.gravity_m_s2 * (t1 - t0) / flights;
         }
+    }
+
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { errors: Some(self), ..Extensions::default() }
+    }
+}
+
+impl ErrorModel for TimesModel {
+    /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
+    fn longest_correlation(&self) -> f64 {
+        self.longest_noise
     }
 }

@@ -93,7 +93,7 @@ fn parameter(
     } else {
         b.shared(name, unit, begin, [lower, upper], scale)
     };
-    let scope = b.spec.parameters[at.index].scope;
+    let scope = b.so_far().parameters[at.index].scope;
     names.push((name.to_owned(), scope, at.slot));
     Ok(at)
 }

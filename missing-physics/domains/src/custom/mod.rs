@@ -80,7 +80,7 @@ impl Domain for Custom {
         let (program, relative_step) = declare::program(header)?;
         let mut b = Builder::default();
         let parameters = declare::declare(header, &mut b)?;
-        b.spec.baseline = header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE).into();
+        b.baseline(header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE));
         let channel_names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
         let calibration = calibration(header, &channel_names)?;
 
@@ -111,7 +111,7 @@ impl Domain for Custom {
                 extent: along.then(extent),
             },
         );
-        let experiments = experiments(header, &inputs, channels.len(), &b.spec, program.is_some())?;
+        let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
         let simulation = match program {
             Some(start) => Simulation::Asked(Box::new(Asked {
                 pool: Pool::new(start),
@@ -135,7 +135,7 @@ impl Domain for Custom {
             calibration,
             resolution,
         };
-        let model = CustomModel { spec: b.spec, simulation, terms, relative_step };
+        let model = CustomModel { spec: b.build_unchecked(), simulation, terms, relative_step };
         Ok(Loaded {
             recording,
             model: Box::new(model),

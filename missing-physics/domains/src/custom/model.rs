@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Scope, Spec};
+use missing_physics::model::{Extensions, ExternalProgram, Model, PredictError, Scope, Spec};
 
 use super::process::{Failure, Pool};
 use super::terms::Candidate;
@@ -117,6 +117,16 @@ impl Model for CustomModel {
         Ok(())
     }
 
+    fn relative_step(&self) -> f64 {
+        self.relative_step
+    }
+
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { program: Some(self), ..Extensions::default() }
+    }
+}
+
+impl ExternalProgram for CustomModel {
     fn fatal_error(&self) -> Option<PredictError> {
         match &self.simulation {
             Simulation::Made(_) => None,
@@ -124,9 +134,5 @@ impl Model for CustomModel {
                 asked.pool.fault().map(|reason| PredictError { run: "(any)".into(), reason })
             }
         }
-    }
-
-    fn relative_step(&self) -> f64 {
-        self.relative_step
     }
 }

@@ -1,7 +1,7 @@
 //! What an unknown law could be made of, where nothing is known but names: powers and products of the known inputs, of the
 //! predicted channels and of how fast these change.
 
-use missing_physics::model::{Quantity, Term};
+use missing_physics::model::Quantity;
 
 use crate::builder::Builder;
 
@@ -81,12 +81,7 @@ pub(super) fn add(b: &mut Builder, sizes: &Sizes<'_>) -> Vec<Candidate> {
             let name = format!("factor of {formula}");
             let at = b.shared(&name, &unit, 0.0, [-1e4 * scale, 1e4 * scale], scale);
             candidates.push(Candidate { slot: at.slot, channel, variable, shape });
-            b.spec.terms.push(Term {
-                parameter: at.index,
-                formula,
-                adds_to: quantity.clone(),
-                variables: names,
-            });
+            b.term(at, formula, quantity.clone(), names);
         };
         term(Variable::Channel(channel), Shape::One, "1".into(), 1.0, &[]);
         for (i, k) in known.iter().enumerate() {

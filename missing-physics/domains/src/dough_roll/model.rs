@@ -13,7 +13,9 @@ use dough_mbrl::repair::answered;
 use dough_mbrl::sensitivity::{PER_ROLL, surprise, white};
 use dough_mbrl::tie::Tie;
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Spec};
+use missing_physics::model::{
+    CoupledRows, ErrorModel, Extensions, Model, MultimodalModel, PredictError, Spec,
+};
 use nalgebra::{DVector, Vector3};
 
 use super::forces::Forces;
@@ -300,6 +302,17 @@ impl Model for DoughModel {
         Ok(())
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions {
+            errors: Some(self),
+            modes: Some(self),
+            coupled_rows: Some(self),
+            ..Extensions::default()
+        }
+    }
+}
+
+impl MultimodalModel for DoughModel {
     /// Forces below which the band may slip: between two of those of the rolls there is no slope to follow, so that all are looked at.
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let slip = self.places.slip.index;
@@ -320,14 +333,16 @@ impl Model for DoughModel {
     fn jumps(&self, shared_slot: usize) -> &[f64] {
         if shared_slot == self.places.slip.slot { self.forces.rising() } else { &[] }
     }
+}
 
+impl CoupledRows for DoughModel {
     /// The response of each roll: what follows from that is measured in all rolls that what was learned ties to it.
     fn perturbation_response(
         &self,
         runs: &[Run],
         shared: &[f64],
         amounts: &[Vec<f64>],
-    ) -> Result<Option<Vec<Vec<f64>>>, PredictError> {
+    ) -> Result<Vec<Vec<f64>>, PredictError> {
         const PART: f64 = 1e-4;
         let effects = self.places.effects(shared);
         let places = runs.iter().map(|run| self.place(run)).collect::<Result<Vec<_>, _>>()?;
@@ -355,15 +370,17 @@ impl Model for DoughModel {
                 changes[run] = (0..PER_ROLL * n).map(at).collect();
             }
         }
-        Ok(Some(changes))
+        Ok(changes)
     }
+}
 
+impl ErrorModel for DoughModel {
     fn prediction_is_clean(&self) -> bool {
         false
     }
 
     /// Errors come apart by their own covariance.
-    fn longest_noise(&self) -> f64 {
+    fn longest_correlation(&self) -> f64 {
         0.0
     }
 }

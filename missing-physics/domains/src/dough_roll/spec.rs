@@ -1,6 +1,6 @@
 //! Parameters and mechanisms of a rolled dough.
 
-use missing_physics::model::{Quantity, Spec, Term};
+use missing_physics::model::{Quantity, Spec};
 
 use crate::builder::{At, Builder};
 
@@ -77,7 +77,7 @@ impl Places {
 pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spec, Places) {
     let mut b = Builder::default();
     let mut p = Places::default();
-    b.spec.baseline = "the dynamics learned from the training rolls, as uncertain as they leave them".into();
+    b.baseline("the dynamics learned from the training rolls, as uncertain as they leave them");
     p.factor = b.shared("factor", "", 1.0, [0.0, 20.0], 0.05);
     b.mechanism(
         "stiffness-change",
@@ -154,19 +154,14 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
         &["drying", "stiffness-change"],
     );
     terms(&mut b, &mut p);
-    (b.spec, p)
+    (b.build_unchecked(), p)
 }
 
 /// What the response could depend on, should no mechanism hold.
 fn terms(b: &mut Builder, p: &mut Places) {
     let mut term = |name: &str, unit: &str, scale: f64, formula: &str, variable: &str| {
         let at = b.shared(name, unit, 0.0, [-1e3 * scale, 1e3 * scale], scale);
-        b.spec.terms.push(Term {
-            parameter: at.index,
-            formula: formula.into(),
-            adds_to: Quantity::new("relative response", ""),
-            variables: vec![variable.into()],
-        });
+        b.term(at, formula, Quantity::new("relative response", ""), vec![variable.into()]);
         at
     };
     p.parity = term("alternation", "", 0.05, "(-1)^step", "step");

@@ -6,7 +6,7 @@ use granular_infer::campaign::Conditions;
 use granular_infer::emulator::{Emulator, EmulatorError};
 use granular_infer::statistics::{COUNT, STATISTICS, statistics};
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Spec};
+use missing_physics::model::{ErrorModel, Extensions, Model, PredictError, Spec};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -349,8 +349,14 @@ impl Model for PourModel {
         Ok(())
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { errors: Some(self), ..Extensions::default() }
+    }
+}
+
+impl ErrorModel for PourModel {
     /// Pours are independent.
-    fn longest_noise(&self) -> f64 {
+    fn longest_correlation(&self) -> f64 {
         0.0
     }
 }

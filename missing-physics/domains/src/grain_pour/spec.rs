@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use granular_infer::campaign::Ranges;
-use missing_physics::model::{Derived, Quantity, Spec, Term};
+use missing_physics::model::{Derived, Quantity, Spec};
 
 use crate::builder::{At, Builder};
 
@@ -34,9 +34,8 @@ pub(super) struct Places {
 pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: f64) -> (Spec, Places) {
     let mut b = Builder::default();
     let mut p = Places::default();
-    b.spec.baseline =
-        "equal rigid spheres with sliding friction, (damped) rolling friction and restitution, poured onto level ground"
-            .into();
+    b.baseline("equal rigid spheres with sliding friction, (damped) rolling friction and restitution, poured onto level ground"
+            );
     let within = |[low, high]: [f64; 2], v: f64| v.clamp(low, high);
     p.friction =
         b.shared("mu_s", "", within(ranges.sliding_friction, start[0]), ranges.sliding_friction, 0.1);
@@ -49,7 +48,7 @@ pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: 
     scene(&mut b, &mut p, ranges, lowest_m, highest_m);
     camera(&mut b, &mut p);
     terms(&mut b, &mut p);
-    (b.spec, p)
+    (b.build_unchecked(), p)
 }
 
 /// What the grains may be.
@@ -207,12 +206,7 @@ fn camera(b: &mut Builder, p: &mut Places) {
 fn terms(b: &mut Builder, p: &mut Places) {
     let mut term = |name: &str, scale: f64, formula: &str, adds_to: &str| {
         let at = b.shared(name, "", 0.0, [-100.0 * scale, 100.0 * scale], scale);
-        b.spec.terms.push(Term {
-            parameter: at.index,
-            formula: formula.into(),
-            adds_to: Quantity::new(adds_to, ""),
-            variables: vec!["funnel_height_m".into()],
-        });
+        b.term(at, formula, Quantity::new(adds_to, ""), vec!["funnel_height_m".into()]);
         at
     };
     p.aside = [

@@ -5,7 +5,7 @@ use hertz_contact::indenter::Indenter;
 use hertz_contact::law::{Acting, Base, Indentation, Law, Layer};
 use hertz_contact::viscoelastic::{Contact, LinearSolid, Scratch};
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Spec};
+use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Spec};
 
 use super::spec::{self, Places};
 use crate::builder::At;
@@ -152,6 +152,12 @@ impl IndentationModel {
 }
 
 impl InDuals for IndentationModel {
+    /// A modulus acts on the runs of its own condition.
+    fn acts_on(&self, run: &Run, shared_slot: usize) -> bool {
+        let of_run = self.modulus(run).map(|at| at.slot);
+        of_run == Some(shared_slot) || self.places.moduli.iter().all(|at| at.slot != shared_slot)
+    }
+
     /// The forces of a run; an effect whose derivative is asked for is there at its off value too.
     fn predict_in<T: Number>(
         &self,
@@ -227,12 +233,12 @@ impl Model for IndentationModel {
         Asked { run, shared, nuisance, shared_free, nuisance_free }.answer(self, out, jacobian)
     }
 
-    /// A modulus acts on the runs of its own condition.
-    fn acts_on(&self, run: &Run, shared_slot: usize) -> bool {
-        let of_run = self.modulus(run).map(|at| at.slot);
-        of_run == Some(shared_slot) || self.places.moduli.iter().all(|at| at.slot != shared_slot)
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { modes: Some(self), ..Extensions::default() }
     }
+}
 
+impl MultimodalModel for IndentationModel {
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let p = &self.places;
         match self.spec.mechanisms[mechanism].id.as_str() {

@@ -40,9 +40,9 @@ pub(super) fn build(
     let mut b = Builder::default();
     let mut p = Places::default();
     let thickness = if setup.thickness_m.is_some() { " on a layer of the stated thickness" } else { "" };
-    b.spec.baseline = format!(
+    b.baseline(format!(
         "an elastic contact{thickness}: one modulus for each condition, contact at delta = 0, no adhesion"
-    );
+    ));
     for condition in conditions {
         let start = condition.start_pa;
         p.moduli.push(b.shared(&condition.name, "Pa", start, [1e-6 * start, 1e6 * start], 0.2 * start));
@@ -140,7 +140,7 @@ pub(super) fn build(
         );
         p.stiffening = Some(stiffening);
     }
-    (b.spec, p)
+    (b.build_unchecked(), p)
 }
 
 fn extra_stiffness(b: &mut Builder, p: &mut Places, stiffness: f64, deepest: f64) {

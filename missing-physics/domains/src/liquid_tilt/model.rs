@@ -6,7 +6,7 @@ use liquid_haptics::container::mesh::{MeshContainer, PlannedMesh};
 use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::wrench::{Departures, Grasp};
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Scope, Spec};
+use missing_physics::model::{ErrorModel, Extensions, Model, MultimodalModel, PredictError, Scope, Spec};
 
 use crate::builder::{At, Builder};
 use crate::kept::Kept;
@@ -214,13 +214,7 @@ impl Model for LiquidTiltModel {
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
-    /// Poses are settled ones, seconds apart: a sensor that wanders forgets within a few of them. What lasts longer is physics, such
-    /// as a grip that slips and stays.
-    fn longest_noise(&self) -> f64 {
-        2.9
-    }
-
-    fn start(&self, run: &Run, nuisance: &mut [f64]) {
+    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
         let grasp = &self.setup.grasp;
         let Some(forces) = run.outputs.get(1) else { return };
         let finite = forces.iter().filter(|f| f.is_finite());
@@ -258,6 +252,20 @@ impl Model for LiquidTiltModel {
         nuisance[at.slot] = best.1;
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { errors: Some(self), modes: Some(self), ..Extensions::default() }
+    }
+}
+
+impl ErrorModel for LiquidTiltModel {
+    /// Poses are settled ones, seconds apart: a sensor that wanders forgets within a few of them. What lasts longer is physics, such
+    /// as a grip that slips and stays.
+    fn longest_correlation(&self) -> f64 {
+        2.9
+    }
+}
+
+impl MultimodalModel for LiquidTiltModel {
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         if mechanism != self.slip {
             return Vec::new();
@@ -291,7 +299,7 @@ fn build(setup: &Setup, rows: usize) -> (Spec, Places) {
     let mut p = Places::default();
     let grasp = &setup.grasp;
     let capacity = setup.vessel.capacity_m3();
-    b.spec.baseline = "the weight of gripper, container and liquid (eq. 2.1): walls of no thickness, a level surface, the shell's centre of mass in its middle".into();
+    b.baseline("the weight of gripper, container and liquid (eq. 2.1): walls of no thickness, a level surface, the shell's centre of mass in its middle");
     if !(setup.volumes_known && setup.density_kg_m3.is_some()) {
         let most = setup.density_kg_m3.map_or(30.0 * (capacity * 1e3), |d| d * capacity);
         p.mass = Some(b.nuisance("liquid_mass_kg", "kg", [0.0, most], capacity * 100.0));
@@ -412,5 +420,5 @@ fn build(setup: &Setup, rows: usize) -> (Spec, Places) {
         ],
         &["angle-offset"],
     );
-    (b.spec, p)
+    (b.build_unchecked(), p)
 }

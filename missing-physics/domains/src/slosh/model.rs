@@ -2,7 +2,7 @@
 
 use liquid_haptics::slosh::{Decay, Effects, SloshError, UprightCylinder};
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Scope, Spec};
+use missing_physics::model::{Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec};
 
 use super::cylinder;
 use super::spec::{ARM_RAD_S, Places, build, second_band};
@@ -244,7 +244,7 @@ impl Model for SloshModel {
         Ok(())
     }
 
-    fn start(&self, run: &Run, nuisance: &mut [f64]) {
+    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
         let viscosity = self.spec.parameters[self.places.viscosity.index].start;
         if let Some([a, b]) = first_wave(&self.cylinders[0], viscosity, run) {
             nuisance[self.places.cos.slot] = a;
@@ -252,6 +252,12 @@ impl Model for SloshModel {
         }
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { modes: Some(self), limits: Some(self), ..Extensions::default() }
+    }
+}
+
+impl MultimodalModel for SloshModel {
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let p = &self.places;
         if mechanism == self.friction {
@@ -279,7 +285,9 @@ impl Model for SloshModel {
             .flat_map(|w| [0.003, 0.03].map(|ratio| vec![(omega, w), (damping, ratio)]))
             .collect()
     }
+}
 
+impl JointLimits for SloshModel {
     fn implausible(&self, mechanism: usize, shared: &[f64]) -> Option<String> {
         let omega = shared[self.places.arm_omega.slot];
         (mechanism == self.arm && self.is_slosh(omega))

@@ -39,6 +39,9 @@ pub(super) fn second_band(cylinder: &UprightCylinder) -> [f64; 2] {
 /// Bounds of the arm's frequency, rad/s.
 pub(super) const ARM_RAD_S: [f64; 2] = [1.0, 1000.0];
 
+/// The smallest viscosity that is looked for, m^2/s.
+const THINNEST_M2_S: f64 = 1e-12;
+
 /// All parameters, and where each stands: amplitudes and viscosity start from what the runs show.
 pub(super) fn build(
     setup: &Setup,
@@ -50,12 +53,13 @@ pub(super) fn build(
     let mut p = Places::default();
     let (unit, suffix) = (setup.channel.unit(), setup.channel.suffix());
     let amplitude = 0.1 * largest;
-    b.spec.baseline = "the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase".into();
+    b.baseline("the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase");
+    let thickest = cylinder.kinematic_viscosity_m2_s(0.9);
     p.viscosity = b.shared(
         "kinematic_viscosity_m2_s",
         "m^2/s",
-        viscosity,
-        [1e-12, cylinder.kinematic_viscosity_m2_s(0.9)],
+        viscosity.min(thickest).max(THINNEST_M2_S),
+        [THINNEST_M2_S, thickest],
         viscosity,
     );
     p.cos = b.nuisance(&format!("cos_{suffix}"), unit, ANY, largest);
@@ -138,7 +142,7 @@ pub(super) fn build(
         ],
         &["contact-line-friction"],
     );
-    p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3, 100.0], 1.0 / omega);
+    p.lag = b.shared("tau_s", "s", (1.0 / omega).clamp(1e-3, 100.0), [1e-3, 100.0], 1.0 / omega);
     p.transient = b.nuisance(&format!("transient_{suffix}"), unit, ANY, amplitude);
     modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
     let mechanism = b.mechanism(
@@ -155,12 +159,12 @@ pub(super) fn build(
     mechanism.companions = vec![p.transient.index];
     mechanism.shape_parameters = vec![p.lag.index];
     unlagged(&mut b, &p, omega, (unit, suffix));
-    (b.spec, p)
+    (b.build_unchecked(), p)
 }
 
 /// What a reading is of the wave itself: a sensor that lags, where it does, shows less of it.
 fn unlagged(b: &mut Builder, p: &Places, omega: f64, (unit, suffix): (&str, &str)) {
-    let off = b.spec.parameters[p.lag.index].start;
+    let off = b.so_far().parameters[p.lag.index].start;
     for (id, name, unit, at, power) in [
         ("contact-line-friction", format!("friction_{suffix}"), unit.to_owned(), p.friction, 1),
         ("quadratic-damping", format!("coefficient_per_{suffix}"), format!("1/({unit})"), p.quadratic, -1),
@@ -170,7 +174,7 @@ fn unlagged(b: &mut Builder, p: &Places, omega: f64, (unit, suffix): (&str, &str
             let lags = if shared[lag] == off { 0.0 } else { omega * shared[lag] };
             shared[at] * lags.hypot(1.0).powi(power)
         };
-        if let Some(mechanism) = b.spec.mechanisms.iter_mut().find(|m| m.id == id) {
+        if let Some(mechanism) = b.mechanism_mut(id) {
             mechanism.derived.push(Derived { name, unit, value: Arc::new(value) });
         }
     }

@@ -236,7 +236,7 @@ impl Model for TrajectoryModel {
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
-    fn start(&self, run: &Run, nuisance: &mut [f64]) {
+    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
         let Some(times) = run.inputs.first() else { return };
         let begin = times.first().copied().unwrap_or(0.0);
         if self.setup.axes == Axes::Accelerometer {
@@ -404,7 +404,7 @@ mod tests {
         }
         run.outputs[1][4] = f64::NAN;
         let mut nuisance = [0.0; 6];
-        model.start(&run, &mut nuisance);
+        model.nuisance_start(&run, &mut nuisance);
         for (a, b) in nuisance.iter().zip(truth) {
             assert!((a - b).abs() < 1e-9, "{nuisance:?}");
         }

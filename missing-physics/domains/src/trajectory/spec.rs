@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use missing_physics::model::{Derived, Quantity, Spec, Term};
+use missing_physics::model::{Derived, Quantity, Spec};
 
 use super::model::{Axes, Role, Setup};
 use crate::builder::{ANY, At, Builder};
@@ -28,13 +28,13 @@ impl Flying {
         formula: &str,
         variables: &[&str],
     ) {
-        let parameter = self.shared(role, name, unit, [lower, f64::INFINITY], scale).index;
-        self.b.spec.terms.push(Term {
-            parameter,
-            formula: formula.into(),
-            adds_to: Quantity::new("acceleration", "m/s^2"),
-            variables: variables.iter().map(|s| (*s).to_owned()).collect(),
-        });
+        let coefficient = self.shared(role, name, unit, [lower, f64::INFINITY], scale);
+        self.b.term(
+            coefficient,
+            formula,
+            Quantity::new("acceleration", "m/s^2"),
+            variables.iter().map(|s| (*s).to_owned()).collect(),
+        );
     }
 }
 
@@ -44,11 +44,11 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
     let b = &mut flying;
     let (space, felt) = (setup.axes == Axes::Space, setup.axes == Axes::Accelerometer);
     let sized = setup.mass_kg.is_some() && setup.diameter_m.is_some();
-    b.b.spec.baseline = if felt {
-        "free fall: an accelerometer on board reads its offset and nothing else".into()
+    b.b.baseline(if felt {
+        "free fall: an accelerometer on board reads its offset and nothing else"
     } else {
-        "ballistic flight under gravity alone, seen by a true camera; every run has its own start".into()
-    };
+        "ballistic flight under gravity alone, seen by a true camera; every run has its own start"
+    });
     let drag = if sized {
         b.shared(Role::Quadratic, "drag_coefficient", "", [0.0, 10.0], 0.5)
     } else {
@@ -132,7 +132,7 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
             b.b.nuisance("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
         }
     }
-    (flying.b.spec, flying.roles)
+    (flying.b.build_unchecked(), flying.roles)
 }
 
 /// Effects that a height alone shows.

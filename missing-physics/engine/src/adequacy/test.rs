@@ -126,7 +126,8 @@ pub(crate) fn draw(
     let world = stream as usize;
     (0..problem.rows.len())
         .map(|run| {
-            let worlds = problem.model.null_samples(&problem.recording.runs[run]);
+            let errors = problem.model.extensions().errors;
+            let worlds = errors.map_or(&[][..], |errors| errors.null_samples(&problem.recording.runs[run]));
             let copies = worlds.get(world.checked_rem(worlds.len()).unwrap_or(0));
             let copy = copies.and_then(|c| c.get(rng.random_range(0..c.len().max(1))));
             (0..problem.channels())

@@ -132,7 +132,8 @@ pub(crate) fn estimates(
                 ci95 = [value - half, value + half];
                 if profile {
                     let profile = Profile::new(problem, candidate, i);
-                    let between = profile.between(problem.model.jumps(slot));
+                    let between = profile
+                        .between(problem.model.extensions().modes.map_or(&[], |modes| modes.jumps(slot)));
                     ci95 = between.unwrap_or_else(|| profile.interval(half, reach));
                 }
                 ci95 = [ci95[0].max(info.lower), ci95[1].min(info.upper)];

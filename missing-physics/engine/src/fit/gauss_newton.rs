@@ -2,57 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use crate::data::Run;
 use crate::fit::step::{Eliminated, NormalEquations, Step, reduce};
 use crate::linalg::{backward, cholesky, determined, dot, forward, gram, log_determinant};
-use crate::model::{Model, PredictError};
+use crate::model::PredictError;
 use crate::noise::process::Shape;
 use crate::problem::{Problem, Selection};
-
-/// Central differences of a prediction (one-sided at a bound), the default of [`Model::jacobian`].
-///
-/// # Errors
-/// As [`Model::predict`].
-#[allow(clippy::too_many_arguments, reason = "the arguments of Model::jacobian")]
-pub fn finite_differences<M: Model + ?Sized>(
-    model: &M,
-    run: &Run,
-    shared: &[f64],
-    nuisance: &[f64],
-    shared_free: &[usize],
-    nuisance_free: &[usize],
-    out: &mut [f64],
-    jacobian: &mut [f64],
-) -> Result<(), PredictError> {
-    use crate::model::Scope;
-    model.predict(run, shared, nuisance, out)?;
-    let rows = out.len();
-    let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
-    let (mut above, mut below) = (vec![0.0; rows], vec![0.0; rows]);
-    let parameters = |scope| model.spec().parameters.iter().filter(move |p| p.scope == scope);
-    let shared_info: Vec<_> = parameters(Scope::Shared).collect();
-    let nuisance_info: Vec<_> = parameters(Scope::PerRun).collect();
-    let free = shared_free.iter().map(|&s| (true, s)).chain(nuisance_free.iter().map(|&s| (false, s)));
-    for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(rows.max(1))) {
-        if is_shared && !model.acts_on(run, slot) {
-            column.fill(0.0);
-            continue;
-        }
-        let info = if is_shared { shared_info[slot] } else { nuisance_info[slot] };
-        let value = if is_shared { shared[slot] } else { nuisance[slot] };
-        let step = model.relative_step() * info.scale.max(1e-3 * value.abs());
-        let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
-        for (x, out) in [(high, &mut above), (low, &mut below)] {
-            *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = x;
-            model.predict(run, &shared, &nuisance, out)?;
-        }
-        *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = value;
-        for ((d, a), b) in column.iter_mut().zip(&above).zip(&below) {
-            *d = (a - b) / (high - low);
-        }
-    }
-    Ok(())
-}
 
 /// The noise of all channels as a fit assumes it.
 #[derive(Debug, Clone, PartialEq)]

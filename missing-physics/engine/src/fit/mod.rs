@@ -3,4 +3,4 @@
 pub(crate) mod gauss_newton;
 pub(crate) mod step;
 
-pub use gauss_newton::finite_differences;
+pub use crate::model::finite_differences;

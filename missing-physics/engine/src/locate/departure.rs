@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use crate::locate::scan::{bin, edges, solve, value, variables};
-use crate::model::PredictError;
+use crate::model::{CoupledRows, PredictError};
 use crate::problem::Problem;
 
 /// Powers of a variable that a departure may be made of.
@@ -43,9 +43,10 @@ pub(crate) fn best(
     left: &Left<'_>,
     earlier: f64,
 ) -> Result<Option<Departure>, PredictError> {
+    let Some(coupled) = problem.model.extensions().coupled_rows else { return Ok(None) };
     let mut best: Option<(Scan<'_>, Interval)> = None;
     for variable in variables(problem) {
-        let Some(scan) = Scan::new(problem, left, variable)? else { continue };
+        let Some(scan) = Scan::new(problem, coupled, left, variable)? else { continue };
         if let Some(here) = scan.best()
             && best.as_ref().is_none_or(|(_, b)| here.worth > earlier * b.worth + 1e-9)
         {
@@ -84,6 +85,7 @@ struct Scan<'a> {
 impl<'a> Scan<'a> {
     fn new(
         problem: &Problem<'_>,
+        coupled: &dyn CoupledRows,
         left: &'a Left<'a>,
         variable: Option<usize>,
     ) -> Result<Option<Self>, PredictError> {
@@ -94,7 +96,7 @@ impl<'a> Scan<'a> {
         let bins = edges.len() - 1;
         let mut departing = vec![Vec::new(); problem.rows.len()];
         for column in 0..bins * POWERS {
-            let Some(moved) = moved(problem, left, variable, &edges, column)? else { return Ok(None) };
+            let moved = moved(problem, coupled, left, variable, &edges, column)?;
             departing.iter_mut().zip(moved).for_each(|(run, column)| run.push(column));
         }
         let gram = |(known, departing): (&Vec<Vec<f64>>, &Vec<Vec<f64>>)| {
@@ -192,11 +194,12 @@ fn along(x: f64, edges: &[f64]) -> f64 {
 /// What a departure does to the readings, by run: along the variable as a power, in one bin. Columns count powers, then bins.
 fn moved(
     problem: &Problem<'_>,
+    coupled: &dyn CoupledRows,
     left: &Left<'_>,
     variable: Option<usize>,
     edges: &[f64],
     column: usize,
-) -> Result<Option<Vec<Vec<f64>>>, PredictError> {
+) -> Result<Vec<Vec<f64>>, PredictError> {
     let (in_bin, power) = (column / POWERS, (column % POWERS) as i32);
     let runs = &problem.recording.runs;
     let amount = |run: usize, row: usize| {
@@ -206,9 +209,7 @@ fn moved(
     };
     let amounts: Vec<Vec<f64>> =
         (0..runs.len()).map(|run| (0..runs[run].len()).map(|row| amount(run, row)).collect()).collect();
-    let Some(moved) = problem.model.perturbation_response(runs, left.shared, &amounts)? else {
-        return Ok(None);
-    };
+    let moved = coupled.perturbation_response(runs, left.shared, &amounts)?;
     let white = |(run, moved): (usize, Vec<f64>)| {
         let channel = |channel: usize| {
             let picked = problem.pick(run, channel, &moved);
@@ -216,5 +217,5 @@ fn moved(
         };
         (0..problem.channels()).flat_map(channel).collect()
     };
-    Ok(Some(moved.into_iter().enumerate().map(white).collect()))
+    Ok(moved.into_iter().enumerate().map(white).collect())
 }

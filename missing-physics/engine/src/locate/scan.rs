@@ -105,7 +105,7 @@ impl Scan {
         let price = self.rows.iter().sum::<f64>().ln();
         let missed = self.whole - self.outside(bins).0;
         let freed = Interval { worth: variance_gain(dropped, missed) - price, gain: missed - dropped, bins };
-        let gain = self.whole - self.perturbation_response(bins);
+        let gain = self.whole - self.departing(bins);
         let smooth = Interval { worth: gain - SMOOTH as f64 * price, gain: gain - SMOOTH as f64, bins };
         Some(if smooth.worth > freed.worth { smooth } else { freed })
     }
@@ -120,7 +120,7 @@ impl Scan {
     }
 
     /// Fits the linearised baseline and a smooth departure inside the bins to all rows: sum of squares.
-    fn perturbation_response(&self, (from, to): (usize, usize)) -> f64 {
+    fn departing(&self, (from, to): (usize, usize)) -> f64 {
         let first = self.n_nuisance + self.n_shared;
         let last = first + SMOOTH;
         let gram = |run: &Normals| {

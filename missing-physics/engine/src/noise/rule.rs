@@ -30,7 +30,8 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
         .collect();
     let rows: usize = recording.runs.iter().map(|r| r.len()).sum();
     let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1);
-    let longest = problem.model.longest_noise();
+    let longest =
+        problem.model.extensions().errors.map_or(f64::INFINITY, |errors| errors.longest_correlation());
     let (fixed_sigma, uncertainty) = (0..problem.channels())
         .map(|c| match recording.calibration.get(c).copied().flatten() {
             Some(sigma) => (Some(sigma), CALIBRATION_UNCERTAINTY),

@@ -218,7 +218,10 @@ fn evidence(
         let sphere = if one_sided { 0.5 * sphere } else { sphere };
         value -= sphere.ln() + dimension * 0.5 * square.ln() + LOG_RANGE.ln();
     }
-    let senseless = || set.iter().find_map(|&mechanism| problem.model.implausible(mechanism, &fit.shared));
+    let senseless = || {
+        let limits = problem.model.extensions().limits?;
+        set.iter().find_map(|&mechanism| limits.implausible(mechanism, &fit.shared))
+    };
     let ruled_out = bound
         .map(|slot| format!("{} ended at its bound of {}", name(slot), fit.shared[slot]))
         .or_else(senseless)
@@ -334,6 +337,7 @@ fn best_evidence(all: &[Candidate]) -> f64 {
 /// Where the model says to begin the mechanism that a set has and its parent has not, with all whole numbers that it knows for those
 /// of the others: what was the best of them alone need not be so in company.
 fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Vec<(usize, f64)>> {
+    let Some(modes) = problem.model.extensions().modes else { return Vec::new() };
     let Ok(left) = residuals(problem, &parent.fit) else { return Vec::new() };
     let whole: Vec<Vec<Vec<f64>>> = left
         .into_iter()
@@ -357,7 +361,7 @@ fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Vec<
             continue;
         }
         let mut starts: Vec<Vec<(usize, f64)>> = Vec::new();
-        for start in problem.model.starts(mechanism, &problem.recording.runs, &whole) {
+        for start in modes.starts(mechanism, &problem.recording.runs, &whole) {
             let of_it = start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value)));
             let start: Vec<_> = of_it.filter(|(slot, _)| new || integers.contains(slot)).collect();
             if !start.is_empty() && !starts.contains(&start) {

@@ -3,7 +3,9 @@
 #![allow(dead_code, reason = "not every test uses all of it")]
 
 use missing_physics::data::{Recording, Run};
-use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec};
+use missing_physics::model::{
+    Extensions, Mechanism, Model, MultimodalModel, Parameter, PredictError, Quantity, Scope, Spec,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
@@ -81,6 +83,12 @@ impl Model for Curve {
         Ok(())
     }
 
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { modes: Some(self), ..Extensions::default() }
+    }
+}
+
+impl MultimodalModel for Curve {
     fn starts(&self, _: usize, runs: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         (self.starts)(runs)
     }

@@ -56,7 +56,7 @@ fn fit(
     let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
     let mut nuisances = vec![vec![0.0; nuisance_count]; runs.len()];
     for (run, nuisance) in runs.iter().zip(&mut nuisances) {
-        model.start(run, nuisance);
+        model.nuisance_start(run, nuisance);
     }
     let size = free.len() + nuisance_count * runs.len();
     let mut errors = Vec::new();

@@ -42,7 +42,9 @@ impl Curves {
                     .iter()
                     .flatten()
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-                let shown = v < inputs || problem.model.prediction_is_clean();
+                let clean =
+                    problem.model.extensions().errors.is_none_or(|errors| errors.prediction_is_clean());
+                let shown = v < inputs || clean;
                 let moves = shown && high - low > least(v).max(1e-12 * high.abs().max(low.abs()));
                 (moves && (high - low).is_finite()).then(|| {
                     runs.into_iter()

@@ -1,0 +1,11 @@
+//! What a simulation says where it has no answer.
+
+/// A prediction that could not be made at the given parameters.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("no prediction for run {run}: {reason}")]
+pub struct PredictError {
+    /// Label of the run.
+    pub run: String,
+    /// What went wrong, with the values involved.
+    pub reason: String,
+}

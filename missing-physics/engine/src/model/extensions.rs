@@ -1,0 +1,101 @@
+//! What some models know beyond their predictions: each kind of knowledge is a trait, and a model says which it has.
+
+use crate::data::Run;
+use crate::model::error::PredictError;
+
+/// The knowledge that a model has beyond its predictions ([`Model::extensions`](super::Model::extensions)); none by default.
+///
+/// A model lists what it implements: `Extensions { errors: Some(self), ..Extensions::default() }`.
+#[derive(Clone, Copy, Default)]
+pub struct Extensions<'a> {
+    /// What is known of the errors of measurement.
+    pub errors: Option<&'a dyn ErrorModel>,
+    /// Where a likelihood with several modes is to be looked at.
+    pub modes: Option<&'a dyn MultimodalModel>,
+    /// What parameters may not be together.
+    pub limits: Option<&'a dyn JointLimits>,
+    /// How an effect in one row shows in others.
+    pub coupled_rows: Option<&'a dyn CoupledRows>,
+    /// A program that makes the predictions.
+    pub program: Option<&'a dyn ExternalProgram>,
+}
+
+impl std::fmt::Debug for Extensions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Extensions")
+            .field("errors", &self.errors.is_some())
+            .field("modes", &self.modes.is_some())
+            .field("limits", &self.limits.is_some())
+            .field("coupled_rows", &self.coupled_rows.is_some())
+            .field("program", &self.program.is_some())
+            .finish()
+    }
+}
+
+/// What a model knows of its errors of measurement. Without it they are independent of the prediction, normal, and correlated over
+/// any length.
+pub trait ErrorModel: Sync {
+    /// The longest correlation that noise may have along a run, in steps between its rows: what is slower is physics. Zero
+    /// where noise is white by construction; no limit by default.
+    fn longest_correlation(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Whether a residual may depend on the prediction itself (the default); false where predictions are made with measured inputs,
+    /// and share their noise with the residual.
+    fn prediction_is_clean(&self) -> bool {
+        true
+    }
+
+    /// Errors of a run under the null hypothesis, in sigmas of each channel, `[world][copy][channel][row]`, of a model that knows
+    /// them not to be normal: as many worlds for every run, which share what is not known of the noise, and independent copies in
+    /// each. None by default.
+    fn null_samples(&self, _run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
+        &[]
+    }
+}
+
+/// A model whose likelihood has several modes, or jumps.
+pub trait MultimodalModel: Sync {
+    /// Where to begin fitting a mechanism (index into [`Spec::mechanisms`](super::Spec::mechanisms)), judged from what a fit without
+    /// it leaves: `residual[run][channel][row]`, measured less predicted, NaN where nothing was measured.
+    ///
+    /// Each start is a list of shared parameters (index into [`Spec::parameters`](super::Spec::parameters)) with their values; an
+    /// index that is no shared parameter's is ignored. No start: a fit begins where the parameters do.
+    fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>>;
+
+    /// Values, rising, at which predictions jump as the shared parameter at a slot grows; between two of them next to nothing depends
+    /// on it. None (the default) where predictions are smooth.
+    fn jumps(&self, _shared_slot: usize) -> &[f64] {
+        &[]
+    }
+}
+
+/// A model that knows combinations of parameters that make no sense.
+pub trait JointLimits: Sync {
+    /// Why a mechanism (index into [`Spec::mechanisms`](super::Spec::mechanisms)) is no explanation at these shared parameters, in a
+    /// few words; `None` where it makes sense. Bounds say what each parameter may be; this says what they may not be together.
+    fn implausible(&self, mechanism: usize, shared: &[f64]) -> Option<String>;
+}
+
+/// A model whose rows are not alone: an effect in one shows in others.
+pub trait CoupledRows: Sync {
+    /// How the predictions of all runs change (each as [`Model::predict`](super::Model::predict) fills it) by a unit of a perturbation
+    /// that is small and has the size `amounts[run][row]` in the law of each row.
+    ///
+    /// # Errors
+    /// As [`Model::predict`](super::Model::predict).
+    fn perturbation_response(
+        &self,
+        runs: &[Run],
+        shared: &[f64],
+        amounts: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>, PredictError>;
+}
+
+/// A model whose predictions come from a program that may end.
+pub trait ExternalProgram: Sync {
+    /// Why there will be no prediction any more, whatever is asked (the program has ended): the diagnosis then ends with this error,
+    /// even where it could do without the predictions that failed.
+    fn fatal_error(&self) -> Option<PredictError>;
+}

@@ -1,0 +1,16 @@
+//! What the engine asks of a simulation: its parameters, its mechanisms and its prediction of a run.
+
+mod builder;
+mod check;
+mod error;
+mod extensions;
+mod simulation;
+mod spec;
+
+pub use crate::quantity::Quantity;
+pub use builder::{ParameterRef, SpecBuilder, UNBOUNDED};
+pub use check::SpecError;
+pub use error::PredictError;
+pub use extensions::{CoupledRows, ErrorModel, Extensions, ExternalProgram, JointLimits, MultimodalModel};
+pub use simulation::{Experiment, Model, finite_differences};
+pub use spec::{Derived, DerivedPerRun, Mechanism, OfParameters, OfRun, Over, Parameter, Scope, Spec, Term};
