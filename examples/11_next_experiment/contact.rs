@@ -9,7 +9,7 @@ use hw_traits::{ErrorKind, ErrorType};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
-use worlds::physics::indentation::{Effects, IndentationWorld, Indenter, Step};
+use worlds::physics::indentation::{Effects, IndentationWorld, Indenter, Rim, Step};
 
 use super::{Outcome, Rig, on_log_scale};
 
@@ -69,7 +69,10 @@ impl Rig for Contact {
             }
             5 => ("load-cell-compliance", Effects { compliance_m_n: 3e-4 * size, ..none }),
             6 => ("membrane-stretching", Effects { stretching_n_m3: 1e7 * size, ..none }),
-            7 => ("rim-contact", Effects { rim: [rng.random_range(3e-4..3e-3), 50.0 * size], ..none }),
+            7 => {
+                let rim = Rim { depth_m: rng.random_range(3e-4..3e-3), stiffness_n_m: 50.0 * size };
+                ("rim-contact", Effects { rim, ..none })
+            }
             8 => ("contact-offset", Effects { contact_offset_m: 3e-5 * signed, ..none }),
             _ => ("force-offset", Effects { force_offset_n: 3e-3 * signed, ..none }),
         };

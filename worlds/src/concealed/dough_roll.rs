@@ -10,7 +10,7 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::Nuisances;
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::dough::{Band, DoughWorld, Effects, Piece, PlannedRoll, Roll, Shape};
+use crate::physics::dough::{Band, DoughWorld, Effects, Long, Piece, PlannedRoll, Roll, Shape};
 
 const LISTED: usize = 6;
 const DRYING: usize = 1;
@@ -120,7 +120,7 @@ impl Rig for Table {
         match which {
             0 => Effects { alternation: sign * size, ..none },
             1 => Effects { throw_per_m: sign * size, ..none },
-            2 => Effects { long: [size, self.long_from_m], ..none },
+            2 => Effects { long: Long { fall: size, from_m: self.long_from_m }, ..none },
             _ => Effects { worked: size, ..none },
         }
     }

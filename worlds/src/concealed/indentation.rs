@@ -9,7 +9,7 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::indentation::{Effects, IndentationWorld, Indenter, Step};
+use crate::physics::indentation::{Effects, IndentationWorld, Indenter, Rim, Ripple, Slip, Step};
 
 /// Listed effects; the last three act on spheres only, and viscoelasticity needs times.
 const LISTED: usize = 10;
@@ -101,7 +101,7 @@ impl Rig for Press {
             0 => e.contact_offset_m = self.signs[0] * size,
             1 => e.tension_n_m = size,
             2 => e.stretching_n_m3 = size,
-            3 => e.rim = [self.depth_m, size],
+            3 => e.rim = Rim { depth_m: self.depth_m, stiffness_n_m: size },
             4 => e.compliance_m_n = size,
             5 => e.force_offset_n = self.signs[1] * size,
             RELAXES => (e.relaxed_fraction, e.tau_s) = (size, self.tau_s),
@@ -121,7 +121,7 @@ impl Rig for Press {
             1 => key.add("membrane-tension", &[("stiffness_n_m", e.tension_n_m)]),
             2 => key.add("membrane-stretching", &[("coefficient_n_m3", e.stretching_n_m3)]),
             3 => {
-                key.add("rim-contact", &[("depth_m", e.rim[0]), ("stiffness_n_m", e.rim[1])]);
+                key.add("rim-contact", &[("depth_m", e.rim.depth_m), ("stiffness_n_m", e.rim.stiffness_n_m)]);
                 key.place = Some(self.beyond_depth());
             }
             4 => key.add("load-cell-compliance", &[("compliance_m_n", e.compliance_m_n)]),
@@ -147,8 +147,8 @@ impl Rig for Press {
         let none = Effects::default();
         match which {
             0 => Effects { dent: size, ..none },
-            1 => Effects { ripple: [size, self.pitch_m], ..none },
-            _ => Effects { slip: [self.depth_m, size], ..none },
+            1 => Effects { ripple: Ripple { amplitude_n: size, pitch_m: self.pitch_m }, ..none },
+            _ => Effects { slip: Slip { depth_m: self.depth_m, force_n: size }, ..none },
         }
     }
 

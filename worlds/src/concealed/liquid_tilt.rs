@@ -10,7 +10,7 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::tilt::{Cavity, Effects, Sweep, TiltWorld};
+use crate::physics::tilt::{Cable, Cavity, Effects, Sweep, TiltWorld};
 
 const LISTED: usize = 9;
 const UNLISTED: usize = 4;
@@ -27,7 +27,8 @@ pub(crate) struct Container {
     sigma: [f64; 2],
     /// Sign of each listed effect.
     signs: [f64; LISTED],
-    slip_at: [usize; 2],
+    slip_run: usize,
+    slip_pose: usize,
     taut_from_rad: f64,
 }
 
@@ -95,7 +96,7 @@ impl Rig for Container {
             3 => e.angle_offset_rad = signed,
             4 => e.grasp_offset_m = signed,
             5 => e.cap_shift_m = signed,
-            6 => (e.slip_m, e.slip_at) = (signed, self.slip_at),
+            6 => (e.slip_m, e.slip_run, e.slip_pose) = (signed, self.slip_run, self.slip_pose),
             7 => e.drift_nm_per_row = signed,
             _ => e.surface_lag_rad = signed,
         }
@@ -123,17 +124,20 @@ impl Rig for Container {
             0 => [1e-4, 0.05],
             1 => [2e-5, 0.01],
             2 => [1e-3, 5.0],
-            _ => [2e-4, 0.2 * self.world.sweeps[self.slip_at[0]].mass_kg],
+            _ => [2e-4, 0.2 * self.world.sweeps[self.slip_run].mass_kg],
         }
     }
 
     fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
-            0 => Effects { cable: [sign * size, self.taut_from_rad], ..none },
+            0 => Effects {
+                cable: Cable { taut_from_rad: self.taut_from_rad, stiffness_nm_rad: sign * size },
+                ..none
+            },
             1 => Effects { play_nm: size, ..none },
             2 => Effects { flex: sign * size, ..none },
-            _ => Effects { spilt_kg: size, slip_at: self.slip_at, ..none },
+            _ => Effects { spilt_kg: size, slip_run: self.slip_run, slip_pose: self.slip_pose, ..none },
         }
     }
 
@@ -232,7 +236,8 @@ impl Container {
             sigma: [draw::sigma(&noise[0]), draw::sigma(&noise[1])],
             noise,
             signs: std::array::from_fn(|_| sign(rng)),
-            slip_at: [slip_run, whole(rng, tilts_rad.len() / 4, 3 * tilts_rad.len() / 4)],
+            slip_run,
+            slip_pose: whole(rng, tilts_rad.len() / 4, 3 * tilts_rad.len() / 4),
             taut_from_rad: between(rng, 0.3, 0.65) * tilts_rad.iter().copied().fold(0.0, f64::max),
             world: TiltWorld {
                 outside,
@@ -257,8 +262,7 @@ impl Container {
 
     /// Where the poses of a run from its slip on are.
     fn after_slip(&self) -> Place {
-        let [run, pose] = self.slip_at;
-        let late = &self.world.sweeps[run].tilts_rad[pose..];
+        let late = &self.world.sweeps[self.slip_run].tilts_rad[self.slip_pose..];
         Place {
             variable: "theta_rad".into(),
             from: late.iter().copied().fold(f64::INFINITY, f64::min),

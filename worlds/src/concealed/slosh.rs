@@ -10,7 +10,7 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::slosh::{Effects, Oscillation, ROOTS, SloshWorld, Start};
+use crate::physics::slosh::{Effects, Machine, Oscillation, ROOTS, Slip, SloshWorld, Start};
 
 const LISTED: usize = 7;
 const UNLISTED: usize = 4;
@@ -29,7 +29,7 @@ pub(crate) struct Bottle {
     frequency_sign: f64,
     least_tension_n_m: f64,
     lag_s: f64,
-    machine: [f64; 2],
+    machine: Machine,
     slip_s: f64,
 }
 
@@ -144,9 +144,12 @@ impl Rig for Bottle {
     fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
         let none = Effects::default();
         match which {
-            0 => Effects { machine: [size, self.machine[0], self.machine[1]], ..none },
+            0 => Effects { machine: Machine { amplitude: size, ..self.machine }, ..none },
             1 => Effects { leak: size, ..none },
-            2 => Effects { slip: [sign * size, self.slip_s], slip_run: self.world.starts.len() / 2, ..none },
+            2 => {
+                let run = self.world.starts.len() / 2;
+                Effects { slip: Slip { shift: sign * size, run, at_s: self.slip_s }, ..none }
+            }
             _ => Effects { swirl_rad_s: size, ..none },
         }
     }
@@ -155,7 +158,7 @@ impl Rig for Bottle {
         let end = self.world.rows as f64 / self.world.rate_hz;
         let from = |from: f64| Some(Place { variable: "t_s".into(), from, to: end });
         let (what, place) = match which {
-            0 => ("a machine near by that starts", from(self.machine[1])),
+            0 => ("a machine near by that starts", from(self.machine.from_s)),
             1 => ("a leak: less liquid from run to run", None),
             2 => ("a grip that slips once, in one run", from(self.slip_s)),
             _ => ("a wave whose plane turns", None),
@@ -225,7 +228,7 @@ impl Bottle {
             effects: Effects::default(),
         };
         let mode = |root: f64| world.omega_rad_s(root, world.depth_m());
-        // An arm's frequency is its own: far from the first three modes.
+        // The arm's frequency is far from those of the first three modes.
         let modes = [mode(ROOTS[0]), mode(ROOTS[1]), mode(8.536)];
         let arm = loop {
             let omega = log_between(rng, 28.0, 110.0);
@@ -235,7 +238,11 @@ impl Bottle {
         };
         let rings = [[modes[1], log_between(rng, 0.004, 0.03)], [arm, log_between(rng, 0.003, 0.03)]];
         let frequency_sign = if depth < 0.5 * radius_m { 1.0 } else { -1.0 };
-        let machine = [modes[0] * between(rng, 1.15, 1.8), duration_s * between(rng, 0.2, 0.6)];
+        let machine = Machine {
+            amplitude: 0.0,
+            omega_rad_s: modes[0] * between(rng, 1.15, 1.8),
+            from_s: duration_s * between(rng, 0.2, 0.6),
+        };
         let slip_s = duration_s * between(rng, 0.2, 0.8);
         Self {
             sigma: draw::sigma(&noise),

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::draw::{between, choose, log_between, noise, sign, whole};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
-use crate::physics::flight::{Effects, FlightWorld, Gust, Measured};
+use crate::physics::flight::{Effects, FlightWorld, Gust, Knock, Mast, Measured};
 
 /// Makes worlds of the domain `trajectory`.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,8 @@ fn listed(e: &mut Effects, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
 fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
     match whole(rng, 0, 3) {
         0 => {
-            e.mast = [log_between(rng, 0.003, 0.02), between(rng, 2.0, 8.0)];
+            e.mast =
+                Mast { amplitude_m: log_between(rng, 0.003, 0.02), frequency_hz: between(rng, 2.0, 8.0) };
             key.unlisted = Some("a mast that swings".into());
         }
         1 => {
@@ -110,14 +111,15 @@ fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
             let begin = between(rng, 0.1, 0.35);
             let end = begin + between(rng, 0.1, 0.25);
             e.quadratic_per_m = 0.05;
-            // What it does to the speed stays when it is over: no place in the readings.
+            // The change of the speed stays when the gust is over: the key states no place in the readings.
             e.gust = Gust { velocity_m_s: [0.0, log_between(rng, 4.0, 15.0), 0.0], window_s: [begin, end] };
             key.unlisted = Some("a gust in still air, with drag".into());
         }
         _ => {
-            e.camera_step = [sign(rng) * log_between(rng, 0.005, 0.03), between(rng, 0.2, 0.5)];
+            e.knock =
+                Knock { height_m: sign(rng) * log_between(rng, 0.005, 0.03), at_s: between(rng, 0.2, 0.5) };
             key.unlisted = Some("a camera that is knocked".into());
-            key.place = Some(Place { variable: "t_s".into(), from: e.camera_step[1], to: f64::INFINITY });
+            key.place = Some(Place { variable: "t_s".into(), from: e.knock.at_s, to: f64::INFINITY });
         }
     }
 }

@@ -43,10 +43,19 @@ pub struct Effects {
     pub alternation: f64,
     /// Unlisted: relative change of the response by the throw beyond 80 mm, 1/m.
     pub throw_per_m: f64,
-    /// Unlisted: how fast the response falls beyond a length: relative change by relative length, and the length in m.
-    pub long: [f64; 2],
+    /// Unlisted: the response falls beyond a length.
+    pub long: Long,
     /// Unlisted: a dough that was just worked is harder: relative change for each tenth of strain in the roll before.
     pub worked: f64,
+}
+
+/// A response that falls beyond a length, exponentially in the relative length.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Long {
+    /// Its fall by relative length; 0 for none.
+    pub fall: f64,
+    /// The length in m.
+    pub from_m: f64,
 }
 
 /// Size and shape of a piece of dough.
@@ -201,7 +210,7 @@ impl DoughWorld {
         }
         let faded = (-e.drying_per_s * t_s - e.softening_per_roll * step as f64).exp();
         let even = if step % 2 == 1 { 1.0 } else { -1.0 };
-        let [fall, from_m] = e.long;
+        let Long { fall, from_m } = e.long;
         let beyond = if fall == 0.0 { 0.0 } else { fall * (length_m / from_m - 1.0).max(0.0) };
         let worked = 1.0 / (1.0 + e.worked * strain_before / 0.1);
         let law = (1.0 + e.alternation * even) * (1.0 + e.throw_per_m * (action[0] - 0.08)) * (-beyond).exp();
@@ -356,7 +365,7 @@ mod tests {
             let expected = if i % 2 == 1 { 1.2 } else { 0.8 };
             approx::assert_relative_eq!(*part, expected, max_relative = 0.02);
         }
-        let effects = Effects { long: [0.8, 0.07], ..none };
+        let effects = Effects { long: Long { fall: 0.8, from_m: 0.07 }, ..none };
         for m in &world(effects).rolled()[0] {
             let part = strain(m, &m.after) / strain(m, &m.unchanged);
             assert_eq!(part < 0.999, m.before[0] > 0.0702, "{part} at {}", m.before[0]);

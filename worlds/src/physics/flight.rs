@@ -41,18 +41,43 @@ pub struct Effects {
     pub camera_tilt_rad: [f64; 2],
     /// Relative error of the stated times.
     pub clock_rate: f64,
-    /// Unlisted: amplitude in m and frequency in Hz of a swinging mast, its phase new in each run; x swings by the
-    /// amplitude, y by 0.3 and z by 0.1 of it.
-    pub mast: [f64; 2],
-    /// Unlisted: the drag falls to a fraction above a speed in m/s: fraction, speed; both 0 for none.
-    pub drag_crisis: [f64; 2],
+    /// Unlisted: the camera's mast swings.
+    pub mast: Mast,
+    /// Unlisted: the drag falls above a speed.
+    pub drag_crisis: DragCrisis,
     /// Unlisted: a cord that pulls back towards the start, in 1/s^2.
     pub cord_per_s2: f64,
     /// Unlisted: a gust that is added to the wind within a window of the true time.
     pub gust: Gust,
-    /// Unlisted: the camera is knocked at a stated time in s, after which heights are read this much too large in m
-    /// (height, time); (0, 0) for none.
-    pub camera_step: [f64; 2],
+    /// Unlisted: the camera is knocked.
+    pub knock: Knock,
+}
+
+/// A mast that swings with a new phase in each run: x by the amplitude, y by 0.3 and z by 0.1 of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Mast {
+    /// Amplitude in m.
+    pub amplitude_m: f64,
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+}
+
+/// A drag that falls above a speed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DragCrisis {
+    /// Speed above which it falls in m/s; 0 for none.
+    pub above_m_s: f64,
+    /// The part of the drag that is left.
+    pub fraction: f64,
+}
+
+/// A knock, after which all heights are read too large.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Knock {
+    /// Error of the heights in m; 0 for no knock.
+    pub height_m: f64,
+    /// Stated time in s.
+    pub at_s: f64,
 }
 
 /// A wind that blows for a while; it acts through drag.
@@ -180,9 +205,9 @@ impl FlightWorld {
         let force = |y: &[f64; 6], gust: [f64; 3]| -> [f64; 3] {
             let air = [y[3] - e.wind_m_s[0] - gust[0], y[4] - e.wind_m_s[1] - gust[1], y[5] - gust[2]];
             let speed = (air[0].powi(2) + air[1].powi(2) + air[2].powi(2)).sqrt();
-            let share =
-                if e.drag_crisis[1] > 0.0 && speed > e.drag_crisis[1] { e.drag_crisis[0] } else { 1.0 };
-            let drag = share * e.quadratic_per_m * speed + e.linear_per_s;
+            let DragCrisis { above_m_s, fraction } = e.drag_crisis;
+            let fraction = if above_m_s > 0.0 && speed > above_m_s { fraction } else { 1.0 };
+            let drag = fraction * e.quadratic_per_m * speed + e.linear_per_s;
             let [lx, ly, lz] = e.magnus_per_s;
             [
                 ly * y[5] - lz * y[4] - drag * air[0] - e.cord_per_s2 * (y[0] - origin[0]),
@@ -211,11 +236,10 @@ impl FlightWorld {
         for i in 0..rows {
             let t = i as f64 * frame;
             t_s.push(t);
-            let swing = e.mast[0] * (std::f64::consts::TAU * e.mast[1] * t + phase).sin();
+            let swing = e.mast.amplitude_m * (std::f64::consts::TAU * e.mast.frequency_hz * t + phase).sin();
             let mut seen = self.read(&y, swing);
-            let [size, knocked_at] = e.camera_step;
-            if size != 0.0 && t >= knocked_at {
-                seen[2] += size;
+            if e.knock.height_m != 0.0 && t >= e.knock.at_s {
+                seen[2] += e.knock.height_m;
             }
             match self.measured {
                 Measured::Height => channels[0].push(seen[2]),

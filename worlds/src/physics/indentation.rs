@@ -35,8 +35,8 @@ pub struct Effects {
     pub relaxed_fraction: f64,
     /// Time constant of the relaxation in s.
     pub tau_s: f64,
-    /// A rim that is met at a depth in m, and its stiffness in N/m.
-    pub rim: [f64; 2],
+    /// A rim that is met at a depth.
+    pub rim: Rim,
     /// Compliance of the load cell, which adds to the depth reading, m/N.
     pub compliance_m_n: f64,
     /// Offset of the load cell, N.
@@ -45,10 +45,37 @@ pub struct Effects {
     pub stiffening: f64,
     /// Unlisted: fraction of the largest depth that stays as a dent.
     pub dent: f64,
-    /// Unlisted: a ripple of the drive: amplitude in N, pitch in m.
-    pub ripple: [f64; 2],
-    /// Unlisted: force that is lost at a depth in m: depth, force in N.
-    pub slip: [f64; 2],
+    /// Unlisted: a ripple of the drive.
+    pub ripple: Ripple,
+    /// Unlisted: a membrane that slips.
+    pub slip: Slip,
+}
+
+/// A rim beside the contact.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Rim {
+    /// Depth reading at which it is met, m.
+    pub depth_m: f64,
+    /// Its stiffness, N/m.
+    pub stiffness_n_m: f64,
+}
+
+/// A force that is periodic in the depth reading.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ripple {
+    /// Amplitude in N; 0 for none.
+    pub amplitude_n: f64,
+    /// Pitch in m.
+    pub pitch_m: f64,
+}
+
+/// A force that is lost once a depth was reached.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slip {
+    /// Depth reading in m; 0 for none.
+    pub depth_m: f64,
+    /// The force in N.
+    pub force_n: f64,
 }
 
 /// Depth and time of a reading.
@@ -159,15 +186,14 @@ impl IndentationWorld {
                 forces = self.forces(plane, steps, &depths, layer);
             }
         }
-        let [ripple, pitch] = e.ripple;
-        let [slips_at, lost] = e.slip;
+        let Ripple { amplitude_n, pitch_m } = e.ripple;
         let deepest = steps.iter().map(|s| s.delta_m).fold(0.0, f64::max);
         let mut slipped = false;
         for (force, step) in forces.iter_mut().zip(steps) {
-            slipped |= slips_at > 0.0 && step.delta_m >= slips_at;
-            *force += e.force_offset_n - if slipped { lost } else { 0.0 };
-            if ripple != 0.0 {
-                *force += ripple * (2.0 * PI * step.delta_m / pitch).sin();
+            slipped |= e.slip.depth_m > 0.0 && step.delta_m >= e.slip.depth_m;
+            *force += e.force_offset_n - if slipped { e.slip.force_n } else { 0.0 };
+            if amplitude_n != 0.0 {
+                *force += amplitude_n * (2.0 * PI * step.delta_m / pitch_m).sin();
             }
         }
         if e.dent > 0.0 {
@@ -206,10 +232,9 @@ impl IndentationWorld {
                 touched = sticky.is_some();
                 *force += sticky.map_or(0.0, |f| f - self.indenter.force_n(plane, depth));
             }
-            let [from, stiffness] = e.rim;
             *force += e.tension_n_m * depth
                 + e.stretching_n_m3 * depth.powi(3)
-                + stiffness * (depths[i] - from).max(0.0);
+                + e.rim.stiffness_n_m * (depths[i] - e.rim.depth_m).max(0.0);
         }
         bare
     }
@@ -337,7 +362,8 @@ mod tests {
             0.064,
             max_relative = 1e-9
         );
-        approx::assert_relative_eq!(with(Effects { rim: [3e-3, 40.0], ..none }), 0.04, max_relative = 1e-9);
+        let rim = Rim { depth_m: 3e-3, stiffness_n_m: 40.0 };
+        approx::assert_relative_eq!(with(Effects { rim, ..none }), 0.04, max_relative = 1e-9);
         approx::assert_relative_eq!(
             with(Effects { stiffening: 0.5, ..none }),
             0.2 * plain[40],

@@ -40,16 +40,36 @@ pub struct Effects {
     pub lag_s: f64,
     /// Largest error of such a sensor's reading at t = 0, when the rotation has just ended.
     pub lag_start: f64,
-    /// Unlisted: a machine near by, from a time on: amplitude, angular frequency in rad/s, time in s.
-    pub machine: [f64; 3],
+    /// Unlisted: a machine near by.
+    pub machine: Machine,
     /// Unlisted: fraction of the volume that is lost from run to run.
     pub leak: f64,
-    /// Unlisted: the grip slips once: step of the reading, time in s.
-    pub slip: [f64; 2],
-    /// Unlisted: the run in which it slips.
-    pub slip_run: usize,
+    /// Unlisted: the grip slips once.
+    pub slip: Slip,
     /// Unlisted: the plane of the wave turns, rad/s.
     pub swirl_rad_s: f64,
+}
+
+/// A machine that shakes the sensor from a time on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Machine {
+    /// Amplitude in the reading's unit.
+    pub amplitude: f64,
+    /// Angular frequency in rad/s.
+    pub omega_rad_s: f64,
+    /// When it starts, s.
+    pub from_s: f64,
+}
+
+/// A slip of the grip, after which the readings of its run are shifted.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slip {
+    /// The shift in the reading's unit.
+    pub shift: f64,
+    /// The run, counted from 0.
+    pub run: usize,
+    /// When it slips, s.
+    pub at_s: f64,
 }
 
 /// State of the liquid and its sensor at the start of a run.
@@ -165,10 +185,9 @@ impl SloshWorld {
     /// What unlisted effects add to a reading.
     fn unlisted_reading(&self, number: usize, t: f64) -> f64 {
         let e = &self.effects;
-        let [size, omega, from] = e.machine;
-        let machine = if t >= from { size * (omega * (t - from)).sin() } else { 0.0 };
-        let [step, at] = e.slip;
-        machine + if number == e.slip_run && t >= at { step } else { 0.0 }
+        let Machine { amplitude, omega_rad_s, from_s } = e.machine;
+        let machine = if t >= from_s { amplitude * (omega_rad_s * (t - from_s)).sin() } else { 0.0 };
+        machine + if number == e.slip.run && t >= e.slip.at_s { e.slip.shift } else { 0.0 }
     }
 }
 

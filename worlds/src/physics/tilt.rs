@@ -90,20 +90,31 @@ pub struct Effects {
     pub cap_shift_m: f64,
     /// The grasp height jumps by this in one run, from a pose on: m.
     pub slip_m: f64,
-    /// Run and pose of the jump.
-    pub slip_at: [usize; 2],
+    /// Run of the jump, counted from 0.
+    pub slip_run: usize,
+    /// First pose after the jump, counted from 0.
+    pub slip_pose: usize,
     /// Torque that is added from row to row of the whole file, N m.
     pub drift_nm_per_row: f64,
     /// The surface stands as at the tilt less this, rad.
     pub surface_lag_rad: f64,
-    /// Unlisted: a cable that is taut beyond an angle: N m per rad beyond it, and the angle in rad.
-    pub cable: [f64; 2],
+    /// Unlisted: a cable that is taut beyond an angle.
+    pub cable: Cable,
     /// Unlisted: half the width of the sensor's hysteresis (a play), N m.
     pub play_nm: f64,
     /// Unlisted: the gripper gives way with the torque squared, rad/(N m)^2.
     pub flex: f64,
     /// Unlisted: kg of liquid spilt at the run and pose of the slip.
     pub spilt_kg: f64,
+}
+
+/// A cable to the sensor that turns it once it is taut.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cable {
+    /// Tilt from which it is taut, rad.
+    pub taut_from_rad: f64,
+    /// Torque for each radian beyond, N m/rad.
+    pub stiffness_nm_rad: f64,
 }
 
 /// A container's liquid and the poses of one run.
@@ -142,10 +153,9 @@ impl TiltWorld {
         for (run, sweep) in self.sweeps.iter().enumerate() {
             let mut reading = None;
             for (pose, &tilt) in sweep.tilts_rad.iter().enumerate() {
-                let late = run == e.slip_at[0] && pose >= e.slip_at[1];
+                let late = run == e.slip_run && pose >= e.slip_pose;
                 let [force, torque] = self.load(sweep, tilt, late);
-                let [taut, from] = e.cable;
-                let torque = torque + taut * (tilt - from).max(0.0);
+                let torque = torque + e.cable.stiffness_nm_rad * (tilt - e.cable.taut_from_rad).max(0.0);
                 // A play follows only where it is pushed.
                 let followed = reading
                     .map_or(torque, |before: f64| before.clamp(torque - e.play_nm, torque + e.play_nm));

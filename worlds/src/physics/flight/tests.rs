@@ -149,15 +149,16 @@ fn a_cord_swings_about_its_rest() {
 #[test]
 fn the_drag_crisis_acts_above_its_speed_only() {
     let drag = Effects { quadratic_per_m: 0.05, ..Effects::default() };
+    let crisis = |above_m_s| DragCrisis { above_m_s, fraction: 0.4 };
     let (_, full) = flight(drag);
-    let (_, never) = flight(Effects { drag_crisis: [0.4, 1e3], ..drag });
-    let (_, always) = flight(Effects { drag_crisis: [0.4, 1e-9], ..drag });
+    let (_, never) = flight(Effects { drag_crisis: crisis(1e3), ..drag });
+    let (_, always) = flight(Effects { drag_crisis: crisis(1e-9), ..drag });
     let (_, small) = flight(Effects { quadratic_per_m: 0.4 * 0.05, ..Effects::default() });
     assert_eq!(full, never);
     assert_eq!(always, small);
     // From rest the two are one until the speed is reached, and part after it.
     let world = |effects| quiet(Measured::Height, effects).fly([0.0; 6], ROWS, 0.0, STEPS).1.remove(0);
-    let (full, some) = (world(drag), world(Effects { drag_crisis: [0.4, 5.2], ..drag }));
+    let (full, some) = (world(drag), world(Effects { drag_crisis: crisis(5.2), ..drag }));
     let parted = full.iter().zip(&some).position(|(a, b)| a != b);
     // 5.2 m/s is reached at vt/g atanh(5.2/vt) = 0.557 s, between rows 16 and 17.
     assert_eq!(parted, Some(17), "{full:?} {some:?}");
@@ -217,9 +218,11 @@ fn scale_and_clock_change_the_gravity_that_is_seen() {
 #[test]
 fn mast_and_knock_are_added_to_what_is_seen() {
     let (t_s, still) = flight(Effects::default());
-    let world = quiet(Measured::Position, Effects { mast: [0.01, 3.0], ..Effects::default() });
+    let mast = Mast { amplitude_m: 0.01, frequency_hz: 3.0 };
+    let world = quiet(Measured::Position, Effects { mast, ..Effects::default() });
     let (_, seen) = world.fly(START, ROWS, 0.7, STEPS);
-    let (_, knocked) = flight(Effects { camera_step: [0.05, 0.65], ..Effects::default() });
+    let knock = Knock { height_m: 0.05, at_s: 0.65 };
+    let (_, knocked) = flight(Effects { knock, ..Effects::default() });
     for (i, t) in t_s.iter().enumerate() {
         let swing = 0.01 * (std::f64::consts::TAU * 3.0 * t + 0.7).sin();
         for (c, share) in [1.0, 0.3, 0.1].into_iter().enumerate() {
