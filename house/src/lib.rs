@@ -5,10 +5,12 @@
 mod circles;
 mod modules;
 mod names;
+mod sizes;
 mod workspace;
 
 pub use circles::{Circle, Tie, circles};
 pub use modules::{Module, modules};
+pub use sizes::{Size, sizes};
 pub use workspace::{Package, packages, root, sources};
 
 /// What can go wrong while sources are read, in words.

@@ -1,7 +1,7 @@
 //! Files are short, what is bundled is what is made, and the gate runs every example.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-use house::{packages, root, sources};
+use house::{packages, root, sizes, sources};
 
 /// The gate runs the numbered examples of `examples/` by pattern, and every other one by name.
 #[test]
@@ -43,4 +43,21 @@ fn source_files_fit_on_a_few_screens() {
         assert!(lines <= 700, "{} has {lines} lines", file.display());
     }
     assert!(files.len() > 20);
+}
+
+/// The map states the size of every package to a quarter; the message says how it is brought up to date.
+#[test]
+fn the_map_states_sizes_as_they_are() {
+    let map = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    for size in sizes().unwrap() {
+        let row = size.row();
+        let (name, lines) = (row.split(" | ").next().unwrap(), size.total()[1] as f64);
+        let stated =
+            map.lines().find(|l| l.starts_with(&format!("{name} | ")) && l.matches(" | ").count() == 3);
+        let stated = stated.and_then(|l| l.split(" | ").nth(2)).and_then(|l| l.parse::<f64>().ok());
+        assert!(
+            stated.is_some_and(|stated| (stated / lines - 1.0).abs() < 0.25),
+            "ARCHITECTURE.md says {stated:?} lines in {name}, there are {lines}: cargo run -p house -- --write"
+        );
+    }
 }
