@@ -11,7 +11,7 @@ mod workspace;
 pub use circles::{Circle, Tie, circles};
 pub use modules::{Module, modules};
 pub use sizes::{Size, sizes};
-pub use workspace::{Package, packages, root, sources};
+pub use workspace::{Package, metadata, packages, root, sources};
 
 /// What can go wrong while sources are read, in words.
 pub type Error = Box<dyn std::error::Error>;

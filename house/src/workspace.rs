@@ -26,16 +26,28 @@ pub struct Package {
     pub targets: Vec<(String, String, PathBuf)>,
 }
 
-/// What cargo knows of the workspace's packages.
+/// What `cargo metadata` answers to these arguments.
 ///
 /// # Errors
 /// Where cargo fails or answers something else than its metadata.
-pub fn packages() -> Result<Vec<Package>, Error> {
+pub fn metadata(arguments: &[&str]) -> Result<serde_json::Value, Error> {
     let output = Command::new(env!("CARGO"))
-        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
+        .args(["metadata", "--format-version", "1"])
+        .args(arguments)
         .current_dir(root())
         .output()?;
-    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout)?;
+    if output.status.success() {
+        return Ok(serde_json::from_slice(&output.stdout)?);
+    }
+    Err(String::from_utf8_lossy(&output.stderr).into())
+}
+
+/// What cargo knows of the workspace's packages.
+///
+/// # Errors
+/// As [`metadata`].
+pub fn packages() -> Result<Vec<Package>, Error> {
+    let metadata = metadata(&["--no-deps", "--offline"])?;
     let list = |value: &serde_json::Value| value.as_array().cloned().unwrap_or_default();
     let text = |value: &serde_json::Value| value.as_str().unwrap_or_default().to_owned();
     let packages = list(&metadata["packages"]);
