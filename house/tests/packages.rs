@@ -100,22 +100,22 @@ fn blocks(page: &str) -> Vec<(&str, Vec<&str>)> {
     blocks
 }
 
-/// Lines such as `rand = "0.10"`, by name.
-fn wanted<'a>(lines: impl IntoIterator<Item = &'a str>) -> BTreeMap<String, String> {
-    let line = |line: &'a str| line.split_once(" = ").map(|(name, version)| (name.into(), version.into()));
-    lines.into_iter().filter_map(line).collect()
+/// The versions that a table `[dependencies]` asks for, by name.
+fn wanted(manifest: &str) -> BTreeMap<String, String> {
+    let manifest: toml::Table = manifest.parse().unwrap();
+    let entry = |(name, entry): (&String, &toml::Value)| {
+        let version = entry.get("version").unwrap_or(entry);
+        (name.clone(), version.as_str().unwrap_or_default().to_owned())
+    };
+    manifest["dependencies"].as_table().unwrap().iter().map(entry).collect()
 }
 
 /// A README begins with title, purpose, the lines of `[dependencies]` in the versions that the workspace has, and a program; it links
 /// to nothing that a package leaves behind.
 #[test]
 fn readmes_begin_with_how_to_begin() {
-    let manifest: toml::Table = read_to_string(root().join("Cargo.toml")).unwrap().parse().unwrap();
-    let ours = manifest["workspace"]["dependencies"].as_table().unwrap();
-    let version = |name: &str| {
-        let entry = ours.get(name).unwrap_or_else(|| panic!("{name} is no dependency of the workspace"));
-        format!("{}", entry.get("version").unwrap_or(entry))
-    };
+    let root_manifest = read_to_string(root().join("Cargo.toml")).unwrap();
+    let ours = wanted(&root_manifest.replace("[workspace.dependencies]", "[dependencies]"));
     let mut shown = BTreeMap::new();
     for (name, (package, published)) in members() {
         if !published {
@@ -130,20 +130,18 @@ fn readmes_begin_with_how_to_begin() {
         assert!(*kind == "toml" && lines[0] == "[dependencies]", "{name}: {lines:?}");
         let begin = page.lines().position(|line| line == "```toml").unwrap();
         assert!(begin <= 5, "{name}: [dependencies] stands in line {begin}");
-        assert!(["", "no_run", "sh"].contains(&blocks[1].0), "{name}: a program comes first");
-        let lines = wanted(lines.iter().copied());
-        assert!(lines.contains_key(&name), "{name}: {lines:?}");
-        for (needed, asked) in lines {
-            assert_eq!(asked, version(&needed), "{name}: {needed}");
-            shown.insert(needed, asked);
+        assert!(["", "no_run", "console"].contains(&blocks[1].0), "{name}: a program comes first");
+        let wanted = wanted(&lines.join("\n"));
+        assert!(wanted.contains_key(&name), "{name}: {wanted:?}");
+        for (needed, version) in wanted {
+            assert_eq!(ours.get(&needed), Some(&version), "{name}: {needed}");
+            shown.insert(needed, version);
         }
     }
     // The program outside the workspace asks for the crates as the READMEs do.
-    let outside = read_to_string(root().join("tests/downstream/Cargo.toml")).unwrap();
-    let begin = outside.split_once("[dependencies]\n").unwrap().1;
-    let asked = wanted(begin.lines().take_while(|line| !line.is_empty()));
-    assert!(asked.len() >= 3, "{asked:?}");
-    for (name, version) in &asked {
+    let outside = wanted(&read_to_string(root().join("tests/downstream/Cargo.toml")).unwrap());
+    assert!(outside.len() >= 3, "{outside:?}");
+    for (name, version) in &outside {
         assert_eq!(shown.get(name), Some(version), "tests/downstream: {name}");
     }
 }
