@@ -85,6 +85,18 @@ fn published_crates_need_published_ones() {
     assert!(seen > 0);
 }
 
+/// The gate lints every crate with its default features alone, and those that have any without.
+#[test]
+fn the_gate_lints_crates_without_their_default_features() {
+    let gate = read_to_string(root().join(".ci/run")).unwrap();
+    let lint = gate.lines().find(|line| line.contains("--no-default-features -p")).unwrap();
+    let linted: Vec<&str> = lint.split(" -p ").skip(1).filter_map(|rest| rest.split(' ').next()).collect();
+    for (name, (package, _)) in members() {
+        let defaults = !list(&package["features"]["default"]).is_empty();
+        assert!(!defaults || linted.contains(&name.as_str()), "{name} is not linted without its defaults");
+    }
+}
+
 /// The fenced blocks of a page: what stands beside the fence, and their lines.
 fn blocks(page: &str) -> Vec<(&str, Vec<&str>)> {
     let mut blocks: Vec<(&str, Vec<&str>)> = Vec::new();
