@@ -14,7 +14,7 @@ use hw_traits::force_torque::ForceTorque;
 use hw_traits::{Error as _, ErrorKind};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{DiagnoseError, Options, diagnose};
-use missing_physics::model::Quantity;
+use missing_physics::model::{Quantity, SpecError};
 use missing_physics::observer::Silent;
 
 const FINGERTIP: Indenter = Indenter::Sphere { radius_m: 0.01 };
@@ -51,6 +51,12 @@ impl From<DiagnoseError> for Failure {
 
 impl From<LawError> for Failure {
     fn from(error: LawError) -> Self {
+        Self::Data(error.to_string())
+    }
+}
+
+impl From<SpecError> for Failure {
+    fn from(error: SpecError) -> Self {
         Self::Data(error.to_string())
     }
 }
@@ -97,7 +103,7 @@ fn missing(depths_m: &[f64], presses: Vec<Vec<f64>>) -> Result<(String, Vec<Stri
         resolution: vec![0.0],
     };
     let options = Options { replicates: 99, ..Options::default() };
-    let answer = diagnose(&pad::Pad::new(pad::glued()?), &recording, &[], &options, &Silent)?;
+    let answer = diagnose(&pad::Pad::new(pad::glued()?)?, &recording, &[], &options, &Silent)?;
     Ok((answer.verdict.word().to_owned(), answer.chosen))
 }
 

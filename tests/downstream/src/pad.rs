@@ -2,7 +2,7 @@
 
 use hertz_contact::law::{Base, Indentation, Law as _, LawError, Layer};
 use missing_physics::data::Run;
-use missing_physics::model::{Mechanism, Model, Parameter, PredictError, Scope, Spec};
+use missing_physics::model::{Model, PredictError, Spec, SpecBuilder, SpecError, UNBOUNDED};
 
 /// Hertz's law, what a bottom close by adds to it, and a cell whose zero is off.
 pub struct Pad {
@@ -22,36 +22,25 @@ pub fn glued() -> Result<Layer, LawError> {
 }
 
 impl Pad {
-    pub fn new(layer: Layer) -> Self {
-        let parameter = |name: &str, unit: &str, start, upper, scale| Parameter {
-            name: name.into(),
-            unit: unit.into(),
-            scope: Scope::Shared,
-            start,
-            lower: 0.0,
-            upper,
-            scale,
-        };
-        let mechanism = |id: &str, name: &str, parameter| Mechanism {
-            id: id.into(),
-            name: name.into(),
-            parameters: vec![parameter],
-            ..Mechanism::default()
-        };
-        let spec = Spec {
-            baseline: "Hertz's law of a half-space".into(),
-            parameters: vec![
-                parameter("modulus_pa", "Pa", 15e3, f64::INFINITY, 1e3),
-                parameter("inverse_thickness_per_m", "1/m", 0.0, 1e3, 10.0),
-                parameter("offset_n", "N", 0.0, 1.0, 1e-3),
-            ],
-            mechanisms: vec![
-                mechanism("thin-pad", "a bottom close by", 1),
-                mechanism("offset", "the cell's zero is off", 2),
-            ],
-            terms: vec![],
-        };
-        Self { spec, layer }
+    pub fn new(layer: Layer) -> Result<Self, SpecError> {
+        let mut b = SpecBuilder::new("Hertz's law of a half-space");
+        let above_zero = [0.0, f64::INFINITY];
+        b.shared("modulus_pa", "Pa", 15e3, above_zero, 1e3);
+        let bottom = b.shared("inverse_thickness_per_m", "1/m", 0.0, [0.0, 200.0], 10.0);
+        let zero = b.shared("offset_n", "N", 0.0, UNBOUNDED, 1e-3);
+        b.mechanism(
+            "thin-pad",
+            &[bottom],
+            ["a bottom close by", "The table shows.", "F = C(chi) F_Hertz", ""],
+            &[],
+        );
+        b.mechanism(
+            "offset",
+            &[zero],
+            ["an offset", "The cell's zero is off.", "F = F_Hertz + offset_n", ""],
+            &[],
+        );
+        Ok(Self { spec: b.build()?, layer })
     }
 }
 
