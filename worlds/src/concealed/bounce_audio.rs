@@ -17,7 +17,7 @@ use crate::physics::sound::{Room, TableModes, add_noise, wav};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BounceAudio;
 
-/// Of the effects of a [`BounceWorld`] a fast clock is none here: it is the same as a wrong speed of sound.
+/// Number of the effect that sound does not show: a fast clock is the same as a wrong speed of sound.
 const CLOCK: usize = 4;
 const SCALE: usize = 5;
 /// The effect that only sounds have: a misplaced microphone.
@@ -56,10 +56,10 @@ impl Maker for BounceAudio {
 
 /// Height of the microphones above the table, m.
 const HEIGHT_M: f64 = 0.0762;
-/// Corners of the table about which they stand, m.
+/// Side of the square about whose corners the microphones stand, m.
 const SIDE_M: f64 = 0.55;
 
-/// A ball, a room, and what is stated of it.
+/// A ball in a room, and what the header states of the room.
 struct SoundWorld {
     ball: BounceWorld,
     room: Room,
@@ -138,7 +138,7 @@ impl SoundWorld {
         }
     }
 
-    /// The files, and in how many of them an impact cannot be heard.
+    /// The recording's files, and the number of runs in which an impact cannot be heard.
     fn files(&self, rng: &mut ChaCha8Rng) -> (Vec<(String, Vec<u8>)>, usize) {
         let table = TableModes::new(0.42 * self.room.rate_hz.min(22e3), rng);
         let mut unheard = 0;

@@ -21,11 +21,11 @@ pub(crate) struct Custom;
 /// The plant, whose state is a position (or level, or temperature) and its rate of change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Plant {
-    /// Swings with this angular frequency (rad/s) when it swings little.
+    /// A pendulum, by the angular frequency of small swings (rad/s).
     Pendulum { omega_rad_s: f64 },
-    /// Drains by `h' = -k sqrt(h)`, k in sqrt(m)/s.
+    /// A tank whose level falls by `h' = -k sqrt(h)`, k in sqrt(m)/s.
     Tank { outlet: f64 },
-    /// Warmer than the room by what a heater gives (K/s) and the air takes (1/s).
+    /// A heated plate, by the heater's rate (K/s) and that of cooling by the air (1/s); its state is its temperature above the room's.
     Plate { heater_k_s: f64, cooling_per_s: f64 },
 }
 

@@ -63,7 +63,7 @@ impl Rig for Press {
         1.0
     }
 
-    /// What the moduli can do to the readings.
+    /// The changes of the readings that the moduli can make.
     fn nuisances(&self) -> Nuisances {
         let plain = self.whitened(Effects::default(), &self.world.moduli_pa);
         let mut nuisances = Nuisances::default();
@@ -260,7 +260,7 @@ impl Press {
         Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
     }
 
-    /// Where a membrane that slipped shows: it stays slipped on the way back, so where there is one from a time on, else from a depth on.
+    /// Where a slip shows: from a time on where there is a way back, on which the membrane stays slipped; else from a depth on.
     fn after_slip(&self) -> Place {
         let path = &self.world.runs[0].1;
         let slips =
@@ -272,7 +272,7 @@ impl Press {
     }
 }
 
-/// What people vary from run to run, if anything.
+/// The condition that varies from run to run, if one does.
 fn conditions(rng: &mut ChaCha8Rng) -> Option<Conditions> {
     let count = whole(rng, 2, 4);
     let numbers = |step: f64| (0..count).map(|k| format!("{}", step * k as f64)).collect();

@@ -1,15 +1,15 @@
 //! What is hidden in a recording, and the answer that goes with it.
 
-/// What is hidden in a world.
+/// The kind of effect that is hidden in a world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Hidden {
     /// Nothing: noise and nuisances alone.
     Nothing,
     /// One mechanism of the domain's list.
     One,
-    /// Two of them.
+    /// Two mechanisms of the list.
     Two,
-    /// Something that is not on the list.
+    /// An effect that is not on the list.
     Unlisted,
 }
 
@@ -41,24 +41,24 @@ impl Concealed {
     }
 }
 
-/// What was hidden.
+/// The answer: what was hidden in a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Key {
     /// The kind of world.
     pub hidden: Hidden,
     /// Identifiers of the listed mechanisms at work, in alphabetical order.
     pub mechanisms: Vec<String>,
-    /// Identifiers that may be named beside them or not, which is the same model (the drag through which a wind acts).
+    /// Identifiers of companions: mechanisms that may be named beside those at work or not (the drag through which a wind acts).
     pub beside: Vec<String>,
-    /// Their parameters, by the names of the recordings' format.
+    /// Parameters of the mechanisms at work, by the names of the recordings' format.
     pub parameters: Vec<HiddenParameter>,
-    /// What an unlisted effect is, in words.
+    /// The unlisted effect in words.
     pub unlisted: Option<String>,
     /// Where a local effect acts.
     pub place: Option<Place>,
-    /// How strong what is hidden is, where the maker knows it: the root of the sum of squares, in sigmas of white noise, of what
-    /// it does to the readings beyond what the baseline's own unknowns can take away (and, where it is unlisted, any two listed
-    /// mechanisms with them).
+    /// Strength of the hidden effects, where the maker knows it: the root of the sum of squares of their response in the readings,
+    /// in sigmas of white noise, less the part that the baseline's nuisance parameters can take away (and, for an unlisted effect,
+    /// any two listed mechanisms with them).
     pub strength: Option<f64>,
 }
 
@@ -111,7 +111,7 @@ pub struct HiddenParameter {
     pub value: f64,
 }
 
-/// Where a local effect acts: readings change at an end of the interval that lies within the recording.
+/// Where a local effect acts: the readings change at those ends of the interval that lie within the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// Name of the variable.

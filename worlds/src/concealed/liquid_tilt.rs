@@ -47,7 +47,7 @@ impl Rig for Container {
         (0..LISTED).collect()
     }
 
-    /// What mass and volume of each run can do to the readings, as far as they are not stated.
+    /// The changes of the readings that mass and volume of each run can make, as far as they are not stated.
     fn nuisances(&self) -> Nuisances {
         let plain = self.whitened(&self.world);
         let mut nuisances = Nuisances::default();

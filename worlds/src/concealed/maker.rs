@@ -7,7 +7,7 @@ pub trait Maker: Sync {
     /// The domain.
     fn domain(&self) -> &'static str;
 
-    /// What its worlds are called: as the domain, unless the domain has recordings of several kinds.
+    /// The name of its worlds: the domain's, unless the domain has recordings of several kinds.
     fn name(&self) -> &'static str {
         self.domain()
     }
@@ -17,7 +17,7 @@ pub trait Maker: Sync {
         hidden
     }
 
-    /// Draws a world in which something of the given kind (or what stands in for it) is hidden: its strength from faint to strong on a log scale, the
-    /// noise, the nuisances and the numbers of runs and rows as people have them. The same seed gives the same bits.
+    /// Draws a world with a hidden effect of the given kind, or of the kind that stands in for it: the strength from faint to strong on a
+    /// log scale; noise, nuisance parameters and numbers of runs and rows as people have them. A seed always gives the same bits.
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed;
 }

@@ -29,10 +29,10 @@ pub(crate) trait Rig: Sized {
     /// Draws a rig that can show what is to be hidden, and which effects are hidden.
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice);
 
-    /// All that the baseline's nuisance parameters can do to the readings.
+    /// The changes of the readings that the baseline's nuisance parameters can make.
     fn nuisances(&self) -> Nuisances;
 
-    /// What effects do to the readings, in sigmas.
+    /// Change of the readings by effects, in sigmas.
     fn response(&self, effects: Self::Effects) -> Vec<f64>;
 
     /// The listed effects that a model of such a recording can have.
@@ -76,7 +76,7 @@ pub(crate) trait Rig: Sized {
         effects
     }
 
-    /// What each listed effect does to the readings at a size in the middle of the plausible ones.
+    /// Response to each listed effect at a size in the middle of the plausible ones.
     fn directions(&self) -> Vec<Vec<f64>> {
         let middle = |[low, high]: [f64; 2]| (low * high).sqrt();
         self.candidates()
@@ -85,7 +85,7 @@ pub(crate) trait Rig: Sized {
             .collect()
     }
 
-    /// Sizes what is hidden by the part of its response that no baseline can take away, and writes it into the key.
+    /// Sizes the hidden effects by the part of their response that no baseline can take away, and writes them into the key.
     fn hide(&self, hidden: Hidden, choice: &Choice, key: &mut Key, rng: &mut ChaCha8Rng) -> Self::Effects {
         let nuisances = self.nuisances();
         let mut effects = Self::Effects::default();

@@ -47,7 +47,7 @@ impl Rig for Bottle {
         (0..LISTED).collect()
     }
 
-    /// What the amplitude, the phase and the viscosity of each run can do to the readings.
+    /// The changes of the readings that the amplitude, the phase and the viscosity of each run can make.
     fn nuisances(&self) -> Nuisances {
         let (w, rows) = (&self.world, self.world.rows);
         let quarter = std::f64::consts::FRAC_PI_2;

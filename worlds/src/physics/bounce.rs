@@ -58,7 +58,7 @@ pub struct BounceWorld {
     pub noise_known: bool,
     /// Where the softer side of the table begins, if it has one, along x in m; balls are let go above 0.
     pub soft_from_m: f64,
-    /// What acts.
+    /// The effects at work.
     pub effects: Effects,
 }
 

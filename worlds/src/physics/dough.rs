@@ -24,7 +24,7 @@ impl Band {
     }
 }
 
-/// Everything that may have changed since the training rolls; all zero is nothing. A response is what a roll does in the end.
+/// Everything that may have changed since the training rolls; all zero is nothing. A response is the strain of a roll over the usual one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effects {
     /// Relative change of every response.
@@ -98,7 +98,7 @@ impl Shape {
     }
 }
 
-/// One dough and what is done to it.
+/// A dough and the rolls that are made of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Piece {
     /// Size and shape before the first roll.
@@ -144,17 +144,17 @@ pub struct DoughWorld {
     pub breadth_m: f64,
     /// Modulus of the dough under a short load, Pa.
     pub elastic_pa: f64,
-    /// Stress below which it does not flow, Pa.
+    /// Stress below which the dough does not flow, Pa.
     pub yield_pa: f64,
     /// Strain rate at [`EXCESS_PA`] above the yield stress, 1/s.
     pub rate_per_s: f64,
-    /// The power of the excess with which it flows.
+    /// Exponent of the strain rate in the excess of stress.
     pub exponent: f64,
     /// Rise of `oval` with the logarithm of the length.
     pub flattening: f64,
     /// The doughs.
     pub pieces: Vec<Piece>,
-    /// What acts.
+    /// The effects at work.
     pub effects: Effects,
 }
 
@@ -243,7 +243,7 @@ impl DoughWorld {
     }
 }
 
-/// The band at least as long as the dough is wide, and pressed no deeper than it is high.
+/// Throw and depth at a position between the bounds: a band at least as long as the dough is wide, pressed no deeper than it is high.
 fn within(dimensions_m: &[f64; 3], setting: [f64; 2]) -> [f64; 2] {
     let shortest = dimensions_m[1].clamp(THROWS_M[0], THROWS_M[1]);
     let deepest = dimensions_m[2].max(LEAST_DEPTH_M);

@@ -11,7 +11,7 @@ use crate::noise::Noise;
 
 use super::runge_kutta;
 
-/// What is measured.
+/// The measured quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
     /// Height alone.
@@ -65,7 +65,7 @@ pub struct Mast {
 /// A drag that falls above a speed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DragCrisis {
-    /// Speed above which it falls in m/s; 0 for none.
+    /// Speed above which the drag falls in m/s; 0 for none.
     pub above_m_s: f64,
     /// The part of the drag that is left.
     pub fraction: f64,
@@ -85,14 +85,14 @@ pub struct Knock {
 pub struct Gust {
     /// Velocity of the air in m/s, added to the wind.
     pub velocity_m_s: [f64; 3],
-    /// When it begins and when it is over, in s since the start of the run.
+    /// Beginning and end of the gust, in s since the start of the run.
     pub window_s: [f64; 2],
 }
 
 /// How flights are recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlightWorld {
-    /// What is measured.
+    /// The measured quantity.
     pub measured: Measured,
     /// Number of runs.
     pub runs: usize,
@@ -104,7 +104,7 @@ pub struct FlightWorld {
     pub speed_m_s: [f64; 2],
     /// Range of angles above level at the start, in rad.
     pub elevation_rad: [f64; 2],
-    /// What acts.
+    /// The effects at work.
     pub effects: Effects,
     /// Noise of every channel.
     pub noise: Noise,

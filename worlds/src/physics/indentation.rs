@@ -14,7 +14,7 @@ pub enum Indenter {
     Sphere(f64),
     /// A flat-ended cylinder of a radius in m.
     Cylinder(f64),
-    /// A cone of an angle in rad between it and the flat surface.
+    /// A cone, by the angle in rad between its flank and the flat surface.
     Cone(f64),
 }
 
@@ -54,7 +54,7 @@ pub struct Effects {
 /// A rim beside the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Rim {
-    /// Depth reading at which it is met, m.
+    /// Depth reading at which the rim is met, m.
     pub depth_m: f64,
     /// Its stiffness, N/m.
     pub stiffness_n_m: f64,
@@ -100,7 +100,7 @@ pub struct IndentationWorld {
     pub moduli_pa: Vec<f64>,
     /// Runs: number of the condition, and readings.
     pub runs: Vec<(usize, Vec<Step>)>,
-    /// What acts.
+    /// The effects at work.
     pub effects: Effects,
 }
 
@@ -149,7 +149,7 @@ impl Indenter {
 }
 
 /// Force of an adhesive sphere (Johnson, Kendall and Roberts): the contact's edge is stretched by `sqrt(2 pi a w/E*)`, and its radius
-/// is the larger of the two at which that can be; `None` beyond where it tears off.
+/// is the larger of the two at which that can be; `None` beyond the depth at which the sphere tears off.
 pub fn jkr_force_n(radius_m: f64, plane_pa: f64, work_j_m2: f64, depth_m: f64) -> Option<f64> {
     let edge = |a: f64| (2.0 * PI * a * work_j_m2 / plane_pa).sqrt();
     let depth_of = |a: f64| a * a / radius_m - edge(a);

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::GRAVITY_M_S2;
 use crate::noise::Noise;
 
-/// What slows the pendulum, as angular accelerations.
+/// Friction of the pendulum, as angular accelerations.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Friction {
     /// Viscous: `-2 c w`, c in 1/s.
@@ -22,9 +22,9 @@ pub struct Friction {
 pub struct PendulumWorld {
     /// Reduced length, m.
     pub length_m: f64,
-    /// What slows it.
+    /// Its friction.
     pub friction: Friction,
-    /// Angle at which it is let go in each run, rad.
+    /// Angle from which the pendulum is released in each run, rad.
     pub released_rad: Vec<f64>,
     /// Rows of a run.
     pub rows: usize,

@@ -57,7 +57,7 @@ pub struct Machine {
     pub amplitude: f64,
     /// Angular frequency in rad/s.
     pub omega_rad_s: f64,
-    /// When it starts, s.
+    /// Time at which the machine starts, s.
     pub from_s: f64,
 }
 
@@ -68,7 +68,7 @@ pub struct Slip {
     pub shift: f64,
     /// The run, counted from 0.
     pub run: usize,
-    /// When it slips, s.
+    /// Time of the slip, s.
     pub at_s: f64,
 }
 
@@ -77,7 +77,7 @@ pub struct Slip {
 pub struct Start {
     /// Amplitude of the reading.
     pub amplitude: f64,
-    /// Phase of the first mode, and those of the second mode, the arm, and the swirl.
+    /// Phases of the first mode, the second mode, the arm and the swirl.
     pub phases_rad: [f64; 4],
     /// Error of a slow sensor's reading at t = 0 over `lag_start`, in [-1, 1].
     pub lag_error: f64,
@@ -100,7 +100,7 @@ pub struct SloshWorld {
     pub rows: usize,
     /// Readings a second.
     pub rate_hz: f64,
-    /// What acts.
+    /// The effects at work.
     pub effects: Effects,
 }
 

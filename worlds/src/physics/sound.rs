@@ -10,7 +10,7 @@ type Vec3 = [f64; 3];
 
 /// Reflections are computed one by one for this long after the direct sound, s; later ones are drawn.
 const EARLY_S: f64 = 0.04;
-/// Late reflections in a second, until they are 40 dB down.
+/// Rate of late reflections until they are 40 dB down, 1/s.
 const LATE_PER_S: f64 = 3e3;
 /// Length of a burst, s.
 const BURST_S: f64 = 0.012;
@@ -163,7 +163,7 @@ impl Burst {
         (self.samples[..n].iter().map(|v| v * v).sum::<f64>() / n.max(1) as f64).sqrt()
     }
 
-    /// Adds it to a recording, begun at a time (s), between samples by a cubic through four.
+    /// Adds the burst to a recording from a time (s) on, interpolated by a cubic through four samples.
     fn add(&self, begin_s: f64, gain: f64, rate_hz: f64, into: &mut [f64]) {
         let first = (begin_s * rate_hz).ceil().max(0.0);
         let at = |k: isize| usize::try_from(k).ok().and_then(|k| self.samples.get(k)).copied().unwrap_or(0.0);

@@ -111,7 +111,7 @@ pub struct Effects {
 /// A cable to the sensor that turns it once it is taut.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cable {
-    /// Tilt from which it is taut, rad.
+    /// Tilt from which the cable is taut, rad.
     pub taut_from_rad: f64,
     /// Torque for each radian beyond, N m/rad.
     pub stiffness_nm_rad: f64,
@@ -141,7 +141,7 @@ pub struct TiltWorld {
     pub grasp_m: f64,
     /// The sweeps.
     pub sweeps: Vec<Sweep>,
-    /// What acts.
+    /// The effects at work.
     pub effects: Effects,
 }
 
