@@ -11,7 +11,7 @@ use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{DiagnoseError, Options, diagnose};
 use missing_physics::model::Quantity;
 use missing_physics::observer::Silent;
-use missing_physics_domains::trajectory::model::{Axes, Setup, TrajectoryModel};
+use missing_physics_domains::trajectory::{Axes, Setup, TrajectoryModel};
 use rayon::prelude::*;
 use worlds::physics::flight::{FlightWorld, Measured};
 

@@ -302,34 +302,36 @@ fn a_template_is_a_sound_recording() {
     assert_eq!(tool(&["new", "weather", fresh]).0, 2);
 }
 
-/// Each kind of picture that shows no grains on a ground, or is no picture of depths, has its line.
-#[test]
-fn every_rule_of_a_depth_picture_has_its_line() {
-    let header = "format = 1\ndomain = \"grain-pour\"\ndata = \"data.csv\"\n[camera]\nfx_px = 50\nfy_px = 50\ncx_px = 19.5\n\
+/// A camera and a rig of the bundled pours.
+const RIG: &str = "format = 1\ndomain = \"grain-pour\"\ndata = \"data.csv\"\n[camera]\nfx_px = 50\nfy_px = 50\ncx_px = 19.5\n\
                   cy_px = 19.5\nheight_m = 0.35\ndepth_unit_m = 0.0001\n[rig]\ngrain_diameter_m = 0.004\n\
                   grain_mass_kg = 4.356e-5\ngrain_count = 1000\n\
                   funnel = { outlet_radius_m = 0.014, cone_half_angle_rad = 0.7854, tube_radius_m = 0.04 }\n";
+
+fn png_of(depth: png::BitDepth, counts: &[u16]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 40, 40);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(depth);
+    let wide = depth == png::BitDepth::Sixteen;
+    let data: Vec<u8> = counts.iter().flat_map(|c| c.to_be_bytes()[usize::from(!wide)..].to_vec()).collect();
+    encoder.write_header().unwrap().write_image_data(&data).unwrap();
+    bytes
+}
+
+/// Each kind of picture that shows no grains on a ground, or is no picture of depths, has its line.
+#[test]
+fn every_rule_of_a_depth_picture_has_its_line() {
     let csv = "run,funnel_height_m,depth_image\n1,0.06,a.png\n";
-    let picture = |depth: png::BitDepth, counts: &[u16]| {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, 40, 40);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(depth);
-        let wide = depth == png::BitDepth::Sixteen;
-        let data: Vec<u8> =
-            counts.iter().flat_map(|c| c.to_be_bytes()[usize::from(!wide)..].to_vec()).collect();
-        encoder.write_header().unwrap().write_image_data(&data).unwrap();
-        bytes
-    };
     let said = |csv: &str, bytes: Option<&[u8]>| {
-        let folder = folder(header, csv.as_bytes());
+        let folder = folder(RIG, csv.as_bytes());
         if let Some(bytes) = bytes {
             std::fs::write(folder.path().join("a.png"), bytes).unwrap();
         }
         let error = domains::load(folder.path()).err().unwrap().to_string();
         error.replace(&format!("{}/", folder.path().display()), "")
     };
-    let sixteen = |counts: &[u16]| picture(png::BitDepth::Sixteen, counts);
+    let sixteen = |counts: &[u16]| png_of(png::BitDepth::Sixteen, counts);
     let wild: Vec<u16> = (0..1600).map(|i| 2800 + ((i * 7919) % 1400) as u16).collect();
     let cases: Vec<(Option<Vec<u8>>, &str)> = vec![
         (None, "a.png: no such file"),
@@ -339,7 +341,7 @@ fn every_rule_of_a_depth_picture_has_its_line() {
             "a.png: not a sound PNG: ",
         ),
         (
-            Some(picture(png::BitDepth::Eight, &[7; 1600])),
+            Some(png_of(png::BitDepth::Eight, &[7; 1600])),
             "a.png: Eight bits, Grayscale, expected 16-bit greyscale",
         ),
         (Some(sixteen(&[0; 1600])), "a.png: 100 % of the pixels are missing, expected at most 60 %"),
@@ -361,4 +363,37 @@ fn every_rule_of_a_depth_picture_has_its_line() {
     assert!(said(&outside, None).contains("a file in the recording's folder"));
     let low = csv.replace("0.06", "-0.06");
     assert!(said(&low, None).contains("expected above 0 and below 10"));
+}
+
+/// `check` of a rig that nobody has poured before says what is there at once: it pours nothing, and leaves no pours for later.
+#[test]
+fn a_check_pours_nothing() {
+    let header = RIG.replace("grain_count = 1000", "grain_count = 700");
+    let folder = folder(&header, b"run,funnel_height_m,depth_image\n1,0.06,a.png\n");
+    // A cone of about the volume of the grains, from above.
+    let depth = |at: usize| {
+        let [u, v] = [at % 40, at / 40].map(|p| (p as f64 - 19.5) * 0.35 / 50.0);
+        let height = 0.03 * (1.0 - u.hypot(v) / 0.03).max(0.0);
+        ((0.35 - height) / 1e-4).round() as u16
+    };
+    let heap: Vec<u16> = (0..1600).map(depth).collect();
+    std::fs::write(folder.path().join("a.png"), png_of(png::BitDepth::Sixteen, &heap)).unwrap();
+    let cache = tempfile::tempdir().unwrap();
+    let begin = std::time::Instant::now();
+    let output = Command::new(env!("CARGO_BIN_EXE_missing-physics"))
+        .arg("check")
+        .arg(folder.path())
+        .env("XDG_CACHE_HOME", cache.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        said.contains("1 runs, 1 rows; measured: ") && said.contains("run 1: 1 rows, 0.06 to 0.06 m"),
+        "{said}"
+    );
+    assert!(said.contains("mechanisms that can show: cohesion, "), "{said}");
+    // 500 heaps take minutes.
+    assert!(begin.elapsed() < std::time::Duration::from_secs(10), "{:?}", begin.elapsed());
+    assert_eq!(std::fs::read_dir(cache.path()).unwrap().count(), 0);
 }

@@ -5,14 +5,14 @@ use missing_physics::model::{Model, PredictError};
 use num_dual::{Derivative, DualNum, DualSVec64};
 
 /// A model whose prediction is written in any number.
-pub(super) trait InDuals: Model {
+pub(super) trait DualModel: Model {
     /// Whether the shared parameter at a slot can change this run at all; where it cannot, its derivative is zero without a prediction.
     fn acts_on(&self, _run: &Run, _shared_slot: usize) -> bool {
         true
     }
 
-    /// As [`Model::predict`]; `moving` are the shared slots that carry a derivative.
-    fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+    /// Predicts as [`Model::predict`] does; `moving` are the shared slots that carry a derivative.
+    fn predict_dual<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,
         run: &Run,
         shared: &[T],
@@ -23,7 +23,7 @@ pub(super) trait InDuals: Model {
 }
 
 /// What [`Model::jacobian`] is asked for.
-pub(super) struct Asked<'a> {
+pub(super) struct JacobianRequest<'a> {
     pub(super) run: &'a Run,
     pub(super) shared: &'a [f64],
     pub(super) nuisance: &'a [f64],
@@ -34,11 +34,11 @@ pub(super) struct Asked<'a> {
 /// A free parameter: its column, whether it is shared, and its slot.
 type Free = (usize, bool, usize);
 
-impl Asked<'_> {
-    /// Fills `out` and `jacobian`.
-    pub(super) fn answer(
+impl JacobianRequest<'_> {
+    /// Fills `out` with the prediction of a model, and `jacobian` with its derivatives.
+    pub(super) fn fill(
         &self,
-        model: &impl InDuals,
+        model: &impl DualModel,
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
@@ -68,7 +68,7 @@ impl Asked<'_> {
     /// The columns of at most `N` parameters.
     fn columns<const N: usize>(
         &self,
-        model: &impl InDuals,
+        model: &impl DualModel,
         free: &[Free],
         out: &mut [f64],
         jacobian: &mut [f64],
@@ -84,7 +84,7 @@ impl Asked<'_> {
         }
         let moving: Vec<usize> = free.iter().filter(|f| f.1).map(|f| f.2).collect();
         let mut values = vec![DualSVec64::<N>::from(0.0); rows];
-        model.predict_in(self.run, &shared, &nuisance, &moving, &mut values)?;
+        model.predict_dual(self.run, &shared, &nuisance, &moving, &mut values)?;
         for (row, value) in values.iter().enumerate() {
             out[row] = value.re;
             for (i, (column, ..)) in free.iter().enumerate() {

@@ -1,6 +1,10 @@
 //! What every domain does with its table: runs, noise, resolution.
 
-use crate::recording::{Column, Header, ReadError, Table, quoted};
+use crate::recording::{Column, ReadError, Table, quoted};
+
+/// Standard gravity, m/s^2 (CGPM 1901).
+#[cfg(any(feature = "bounce", feature = "liquid-tilt", feature = "slosh", feature = "trajectory"))]
+pub(super) const GRAVITY_M_S2: f64 = 9.80665;
 
 /// A column of numbers.
 pub(super) const fn number<'a>(name: &'a str, what: &'a str) -> Column<'a> {
@@ -47,16 +51,41 @@ pub(super) fn check_runs(
     Ok(runs)
 }
 
+/// The middle one of some values, the upper one of the two in the middle where their number is even; `None` of nothing.
+#[cfg(any(feature = "grain-pour", feature = "slosh", feature = "trajectory"))]
+pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
 /// The calibrated sigma of each channel, where `[noise]` has one.
 ///
 /// # Errors
 /// [`ReadError::Value`].
-pub(super) fn calibration(header: &Header, channels: &[&str]) -> Result<Vec<Option<f64>>, ReadError> {
+#[cfg(any(
+    feature = "custom",
+    feature = "indentation",
+    feature = "liquid-tilt",
+    feature = "slosh",
+    feature = "trajectory"
+))]
+pub(super) fn calibration(
+    header: &crate::recording::Header,
+    channels: &[&str],
+) -> Result<Vec<Option<f64>>, ReadError> {
     let noise = header.section("noise")?;
     channels.iter().map(|name| noise.number(name, f64::MIN_POSITIVE, 1e12)).collect()
 }
 
 /// The step of a column's readings where they are clearly steps of one size, else 0.
+#[cfg(any(
+    feature = "bounce",
+    feature = "custom",
+    feature = "indentation",
+    feature = "liquid-tilt",
+    feature = "slosh",
+    feature = "trajectory"
+))]
 pub(super) fn resolution(column: &[f64]) -> f64 {
     let mut sorted = column.to_vec();
     sorted.sort_by(f64::total_cmp);

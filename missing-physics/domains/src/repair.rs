@@ -16,7 +16,7 @@ use missing_physics::diagnosis::Diagnosis;
 use missing_physics::repaired::{PredictedRun, Repaired, RepairedError};
 use serde::{Deserialize, Serialize};
 
-use crate::Domain;
+use crate::domain::Domain;
 use crate::recording::{ReadError, one_line, read_text};
 
 /// A repaired model of a domain.
@@ -116,7 +116,7 @@ impl Repair {
     /// # Errors
     /// [`RepairError`].
     pub fn predict(&self, folder: &Path) -> Result<Predicted, RepairError> {
-        let (domain, loaded) = crate::load_with_gaps(folder)?;
+        let (domain, loaded) = crate::registry::load_with_gaps(folder)?;
         let name = || folder.display().to_string();
         if domain.id() != self.domain {
             let (got, expected) = (domain.id(), self.domain.clone());

@@ -74,21 +74,21 @@ fn matrix(domain: &DomainScore) -> String {
 fn power(domain: &DomainScore) -> String {
     let sizes: Vec<f64> = domain.power.iter().map(|p| p.0).collect();
     let tool: Vec<f64> = domain.power.iter().map(|p| p.1.rate()).collect();
-    let told: Vec<f64> = domain.power.iter().map(|p| p.2.rate()).collect();
+    let test: Vec<f64> = domain.power.iter().map(|p| p.2.rate()).collect();
     if sizes.len() < 2 {
         return String::new();
     }
     let line = |class, y| Series { class, x: &sizes, y, points: false };
     let chart = Chart {
         title: "Detected at 5 %".into(),
-        x_label: "size: square root of the told likelihood ratio".into(),
+        x_label: "size: square root of the oracle's likelihood ratio".into(),
         y_label: "share".into(),
-        series: vec![line("before", &told), line("after", &tool)],
+        series: vec![line("before", &test), line("after", &tool)],
         shaded: None,
         band: None,
     };
     format!(
-        "<figure style=\"max-width:30rem\">{}<figcaption class=\"key\"><span><i style=\"background:var(--after)\"></i>the tool</span><span><i style=\"background:var(--before)\"></i>a likelihood-ratio test told the truth</span></figcaption></figure>",
+        "<figure style=\"max-width:30rem\">{}<figcaption class=\"key\"><span><i style=\"background:var(--after)\"></i>the tool</span><span><i style=\"background:var(--before)\"></i>a likelihood-ratio test that knows the truth</span></figcaption></figure>",
         chart.render()
     )
 }

@@ -47,12 +47,12 @@ pub struct DomainScore {
     pub domain: String,
     /// Worlds in which nothing is hidden that were doubted at 5 %.
     pub alarms_5: Part,
-    /// The same at 1 %.
+    /// Worlds in which nothing is hidden that were doubted at 1 %.
     pub alarms_1: Part,
     /// Worlds with listed effects that were doubted at 5 %.
     pub detected: Part,
-    /// The same by a likelihood-ratio test that was told what to look for.
-    pub told_detected: Part,
+    /// Worlds with listed effects that an oracle's likelihood-ratio test, which knows what to look for, doubts at 5 %.
+    pub oracle_detected: Part,
     /// Of the worlds where the data decide: `explained` by exactly what is hidden.
     pub right: Part,
     /// `ambiguous`, the truth among the rivals.
@@ -76,8 +76,8 @@ pub struct DomainScore {
     pub heldout_ratio: f64,
     /// Median time of a diagnosis in s (of this machine, as busy as it was).
     pub seconds: f64,
-    /// Detection against the size of an effect: `sqrt` of the told likelihood ratio at the middle of each bin, detected by the
-    /// tool, by the told test.
+    /// Detection against the size of an effect: `sqrt` of the oracle's likelihood ratio at the middle of each bin, detected by the
+    /// tool, by the oracle's test.
     pub power: Vec<(f64, Part, Part)>,
     /// What was answered to each single hidden mechanism: `confusion[truth][answer]`.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
@@ -95,11 +95,11 @@ pub struct Score {
     pub all: DomainScore,
 }
 
-/// Edges of the bins of `sqrt` of the told likelihood ratio.
+/// Edges of the bins of `sqrt` of the oracle's likelihood ratio.
 const EDGES: [f64; 9] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, f64::INFINITY];
 /// A place is found where an end of it is, to this part of the variable's extent.
 const CLOSE: f64 = 0.1;
-/// Where the told log Bayes factor against every rival is at least this, the data decide.
+/// Where the oracle's log Bayes factor against every rival is at least this, the data decide.
 const DECISIVE: f64 = 5.0;
 
 impl Score {
@@ -178,15 +178,15 @@ impl DomainScore {
             };
             *self.confusion.entry(single.clone()).or_default().entry(answer).or_default() += 1;
         }
-        if let Some(best) = &w.best {
-            self.told_detected.add(best.p_value <= 0.05);
-            let size = best.likelihood_ratio.sqrt();
+        if let Some(oracle) = &w.oracle {
+            self.oracle_detected.add(oracle.p_value <= 0.05);
+            let size = oracle.likelihood_ratio.sqrt();
             let bin = EDGES.windows(2).position(|e| size >= e[0] && size < e[1]);
-            if let Some((_, tool, told)) = bin.and_then(|b| self.power.get_mut(b)) {
+            if let Some((_, tool, test)) = bin.and_then(|b| self.power.get_mut(b)) {
                 tool.add(doubted);
-                told.add(best.p_value <= 0.05);
+                test.add(oracle.p_value <= 0.05);
             }
-            if best.decisive >= DECISIVE {
+            if oracle.decisive >= DECISIVE {
                 self.right.add(o.verdict == "explained" && chosen == truth);
                 self.ambiguous.add(o.verdict == "ambiguous" && holds);
                 self.wrong.add(wrong);
@@ -209,8 +209,8 @@ impl DomainScore {
                 self.covered.add((e.ci95[0]..=e.ci95[1]).contains(&p.value));
             }
         }
-        if let Some(best) = &w.best {
-            let pairs = w.outcome.heldout_rmse.iter().zip(&best.heldout_rmse);
+        if let Some(oracle) = &w.oracle {
+            let pairs = w.outcome.heldout_rmse.iter().zip(&oracle.heldout_rmse);
             let ratios: Vec<f64> = pairs.filter_map(|(a, b)| Some((*a)? / (*b)?)).collect();
             if !ratios.is_empty() {
                 self.ratios.push(ratios.iter().sum::<f64>() / ratios.len() as f64);
@@ -223,14 +223,14 @@ impl DomainScore {
         self.heldout_ratio = median(&mut self.ratios);
         self.seconds = median(&mut self.times);
         let mut merged: Vec<(f64, Part, Part)> = Vec::new();
-        for (middle, tool, told) in std::mem::take(&mut self.power) {
+        for (middle, tool, test) in std::mem::take(&mut self.power) {
             match merged.last_mut().filter(|last| last.1.of == 0) {
                 Some(last) => {
                     last.0 = middle;
                     last.1.join(tool);
-                    last.2.join(told);
+                    last.2.join(test);
                 }
-                None => merged.push((middle, tool, told)),
+                None => merged.push((middle, tool, test)),
             }
         }
         merged.retain(|bin| bin.1.of > 0);
@@ -241,9 +241,9 @@ impl DomainScore {
         let part = |p: Part| json!([p.hits, p.of]);
         let number = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
         let power: Vec<Value> =
-            self.power.iter().map(|(size, tool, told)| json!([size, part(*tool), part(*told)])).collect();
+            self.power.iter().map(|(size, tool, test)| json!([size, part(*tool), part(*test)])).collect();
         json!({"domain": self.domain, "false_alarms_5": part(self.alarms_5), "false_alarms_1": part(self.alarms_1),
-            "detected": part(self.detected), "told_detected": part(self.told_detected),
+            "detected": part(self.detected), "told_detected": part(self.oracle_detected),
             "right": part(self.right), "ambiguous": part(self.ambiguous), "wrong": part(self.wrong),
             "answer_set_holds": part(self.holds), "answer_set_size": number(self.set_size),
             "wrong_of_all": part(self.wrong_of_all), "unlisted_unexplained": part(self.unexplained),

@@ -10,7 +10,7 @@ pub(super) const MEASURES: [Measure; 15] = [
     ("false alarms at 5 %", "in the band", |s| banded(s.alarms_5, 0.05)),
     ("false alarms at 1 %", "in the band", |s| banded(s.alarms_1, 0.01)),
     ("listed effects detected", "", |s| part(s.detected)),
-    ("  by a test told the truth", "", |s| part(s.told_detected)),
+    ("  by a test told the truth", "", |s| part(s.oracle_detected)),
     ("where the data decide: named right", ">= 90 %", |s| part(s.right)),
     ("  honestly ambiguous", "", |s| part(s.ambiguous)),
     ("  wrong name", "<= 5 %", |s| part(s.wrong)),

@@ -11,15 +11,20 @@ use missing_physics::oracle::{Oracle, oracle};
 use serde::{Deserialize, Serialize};
 use worlds::concealed::{Concealed, Hidden, Key, Maker};
 
-use crate::{ProveError, write_whole};
-use missing_physics_domains::{self as domains, recording::read_text};
+use missing_physics_domains as domains;
 use missing_physics_report::{self as report, ReportContext};
+
+use crate::error::ProveError;
+use crate::files::{make_folder, read_json, write_json, write_whole};
 
 /// Kinds of worlds, in the order in which they take turns: 40 % nothing, 30 % one, 15 % two, 15 % unlisted.
 const TURNS: [Hidden; 20] = {
     use Hidden::{Nothing as N, One as O, Two as T, Unlisted as U};
     [N, O, N, U, O, N, T, N, O, N, O, T, N, U, O, N, T, N, O, U]
 };
+
+/// The file of what an oracle finds in a world.
+const ORACLE: &str = "oracle.json";
 
 /// One world.
 pub(super) struct World {
@@ -62,10 +67,10 @@ pub(super) struct Located {
     pub(super) extent: Option<f64>,
 }
 
-/// What somebody who was told the truth finds.
+/// What somebody who knows the truth finds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Best {
+pub(super) struct OracleFit {
     pub(super) likelihood_ratio: f64,
     pub(super) p_value: f64,
     pub(super) decisive: f64,
@@ -80,7 +85,7 @@ pub(super) struct Judged {
     pub(super) key: Key,
     pub(super) outcome: Outcome,
     /// Where listed mechanisms are at work.
-    pub(super) best: Option<Best>,
+    pub(super) oracle: Option<OracleFit>,
 }
 
 impl World {
@@ -106,12 +111,11 @@ impl World {
     /// Writes the recording and diagnoses it from its files, unless that has been done.
     pub(super) fn diagnose(&self) -> Result<(), ProveError> {
         let path = self.folder.join("outcome.json");
-        if read::<Outcome>(&path).is_some() {
+        if read_json::<Outcome>(&path).is_some() {
             return Ok(());
         }
         let recording = self.recording();
-        let fail = |e: std::io::Error| ProveError::Other(format!("{}: {e}", recording.display()));
-        std::fs::create_dir_all(&recording).map_err(fail)?;
+        make_folder(&recording)?;
         for (name, contents) in &self.draw().files {
             write_whole(&recording.join(name), contents)?;
         }
@@ -119,41 +123,43 @@ impl World {
         let (domain, loaded) = domains::load(&recording)?;
         let options = self.options();
         let found = diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent)
-            .map_err(|e| ProveError::Other(format!("{}: {e}", recording.display())))?;
+            .map_err(|error| ProveError::Diagnose { recording: recording.clone(), error })?;
         let seconds = begin.elapsed().as_secs_f64();
         let context = ReportContext {
             domain: domain.id().into(),
             recording: format!("{}/recording", self.name),
             title: self.name.clone(),
+            citations: vec![domains::THESIS.into()],
             additions: loaded.additions,
         };
         write_whole(&self.folder.join("answer.json"), report::json(&found, &context))?;
         write_whole(&self.folder.join("report.html"), report::html(&found, &context))?;
-        write(&path, &Outcome::of(&found, &loaded.recording, seconds))
+        write_json(&path, &Outcome::of(&found, &loaded.recording, seconds))
     }
 
     /// Fits what is truly at work, unless that has been done.
-    pub(super) fn tell_truth(&self) -> Result<(), ProveError> {
+    pub(super) fn fit_oracle(&self) -> Result<(), ProveError> {
         let truth = self.draw().key.mechanisms;
-        let path = self.folder.join("told.json");
-        if truth.is_empty() || read::<Best>(&path).is_some() {
+        let path = self.folder.join(ORACLE);
+        if truth.is_empty() || read_json::<OracleFit>(&path).is_some() {
             return Ok(());
         }
-        let (_, loaded) = domains::load(&self.recording())?;
+        let recording = self.recording();
+        let (_, loaded) = domains::load(&recording)?;
         let found = oracle(&*loaded.model, &loaded.recording, &truth, &self.options())
-            .map_err(|e| ProveError::Other(format!("{}: {e}", self.name)))?;
-        write(&path, &Best::of(&found))
+            .map_err(|error| ProveError::Diagnose { recording, error })?;
+        write_json(&path, &OracleFit::of(&found))
     }
 
     pub(super) fn judged(&self) -> Result<Judged, ProveError> {
-        let missing = |what: &str| ProveError::Other(format!("{}: {what} is missing", self.folder.display()));
+        let missing = |file| ProveError::Missing { folder: self.folder.clone(), file };
         let key = self.draw().key;
-        let best = read::<Best>(&self.folder.join("told.json"));
-        if best.is_none() && !key.mechanisms.is_empty() {
-            return Err(missing("told.json"));
+        let oracle = read_json::<OracleFit>(&self.folder.join(ORACLE));
+        if oracle.is_none() && !key.mechanisms.is_empty() {
+            return Err(missing(ORACLE));
         }
-        let outcome = read(&self.folder.join("outcome.json")).ok_or_else(|| missing("outcome.json"))?;
-        Ok(Judged { domain: self.maker.name(), name: self.name.clone(), key, outcome, best })
+        let outcome = read_json(&self.folder.join("outcome.json")).ok_or_else(|| missing("outcome.json"))?;
+        Ok(Judged { domain: self.maker.name(), name: self.name.clone(), key, outcome, oracle })
     }
 
     fn recording(&self) -> PathBuf {
@@ -196,7 +202,7 @@ impl Outcome {
     }
 }
 
-impl Best {
+impl OracleFit {
     fn of(t: &Oracle) -> Self {
         /// Far beyond any threshold, and a number in JSON.
         const MOST: f64 = 1e9;
@@ -219,15 +225,4 @@ fn extent(recording: &Recording, variable: &str) -> Option<f64> {
 
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
-}
-
-/// A file that is there and whole.
-fn read<T: for<'d> Deserialize<'d>>(path: &Path) -> Option<T> {
-    serde_json::from_str(&read_text(path).ok()?).ok()
-}
-
-fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), ProveError> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|e| ProveError::Other(format!("{}: {e}", path.display())))?;
-    write_whole(path, &(text + "\n"))
 }

@@ -2,9 +2,11 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Verdict};
+use missing_physics::diagnosis::{
+    Confusion, Diagnosis, Law, MechanismReport, NextExperiment, Outlier, Verdict,
+};
 
-use super::ReportContext;
+use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::plots;
 use super::svg::{CHART_STYLE, escape};
@@ -25,103 +27,118 @@ ul{margin:.3rem 0;padding-left:1.2rem}code{font-size:.92em}@media print{body{max
 /// The page.
 pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     let mut page = String::with_capacity(64 * 1024);
+    page.push_str(&head(d, context));
+    let misses: Vec<String> = d.location.iter().map(|l| where_sentence(d, l)).collect();
+    section(&mut page, "Where it misses", &list(&misses));
+    if d.verdict != Verdict::Adequate {
+        section(&mut page, "How probable each mechanism is", &plots::probabilities(d));
+        section(&mut page, "What was left out", &parameters(d, &context.citations));
+    }
+    section(&mut page, "The law in the residual", &d.law.as_ref().map(law).unwrap_or_default());
+    section(&mut page, "How much better", &errors(d));
+    let confused = d.confusion.as_ref().map(confusion).unwrap_or_default();
+    section(&mut page, "How the rivals are confused", &confused);
+    section(&mut page, "Do this next", &d.next_experiment.as_ref().map(next).unwrap_or_default());
+    let unsure: Vec<String> = d.undetermined.iter().chain(&d.remarks).cloned().collect();
+    section(&mut page, "What these data cannot say", &list(&unsure));
+    section(&mut page, "Data and fits", &format!("{CURVES_KEY}{}", plots::channels(d)));
+    let noise: Vec<String> = d.noise.iter().map(|n| noise_sentence(d, n)).collect();
+    section(&mut page, "Noise", &list(&noise));
+    section(&mut page, "Rows set aside", &outliers(d));
+    section(&mut page, &format!("Adequacy of the baseline: {}", p_value(d)), &tests(d));
+    page.push_str("</body></html>\n");
+    page
+}
+
+/// Everything before the first section: style, title, verdict, headline, baseline.
+fn head(d: &Diagnosis, context: &ReportContext) -> String {
     let word = d.verdict.word();
-    // Writing to a string cannot fail.
-    let _ = write!(
-        page,
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0}: {word}</title><style>{CHART_STYLE}{STYLE}</style></head><body><p class=\"kicker\">{0} &#183; {1} &#183; {2} runs</p><p><span class=\"verdict {word}\">{word}</span></p><h1>{3}</h1>",
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0}: {word}</title><style>{CHART_STYLE}{STYLE}</style></head><body><p class=\"kicker\">{0} &#183; {1} &#183; {2} runs</p><p><span class=\"verdict {word}\">{word}</span></p><h1>{3}</h1><p>Baseline: {4}.</p>",
         escape(&context.title),
         escape(&context.domain),
         d.curves.len(),
-        escape(&headline(d))
-    );
-    let _ = write!(page, "<p>Baseline: {}.</p>", escape(&d.baseline));
-    section(
-        &mut page,
-        "Where it misses",
-        &list(&d.location.iter().map(|l| where_sentence(d, l)).collect::<Vec<_>>()),
-    );
-    if d.verdict != Verdict::Adequate {
-        section(&mut page, "How probable each mechanism is", &plots::probabilities(d));
-        section(&mut page, "What was left out", &parameters(d));
+        escape(&headline(d)),
+        escape(&d.baseline)
+    )
+}
+
+/// A law with its kind and its coefficients.
+fn law(law: &Law) -> String {
+    let coefficients: Vec<String> = law.coefficients.iter().map(estimate).collect();
+    format!(
+        "<p><code>{}</code></p><p class=\"note\">{}</p>{}",
+        escape(&law.formula),
+        escape(law_kind(law.kind)),
+        list(&coefficients)
+    )
+}
+
+/// Shares of data from each rival that were taken for each.
+fn confusion(confusion: &Confusion) -> String {
+    let mut table = String::from("<table><tr><th>data from</th>");
+    // Writing to a string cannot fail.
+    for set in &confusion.sets {
+        let _ = write!(table, "<th>taken for {}</th>", escape(&listed(set)));
     }
-    if let Some(law) = &d.law {
-        let coefficients: Vec<String> = law.coefficients.iter().map(estimate).collect();
-        let body = format!(
-            "<p><code>{}</code></p><p class=\"note\">{}</p>{}",
-            escape(&law.formula),
-            escape(law_kind(law.kind)),
-            list(&coefficients)
-        );
-        section(&mut page, "The law in the residual", &body);
-    }
-    section(&mut page, "How much better", &errors(d));
-    if let Some(confusion) = &d.confusion {
-        let mut table = String::from("<table><tr><th>data from</th>");
-        for set in &confusion.sets {
-            let _ = write!(table, "<th>taken for {}</th>", escape(&listed(set)));
+    table.push_str("</tr>");
+    for (set, row) in confusion.sets.iter().zip(&confusion.matrix) {
+        let _ = write!(table, "<tr><th scope=\"row\">{}</th>", escape(&listed(set)));
+        for share in row {
+            let _ = write!(
+                table,
+                "<td class=\"num\" style=\"background:color-mix(in srgb,var(--after) {:.0}%,transparent)\">{:.0} %</td>",
+                50.0 * share,
+                100.0 * share
+            );
         }
         table.push_str("</tr>");
-        for (set, row) in confusion.sets.iter().zip(&confusion.matrix) {
-            let _ = write!(table, "<tr><th scope=\"row\">{}</th>", escape(&listed(set)));
-            for share in row {
-                let _ = write!(
-                    table,
-                    "<td class=\"num\" style=\"background:color-mix(in srgb,var(--after) {:.0}%,transparent)\">{:.0} %</td>",
-                    50.0 * share,
-                    100.0 * share
-                );
-            }
-            table.push_str("</tr>");
-        }
-        table.push_str("</table><p class=\"note\">By simulation from each rival's fit.</p>");
-        section(&mut page, "How the rivals are confused", &table);
     }
-    if let Some(next) = &d.next_experiment {
-        let body = format!(
-            "<p>{}: separates {} (expected log Bayes factor {}).</p>",
-            escape(&next.words),
-            escape(&listed(&next.separates)),
-            significant(next.expected_log_bayes_factor, 2)
-        );
-        section(&mut page, "Do this next", &body);
-    }
-    let unsure: Vec<String> = d.undetermined.iter().chain(&d.remarks).cloned().collect();
-    section(&mut page, "What these data cannot say", &list(&unsure));
-    let key = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>baseline</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>without these rows the baseline would hold</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
-    section(&mut page, "Data and fits", &format!("{key}{}", plots::channels(d)));
-    let noise: Vec<String> = d.noise.iter().map(|n| noise_sentence(d, n)).collect();
-    section(&mut page, "Noise", &list(&noise));
-    let outliers: Vec<String> = d
-        .outliers
-        .iter()
-        .map(|o| {
-            format!(
-                "run {}, row {}, {}: {:.0} sigma from what all other rows say",
-                o.run,
-                o.row + 1,
-                o.channel,
-                o.z.abs()
-            )
-        })
-        .collect();
-    section(&mut page, "Rows set aside", &list(&outliers));
-    let mut tests = String::from(
+    table + "</table><p class=\"note\">By simulation from each rival's fit.</p>"
+}
+
+/// The next experiment and what it separates.
+fn next(next: &NextExperiment) -> String {
+    format!(
+        "<p>{}: separates {} (expected log Bayes factor {}).</p>",
+        escape(&next.words),
+        escape(&listed(&next.separates)),
+        significant(next.expected_log_bayes_factor, 2)
+    )
+}
+
+/// What the colours of the curves mean.
+const CURVES_KEY: &str = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>baseline</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>without these rows the baseline would hold</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
+
+/// The rows that were set aside, a line each.
+fn outliers(d: &Diagnosis) -> String {
+    let line = |o: &Outlier| {
+        format!(
+            "run {}, row {}, {}: {:.0} sigma from what all other rows say",
+            o.run,
+            o.row + 1,
+            o.channel,
+            o.z.abs()
+        )
+    };
+    list(&d.outliers.iter().map(line).collect::<Vec<_>>())
+}
+
+/// The tests of adequacy, folded away.
+fn tests(d: &Diagnosis) -> String {
+    let mut table = String::from(
         "<details><summary>The tests behind the p-value</summary><table><tr><th>test</th><th>statistic</th><th>its own p</th></tr>",
     );
     for t in &d.tests {
         let _ = write!(
-            tests,
+            table,
             "<tr><td>{}</td><td class=\"num\">{}</td><td class=\"num\">{}</td></tr>",
             escape(&t.name),
             significant(t.statistic, 3),
             significant(t.p_value, 2)
         );
     }
-    tests.push_str("</table></details>");
-    section(&mut page, &format!("Adequacy of the baseline: {}", p_value(d)), &tests);
-    page.push_str("</body></html>\n");
-    page
+    table + "</table></details>"
 }
 
 /// A section; nothing where it would be empty.
@@ -139,13 +156,13 @@ fn list(lines: &[String]) -> String {
     format!("<ul>{items}</ul>")
 }
 
-fn parameters(d: &Diagnosis) -> String {
+/// What is known of the mechanisms in the answer, and the sources that are cited for them by a key.
+fn parameters(d: &Diagnosis, citations: &[String]) -> String {
     let said = |id: &String| d.chosen.contains(id) || d.confused_with.iter().flatten().any(|o| o == id);
     let mut table =
         String::from("<table><tr><th>mechanism</th><th>equation</th><th>parameters</th><th>source</th></tr>");
-    let mut any = false;
-    for m in d.mechanisms.iter().filter(|m| said(&m.id)) {
-        any = true;
+    let shown: Vec<&MechanismReport> = d.mechanisms.iter().filter(|m| said(&m.id)).collect();
+    for m in &shown {
         let values: Vec<String> = m.parameters.iter().map(|e| escape(&estimate(e))).collect();
         let _ = write!(
             table,
@@ -157,7 +174,11 @@ fn parameters(d: &Diagnosis) -> String {
         );
     }
     table.push_str("</table>");
-    if any { table } else { String::new() }
+    let key = |citation: &str| citation.split_inclusive(']').next().unwrap_or_default().to_owned();
+    for citation in citations.iter().filter(|c| shown.iter().any(|m| m.reference.contains(&key(c)))) {
+        let _ = write!(table, "<p class=\"note\">{}</p>", escape(citation));
+    }
+    if shown.is_empty() { String::new() } else { table }
 }
 
 fn errors(d: &Diagnosis) -> String {

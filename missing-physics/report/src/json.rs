@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use missing_physics::diagnosis::{ChannelFit, Diagnosis, Estimate};
+use missing_physics::diagnosis::{
+    ChannelFit, ChannelNoise, Confusion, Diagnosis, Estimate, Law, Location, MechanismReport, NextExperiment,
+    Outlier, SetReport, TestOutcome,
+};
 use serde::Serialize;
 use serde_json::{Value, json as value};
 
-use super::ReportContext;
+use super::context::ReportContext;
 
 #[derive(Serialize)]
 struct Answer<'a> {
@@ -48,87 +51,82 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
         recording: &context.recording,
         verdict: d.verdict.word(),
         p_value: d.p_value,
-        noise: d
-            .noise
-            .iter()
-            .map(|n| {
-                value!({"channel": n.channel, "sigma": n.sigma, "source": n.source.word(),
-                    "correlated_share": n.correlated_share, "correlation_length": n.correlation_length})
-            })
-            .collect(),
-        places: d
-            .location
-            .iter()
-            .map(|l| {
-                value!({"channel": l.channel, "variable": l.variable, "from": l.from, "to": l.to, "runs": l.runs,
-                    "share": l.share, "mean_residual": l.mean_residual, "z": l.z,
-                    "largest_residual": l.largest_residual})
-            })
-            .collect(),
-        mechanisms: d
-            .mechanisms
-            .iter()
-            .map(|m| {
-                let rmse: BTreeMap<&str, f64> = m.heldout_rmse.iter().map(|(c, v)| (c.as_str(), *v)).collect();
-                value!({"id": m.id, "name": m.name, "probability": m.probability.clamp(0.0, 1.0),
-                    "parameters": estimates(&m.parameters),
-                    "heldout_log_score_gain": m.heldout_log_score_gain, "heldout_rmse": rmse,
-                    "ruled_out": m.ruled_out})
-            })
-            .collect(),
+        noise: d.noise.iter().map(noise).collect(),
+        places: d.location.iter().map(place).collect(),
+        mechanisms: d.mechanisms.iter().map(mechanism).collect(),
         chosen: &d.chosen,
         confused_with: &d.confused_with,
         fit: value!({"before": fits(&d.before), "after": fits(&d.after)}),
-        law: d.law.as_ref().map_or(Value::Null, |l| {
-            let rmse: BTreeMap<&str, Value> = l
-                .heldout_rmse
-                .iter()
-                .map(|(c, without, with)| (c.as_str(), value!({"without": without, "with": with})))
-                .collect();
-            let pair = |(name, unit): &(String, String)| value!({"name": name, "unit": unit});
-            value!({"formula": l.formula, "kind": l.kind, "adds_to": pair(&l.adds_to),
-                "variables": l.variables.iter().map(pair).collect::<Vec<_>>(),
-                "coefficients": estimates(&l.coefficients), "heldout_rmse": rmse,
-                "heldout_log_score_gain": l.heldout_log_score_gain})
-        }),
-        next_experiment: d.next_experiment.as_ref().map_or(Value::Null, |n| {
-            let action: BTreeMap<&str, f64> = n.action.iter().map(|(k, v)| (k.as_str(), *v)).collect();
-            value!({"action": action, "separates": n.separates,
-                "expected_log_bayes_factor": n.expected_log_bayes_factor, "words": n.words})
-        }),
+        law: d.law.as_ref().map_or(Value::Null, law),
+        next_experiment: d.next_experiment.as_ref().map_or(Value::Null, next_experiment),
         p_floor: d.p_floor,
         final_p_value: d.final_p_value,
         baseline: &d.baseline,
         baseline_parameters: estimates(&d.baseline_parameters),
-        sets: d
-            .sets
-            .iter()
-            .map(|s| {
-                value!({"ids": s.ids, "probability": s.probability, "p_value": s.p_value,
-                    "heldout_log_score_gain": s.heldout_log_score_gain})
-            })
-            .collect(),
-        confusion: d
-            .confusion
-            .as_ref()
-            .map_or(Value::Null, |c| value!({"sets": c.sets, "matrix": c.matrix})),
-        tests: d
-            .tests
-            .iter()
-            .map(|t| value!({"name": t.name, "statistic": t.statistic, "p_value": t.p_value}))
-            .collect(),
+        sets: d.sets.iter().map(set).collect(),
+        confusion: d.confusion.as_ref().map_or(Value::Null, confusion),
+        tests: d.tests.iter().map(test).collect(),
         undetermined: &d.undetermined,
-        outliers: d
-            .outliers
-            .iter()
-            .map(|o| value!({"run": o.run, "row": o.row, "channel": o.channel, "z": o.z}))
-            .collect(),
+        outliers: d.outliers.iter().map(outlier).collect(),
         remarks: &d.remarks,
     };
     // Numbers, texts and lists always serialise.
     let mut text = serde_json::to_string_pretty(&answer).unwrap_or_default();
     text.push('\n');
     text
+}
+
+fn noise(n: &ChannelNoise) -> Value {
+    value!({"channel": n.channel, "sigma": n.sigma, "source": n.source.word(),
+        "correlated_share": n.correlated_share, "correlation_length": n.correlation_length})
+}
+
+fn place(l: &Location) -> Value {
+    value!({"channel": l.channel, "variable": l.variable, "from": l.from, "to": l.to, "runs": l.runs,
+        "share": l.share, "mean_residual": l.mean_residual, "z": l.z, "largest_residual": l.largest_residual})
+}
+
+fn mechanism(m: &MechanismReport) -> Value {
+    let rmse: BTreeMap<&str, f64> = m.heldout_rmse.iter().map(|(c, v)| (c.as_str(), *v)).collect();
+    value!({"id": m.id, "name": m.name, "probability": m.probability.clamp(0.0, 1.0),
+        "parameters": estimates(&m.parameters), "heldout_log_score_gain": m.heldout_log_score_gain,
+        "heldout_rmse": rmse, "ruled_out": m.ruled_out})
+}
+
+fn law(l: &Law) -> Value {
+    let rmse: BTreeMap<&str, Value> = l
+        .heldout_rmse
+        .iter()
+        .map(|(c, without, with)| (c.as_str(), value!({"without": without, "with": with})))
+        .collect();
+    let quantity = |(name, unit): &(String, String)| value!({"name": name, "unit": unit});
+    value!({"formula": l.formula, "kind": l.kind, "adds_to": quantity(&l.adds_to),
+        "variables": l.variables.iter().map(quantity).collect::<Vec<_>>(),
+        "coefficients": estimates(&l.coefficients), "heldout_rmse": rmse,
+        "heldout_log_score_gain": l.heldout_log_score_gain})
+}
+
+fn next_experiment(n: &NextExperiment) -> Value {
+    let action: BTreeMap<&str, f64> = n.action.iter().map(|(k, v)| (k.as_str(), *v)).collect();
+    value!({"action": action, "separates": n.separates,
+        "expected_log_bayes_factor": n.expected_log_bayes_factor, "words": n.words})
+}
+
+fn set(s: &SetReport) -> Value {
+    value!({"ids": s.ids, "probability": s.probability, "p_value": s.p_value,
+        "heldout_log_score_gain": s.heldout_log_score_gain})
+}
+
+fn confusion(c: &Confusion) -> Value {
+    value!({"sets": c.sets, "matrix": c.matrix})
+}
+
+fn test(t: &TestOutcome) -> Value {
+    value!({"name": t.name, "statistic": t.statistic, "p_value": t.p_value})
+}
+
+fn outlier(o: &Outlier) -> Value {
+    value!({"run": o.run, "row": o.row, "channel": o.channel, "z": o.z})
 }
 
 fn estimates(list: &[Estimate]) -> Vec<Value> {

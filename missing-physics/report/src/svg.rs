@@ -104,43 +104,8 @@ impl Chart<'_> {
                 b - a
             );
         }
-        for tick in ticks(x0, x1) {
-            let x = px(tick.0);
-            let bottom = HEIGHT - BOTTOM;
-            let _ = write!(
-                svg,
-                "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\"/><text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
-                bottom + 14.0,
-                tick.1
-            );
-        }
-        for tick in ticks(y0, y1) {
-            let y = py(tick.0);
-            let _ = write!(
-                svg,
-                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                WIDTH - RIGHT,
-                LEFT - 6.0,
-                y + 3.5,
-                tick.1
-            );
-        }
-        for series in &self.series {
-            let stride = series.x.len().div_ceil(MOST_POINTS).max(1);
-            let rows =
-                series.x.iter().zip(series.y).step_by(stride).filter(|(x, y)| x.is_finite() && y.is_finite());
-            let class = series.class;
-            if series.points {
-                let _ = write!(svg, "<g class=\"{class}\">");
-                for (x, y) in rows {
-                    let _ = write!(svg, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"1.8\"/>", px(*x), py(*y));
-                }
-                svg.push_str("</g>");
-            } else {
-                let points: Vec<String> = rows.map(|(x, y)| format!("{:.1},{:.1}", px(*x), py(*y))).collect();
-                let _ = write!(svg, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
-            }
-        }
+        svg.push_str(&grid((x0, x1), (y0, y1), &px, &py));
+        self.series.iter().for_each(|series| svg.push_str(&series.marks(&px, &py)));
         let middle = LEFT + 0.5 * (WIDTH - LEFT - RIGHT);
         let half = TOP + 0.5 * (HEIGHT - TOP - BOTTOM);
         let _ = write!(
@@ -152,6 +117,61 @@ impl Chart<'_> {
         );
         svg
     }
+}
+
+impl Series<'_> {
+    /// The series as dots or as a line; `px` and `py` say where a number stands.
+    fn marks(&self, px: &impl Fn(f64) -> f64, py: &impl Fn(f64) -> f64) -> String {
+        let mut svg = String::new();
+        // Writing to a string cannot fail.
+        let stride = self.x.len().div_ceil(MOST_POINTS).max(1);
+        let rows = self.x.iter().zip(self.y).step_by(stride).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let class = self.class;
+        if self.points {
+            let _ = write!(svg, "<g class=\"{class}\">");
+            for (x, y) in rows {
+                let _ = write!(svg, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"1.8\"/>", px(*x), py(*y));
+            }
+            svg.push_str("</g>");
+        } else {
+            let points: Vec<String> = rows.map(|(x, y)| format!("{:.1},{:.1}", px(*x), py(*y))).collect();
+            let _ = write!(svg, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
+        }
+        svg
+    }
+}
+
+/// Lines at round numbers with their labels; `px` and `py` say where a number stands.
+fn grid(
+    (x0, x1): (f64, f64),
+    (y0, y1): (f64, f64),
+    px: &impl Fn(f64) -> f64,
+    py: &impl Fn(f64) -> f64,
+) -> String {
+    let mut svg = String::new();
+    // Writing to a string cannot fail.
+    for tick in ticks(x0, x1) {
+        let x = px(tick.0);
+        let bottom = HEIGHT - BOTTOM;
+        let _ = write!(
+            svg,
+            "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\"/><text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+            bottom + 14.0,
+            tick.1
+        );
+    }
+    for tick in ticks(y0, y1) {
+        let y = py(tick.0);
+        let _ = write!(
+            svg,
+            "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            WIDTH - RIGHT,
+            LEFT - 6.0,
+            y + 3.5,
+            tick.1
+        );
+    }
+    svg
 }
 
 /// Charts side by side as a picture that stands alone, with lines of words below.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use missing_physics::diagnosis::{Diagnosis, Location, MechanismReport, Verdict};
 
-use super::ReportContext;
+use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, probability, significant};
 
 const WIDTH: usize = 100;

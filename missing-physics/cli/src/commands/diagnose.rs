@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use missing_physics::engine::{Options, diagnose as run};
 use missing_physics::observer::Observer;
 
-use super::{CommandError, write_whole};
+use super::error::{CommandError, write_whole};
 use missing_physics_domains as domains;
 use missing_physics_domains::repair::{Repair, RepairError};
 use missing_physics_report::{self as report, ReportContext};
@@ -37,19 +37,17 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
     for path in arguments.json.iter().chain(&arguments.html).chain(&arguments.svg).chain(&arguments.model) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
-            return Err(CommandError::Other(format!("{}: no such folder to write to", folder.display())));
+            return Err(CommandError::NoFolder { folder: folder.into() });
         }
         if path.is_dir() {
-            return Err(CommandError::Other(format!(
-                "{}: a folder, expected the name of a file",
-                path.display()
-            )));
+            return Err(CommandError::NotAFile { path: path.into() });
         }
     }
+    let threads = arguments.threads;
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads)
+        .num_threads(threads)
         .build()
-        .map_err(|e| CommandError::Other(format!("{} threads cannot be had: {e}", arguments.threads)))?;
+        .map_err(|error| CommandError::Threads { threads, error })?;
     let (domain, loaded) = pool.install(|| domains::load(&arguments.folder))?;
     if arguments.model.is_some() && !domain.predicts() {
         return Err(RepairError::NoChannels { domain: domain.id() }.into());
@@ -65,6 +63,7 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
             .folder
             .file_name()
             .map_or_else(|| "recording".into(), |n| n.to_string_lossy().into_owned()),
+        citations: vec![domains::THESIS.into()],
         additions: loaded.additions,
     };
     if let Some(path) = &arguments.json {

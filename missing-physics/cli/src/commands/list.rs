@@ -5,8 +5,8 @@ use std::path::Path;
 
 use missing_physics::model::Scope;
 
-use super::CommandError;
-use missing_physics_domains as domains;
+use super::error::CommandError;
+use missing_physics_domains::{self as domains, Contents};
 
 /// Describes every domain: baseline, files, mechanisms with equation and source.
 pub fn domains() -> String {
@@ -40,34 +40,29 @@ pub fn domains() -> String {
                 writeln!(text, "    {} += c {}, c in {}", term.adds_to.name, term.formula, parameter.unit);
         }
     }
+    let _ = writeln!(text, "\n{}", domains::THESIS);
     text
 }
 
-/// Reads and validates a recording, and says what is in it.
+/// Reads and validates a recording, and says what is in it; nothing is learned, drawn or simulated for it.
 ///
 /// # Errors
 /// [`CommandError::Read`].
 pub fn check(folder: &Path) -> Result<String, CommandError> {
-    let (domain, loaded) = domains::load(folder)?;
-    let recording = &loaded.recording;
-    let rows: usize = recording.runs.iter().map(missing_physics::data::Run::len).sum();
-    let names: Vec<&str> = recording.channels.iter().map(|c| c.name.as_str()).collect();
-    let spec = loaded.model.spec();
+    let (domain, checked) = domains::check(folder)?;
+    let Contents { channels, calibration, variable, runs, spec } = &checked.contents;
+    let rows: usize = runs.iter().map(|r| r.rows).sum();
+    let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
     let mut text = String::new();
     let _ = writeln!(text, "{}: a sound recording of the domain {}", folder.display(), domain.id());
-    let _ = writeln!(text, "  {} runs, {rows} rows; measured: {}", recording.runs.len(), names.join(", "));
-    for run in &recording.runs {
-        let from = run.inputs[0].first().copied().unwrap_or(0.0);
-        let to = run.inputs[0].last().copied().unwrap_or(0.0);
-        let _ = writeln!(text, "    run {}: {} rows, {from} to {to} s", run.label, run.len());
+    let _ = writeln!(text, "  {} runs, {rows} rows; measured: {}", runs.len(), names.join(", "));
+    for run in runs {
+        let [from, to] = run.from_to;
+        let line = format!("    run {}: {} rows, {from} to {to} {}", run.label, run.rows, variable.unit);
+        let _ = writeln!(text, "{}", line.trim_end());
     }
-    let calibrated: Vec<&str> = recording
-        .channels
-        .iter()
-        .zip(&recording.calibration)
-        .filter(|(_, s)| s.is_some())
-        .map(|(c, _)| c.name.as_str())
-        .collect();
+    let calibrated: Vec<&str> =
+        names.iter().zip(calibration).filter(|(_, sigma)| sigma.is_some()).map(|(name, _)| *name).collect();
     let calibrated =
         if calibrated.is_empty() { "none, it will be estimated".into() } else { calibrated.join(", ") };
     let _ = writeln!(text, "  calibrated noise: {calibrated}");

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{CommandError, write_whole};
+use super::error::{CommandError, write_whole};
 use missing_physics_domains as domains;
 
 /// Writes a template of a domain into a folder that is new or empty.
@@ -10,15 +10,12 @@ use missing_physics_domains as domains;
 /// # Errors
 /// [`CommandError`] for an unknown domain or a folder that holds something.
 pub fn new(domain: &str, folder: &Path) -> Result<String, CommandError> {
-    let domain = domains::find(domain).map_err(CommandError::Other)?;
-    let fail = |e: std::io::Error| CommandError::Other(format!("{}: {e}", folder.display()));
+    let domain = domains::find(domain)?;
+    let fail = |error| CommandError::Io { path: folder.into(), error };
     if folder.exists() {
         let empty = folder.is_dir() && std::fs::read_dir(folder).map_err(fail)?.next().is_none();
         if !empty {
-            return Err(CommandError::Other(format!(
-                "{}: exists, expected a new or empty folder",
-                folder.display()
-            )));
+            return Err(CommandError::NotEmpty { folder: folder.into() });
         }
     }
     std::fs::create_dir_all(folder).map_err(fail)?;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::{CommandError, write_whole};
+use super::error::{CommandError, write_whole};
 use missing_physics_domains::repair::Repair;
 
 /// Half the width of a 95 % interval of a normal law, in sigmas.

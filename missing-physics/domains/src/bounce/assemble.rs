@@ -5,45 +5,188 @@ use missing_physics::data::Recording;
 use missing_physics::model::Quantity;
 
 use super::array::Microphones;
-use super::drop::{Drop, Effects};
+use super::drop::Drop;
+use super::effects::Effects;
 use super::experiments::{experiments, of_times};
-use super::model::{BounceModel, COPIES, Setup};
+use super::model::{BounceModel, COPIES};
 use super::read::{Heard, Rig};
-use super::spread::{Known, judge, released};
-use super::times::TimesModel;
-use crate::Loaded;
+use super::rows::Rows;
+use super::setup::Setup;
+use super::spec::build;
+use super::spread::{Calibration, judge, released};
+use super::times::{TimesModel, build_times};
+use crate::domain::{Contents, Loaded, RunContents};
 use crate::reading::resolution;
 
 /// A ball that keeps all its speed cannot be, but clocks err.
 const LIKELY_RESTITUTION: [f64; 2] = [0.05, 1.2];
 
-/// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
-pub(super) fn assemble(
-    mut heard: Vec<Heard>,
-    rig: &Rig,
-    known: Known,
-    microphones: &Microphones,
-) -> Result<Loaded, (usize, String)> {
-    let (restitution, missed) = listen(&mut heard, rig);
-    let setup = Setup {
-        gravity_m_s2: rig.gravity_m_s2,
-        drag_unit: rig.drag_unit,
-        placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
-        dropped: rig.drop_height_m.is_some(),
-        released: released(heard.len()),
-        listened: heard.iter().any(|h| !h.drop.loudness.is_empty()),
-        unheard: [missed, heard.len()],
-        microphones: microphones.places_m.len(),
-    };
-    if setup.placed {
-        placed(&heard, setup, restitution, known, microphones)
-    } else {
-        Ok(timed(&heard, rig, setup, restitution, known))
+/// The drops of a recording with all that is known of them: impacts that went unheard are marked.
+pub(super) struct Drops {
+    heard: Vec<Heard>,
+    rig: Rig,
+    calibration: Calibration,
+    microphones: Microphones,
+    setup: Setup,
+    restitution: f64,
+}
+
+impl Drops {
+    pub(super) fn new(
+        mut heard: Vec<Heard>,
+        rig: Rig,
+        calibration: Calibration,
+        microphones: Microphones,
+    ) -> Self {
+        let (restitution, missed) = mark_unheard(&mut heard, &rig);
+        let setup = Setup {
+            gravity_m_s2: rig.gravity_m_s2,
+            drag_unit: rig.drag_unit,
+            placed: heard.iter().any(|h| !h.drop.places_m.is_empty()),
+            dropped: rig.drop_height_m.is_some(),
+            released: released(heard.len()),
+            listened: heard.iter().any(|h| !h.drop.loudness.is_empty()),
+            unheard: [missed, heard.len()],
+            microphones: microphones.places_m.len(),
+        };
+        Self { heard, rig, calibration, microphones, setup, restitution }
+    }
+
+    /// What the recording holds.
+    pub(super) fn contents(&self) -> Contents {
+        let spare = self.microphones.spare();
+        let placed = self.setup.placed;
+        let channels = if placed { placed_channels(spare) } else { timed_channels() };
+        let mut calibration = vec![None; channels.len()];
+        if placed {
+            calibration[0] = self.calibration.time_s;
+        }
+        let run = |h: &Heard| {
+            let rows = if placed { Rows::of(&h.drop, spare).heard } else { 0..h.numbers.len() };
+            RunContents::new(&h.label, &h.numbers[rows])
+        };
+        let spec = if placed {
+            build(&self.setup, self.restitution).0.build_unchecked()
+        } else {
+            build_times(&self.setup, self.restitution).0
+        };
+        let variable = Quantity::new("bounce", "");
+        Contents { channels, calibration, variable, runs: self.heard.iter().map(run).collect(), spec }
+    }
+
+    /// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
+    pub(super) fn assemble(&self) -> Result<Loaded, (usize, String)> {
+        if self.setup.placed { self.placed() } else { Ok(self.timed()) }
+    }
+
+    /// Times and places: impact by impact.
+    fn placed(&self) -> Result<Loaded, (usize, String)> {
+        let mut nominal = Effects::none(self.setup.gravity_m_s2, self.restitution);
+        let mut drops: Vec<Drop> = self.heard.iter().map(|h| h.drop.clone()).collect();
+        expect_first(&mut drops, &mut nominal);
+        let senseless = |h: &Heard| {
+            let label = crate::recording::quoted(&h.label);
+            (h.row, format!("times and places of a bouncing ball in run {label}"))
+        };
+        let judged = judge(&drops, &Effects { unheard: 1.0, ..nominal }, self.calibration)
+            .ok_or_else(|| senseless(&self.heard[0]))?;
+        let kappa = judged.spread.kappa;
+        (nominal.heads, nominal.outwards_per_m) = (judged.heads, judged.outwards_per_m);
+        let mut model = BounceModel::new(
+            self.setup,
+            nominal,
+            (judged.spread, judged.plausible),
+            self.microphones.clone(),
+        );
+        let mut runs = Vec::new();
+        for (h, linear) in self.heard.iter().zip(judged.drops) {
+            runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, COPIES).ok_or_else(|| senseless(h))?);
+        }
+        let channels = placed_channels(self.microphones.spare());
+        let mut calibration = vec![None; channels.len()];
+        // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
+        calibration[0] = self.calibration.time_s;
+        let recording = Recording {
+            resolution: vec![0.0; channels.len()],
+            calibration,
+            channels,
+            variables: vec![
+                Quantity::new("bounce", ""),
+                Quantity::new("speed_m_s", "m/s"),
+                Quantity::new("x_m", "m"),
+                Quantity::new("y_m", "m"),
+            ],
+            runs,
+            noise_along: Some(0),
+        };
+        let mut undetermined = vec![format!(
+            "how a direction was scattered and how a place was misheard are told apart by the lengths of the flights alone \
+             (here: kappa about {:.0})",
+            kappa
+        )];
+        if !self.setup.dropped {
+            undetermined.push(UNTIED.into());
+        }
+        let experiments = experiments(&mut model);
+        Ok(Loaded::new(recording, model, experiments, undetermined))
+    }
+
+    /// Times alone.
+    fn timed(&self) -> Loaded {
+        let model = TimesModel::new(
+            self.setup,
+            self.restitution,
+            self.rig.drop_height_m,
+            self.calibration.time_s.is_some(),
+        );
+        let times: Vec<f64> = self.heard.iter().flat_map(|h| h.drop.times_s.iter().copied()).collect();
+        // Directions scatter the times beyond the clock's noise, so that a calibrated clock is the least there is.
+        let least = self.calibration.time_s.map_or(0.0, |sigma| sigma * 12f64.sqrt());
+        let recording = Recording {
+            channels: timed_channels(),
+            variables: vec![
+                Quantity::new("bounce", ""),
+                Quantity::new("known_gaps", ""),
+                Quantity::new("found_gaps", ""),
+            ],
+            runs: self.heard.iter().map(|h| TimesModel::run(&h.label, &h.drop, &h.numbers)).collect(),
+            noise_along: Some(0),
+            calibration: vec![None],
+            resolution: vec![resolution(&times).max(least)],
+        };
+        let mut undetermined = vec![
+            "times alone say nothing of where the ball went: a tilt, friction and the scale of places are not seen".into(),
+        ];
+        if !self.setup.dropped {
+            undetermined.push(UNTIED.into());
+        }
+        if self.heard.len() == 1 {
+            undetermined.push(
+                "in a single drop, an error that wanders along it would look like physics: drop it again"
+                    .into(),
+            );
+        }
+        let experiments = of_times(&model, self.restitution, self.setup.gravity_m_s2);
+        Loaded::new(recording, model, experiments, undetermined)
     }
 }
 
+/// Channels of times and places, and of arrivals beyond those that place and time need.
+fn placed_channels(spare: usize) -> Vec<Quantity> {
+    let mut channels = vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")];
+    channels.extend((0..spare).map(|k| {
+        let name = if spare == 1 { "arrival_s".to_owned() } else { format!("arrival_{}_s", k + 1) };
+        Quantity::new(name, "s")
+    }));
+    channels
+}
+
+fn timed_channels() -> Vec<Quantity> {
+    vec![Quantity::new("t_s", "s")]
+}
+
 /// The typical restitution, and in how many drops an impact went unheard; where it did is marked in them.
-fn listen(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
+fn mark_unheard(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
     let durations: Vec<Vec<f64>> =
         heard.iter().map(|h| h.drop.times_s.windows(2).map(|w| w[1] - w[0]).collect()).collect();
     let of_drop = rig.drop_height_m.map(|h| (8.0 * h / rig.gravity_m_s2).sqrt());
@@ -59,70 +202,6 @@ fn listen(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
         missed += usize::from(h.drop.unheard != h.drop.known);
     }
     (restitution, missed)
-}
-
-/// Times and places: impact by impact.
-fn placed(
-    heard: &[Heard],
-    setup: Setup,
-    restitution: f64,
-    known: Known,
-    microphones: &Microphones,
-) -> Result<Loaded, (usize, String)> {
-    let mut nominal = Effects::none(setup.gravity_m_s2, restitution);
-    let mut drops: Vec<Drop> = heard.iter().map(|h| h.drop.clone()).collect();
-    expect_first(&mut drops, &mut nominal);
-    let senseless = |h: &Heard| {
-        let label = crate::recording::quoted(&h.label);
-        (h.row, format!("times and places of a bouncing ball in run {label}"))
-    };
-    let judged =
-        judge(&drops, &Effects { unheard: 1.0, ..nominal }, known).ok_or_else(|| senseless(&heard[0]))?;
-    let kappa = judged.spread.kappa;
-    (nominal.heads, nominal.outwards_per_m) = (judged.heads, judged.outwards_per_m);
-    let mut model = BounceModel::new(setup, nominal, (judged.spread, judged.plausible), microphones.clone());
-    let mut runs = Vec::new();
-    for (h, linear) in heard.iter().zip(judged.drops) {
-        runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, COPIES).ok_or_else(|| senseless(h))?);
-    }
-    let mut channels = vec![Quantity::new("t_s", "s"), Quantity::new("x_m", "m"), Quantity::new("y_m", "m")];
-    channels.extend((0..microphones.spare()).map(|k| {
-        let name =
-            if microphones.spare() == 1 { "arrival_s".to_owned() } else { format!("arrival_{}_s", k + 1) };
-        Quantity::new(name, "s")
-    }));
-    let mut calibration = vec![None; channels.len()];
-    // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
-    calibration[0] = known.time_s;
-    let recording = Recording {
-        resolution: vec![0.0; channels.len()],
-        calibration,
-        channels,
-        variables: vec![
-            Quantity::new("bounce", ""),
-            Quantity::new("speed_m_s", "m/s"),
-            Quantity::new("x_m", "m"),
-            Quantity::new("y_m", "m"),
-        ],
-        runs,
-        noise_along: Some(0),
-    };
-    let mut undetermined = vec![format!(
-        "how a direction was scattered and how a place was misheard are told apart by the lengths of the flights alone \
-         (here: kappa about {:.0})",
-        kappa
-    )];
-    if !setup.dropped {
-        undetermined.push(UNTIED.into());
-    }
-    let experiments = experiments(&mut model);
-    Ok(Loaded {
-        recording,
-        model: Box::new(model),
-        experiments,
-        undetermined,
-        additions: serde_json::Map::new(),
-    })
 }
 
 /// Where balls are expected to land, and to head where their fall is not known: a tilted table, or a hand, may send all of them one
@@ -151,36 +230,3 @@ fn expect_first(drops: &mut [Drop], nominal: &mut Effects) {
 }
 
 const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
-
-/// Times alone.
-fn timed(heard: &[Heard], rig: &Rig, setup: Setup, restitution: f64, known: Known) -> Loaded {
-    let model = TimesModel::new(setup, restitution, rig.drop_height_m, known.time_s.is_some());
-    let times: Vec<f64> = heard.iter().flat_map(|h| h.drop.times_s.iter().copied()).collect();
-    // Directions scatter the times beyond the clock's noise, so that a calibrated clock is the least there is.
-    let least = known.time_s.map_or(0.0, |sigma| sigma * 12f64.sqrt());
-    let recording = Recording {
-        channels: vec![Quantity::new("t_s", "s")],
-        variables: vec![
-            Quantity::new("bounce", ""),
-            Quantity::new("known_gaps", ""),
-            Quantity::new("found_gaps", ""),
-        ],
-        runs: heard.iter().map(|h| TimesModel::run(&h.label, &h.drop, &h.numbers)).collect(),
-        noise_along: Some(0),
-        calibration: vec![None],
-        resolution: vec![resolution(&times).max(least)],
-    };
-    let mut undetermined = vec![
-        "times alone say nothing of where the ball went: a tilt, friction and the scale of places are not seen".into(),
-    ];
-    if !setup.dropped {
-        undetermined.push(UNTIED.into());
-    }
-    if heard.len() == 1 {
-        undetermined.push(
-            "in a single drop, an error that wanders along it would look like physics: drop it again".into(),
-        );
-    }
-    let experiments = of_times(&model, restitution, setup.gravity_m_s2);
-    Loaded { recording, model: Box::new(model), experiments, undetermined, additions: serde_json::Map::new() }
-}

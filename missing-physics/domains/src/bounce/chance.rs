@@ -8,13 +8,14 @@ use bounce_audio::impact::{Velocity, reflected, speed, speed_after_drop};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::drop::{Drop, Effects};
+use super::drop::Drop;
+use super::effects::Effects;
 use super::spread::ROUNDS;
 use super::weights::{Linear, Spread, Weights};
 
 /// Errors of simulated drops like a measured one, whitened as its own are: by the `judged` spread, where the true one is another
 /// that is plausible too. Few or none where such drops make no sense.
-pub(super) fn errors_by_chance(
+pub(super) fn null_errors(
     likely: &Linear,
     effects: &Effects,
     [truth, judged]: [&Spread; 2],
@@ -24,7 +25,7 @@ pub(super) fn errors_by_chance(
     let level = Effects { unheard: 1.0, ..*effects };
     (0..count)
         .filter_map(|_| {
-            let drop = fallen(&likely.drop, &level, truth, rng)?;
+            let drop = simulated(&likely.drop, &level, truth, rng)?;
             let mut linear = Linear::about_straight(&drop, &level);
             for _ in 0..ROUNDS {
                 linear = linear.likely(&level, judged)?;
@@ -40,12 +41,12 @@ fn normal(rng: &mut impl Rng) -> f64 {
 }
 
 /// A drop like another, on a level table without air, as it would be heard.
-fn fallen(like: &Drop, effects: &Effects, spread: &Spread, rng: &mut impl Rng) -> Option<Drop> {
+fn simulated(like: &Drop, effects: &Effects, spread: &Spread, rng: &mut impl Rng) -> Option<Drop> {
     let mut drop = like.clone();
     let gravity = effects.gravity_m_s2;
     let hidden = |place: usize| like.unheard.get(place).copied().unwrap_or(0);
     let usually = like.comes(effects);
-    let off = [0, 1].map(|_| spread.came_rad * normal(rng));
+    let off = [0, 1].map(|_| spread.approach_rad * normal(rng));
     let mut velocity: Velocity = match like.height_m {
         Some(height) => {
             let falls = speed_after_drop(height, gravity, 0.0) * effects.restitution.powi(hidden(0) as i32);
@@ -128,11 +129,11 @@ pub(super) mod tests {
     #[test]
     fn chance_is_white_where_angles_are_small() {
         let spread =
-            Spread { time_s: 3e-5, place_m: [1e-3; 2], kappa: 1e4, came_rad: 0.01, restitution: 0.0 };
+            Spread { time_s: 3e-5, place_m: [1e-3; 2], kappa: 1e4, approach_rad: 0.01, restitution: 0.0 };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let drop = drop();
         let likely = Linear::about_straight(&drop, &EFFECTS).likely(&EFFECTS, &spread).unwrap();
-        let copies = errors_by_chance(&likely, &EFFECTS, [&spread; 2], 400, &mut rng);
+        let copies = null_errors(&likely, &EFFECTS, [&spread; 2], 400, &mut rng);
         assert!(copies.len() > 390);
         let n = copies.len() as f64;
         for channel in 0..3 {
@@ -154,7 +155,7 @@ pub(super) mod tests {
             place[1] += if i % 2 == 0 { 0.05 } else { -0.05 };
         }
         let spread =
-            Spread { time_s: 3e-5, place_m: [0.05; 2], kappa: 1e4, came_rad: 0.01, restitution: 0.0 };
+            Spread { time_s: 3e-5, place_m: [0.05; 2], kappa: 1e4, approach_rad: 0.01, restitution: 0.0 };
         let mut linear = Linear::about_straight(&wild, &EFFECTS);
         for _ in 0..ROUNDS {
             linear = linear.likely(&EFFECTS, &spread).unwrap();

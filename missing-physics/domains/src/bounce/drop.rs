@@ -4,69 +4,7 @@ use bounce_audio::impact::{Hop, Velocity, heading, reflected, speed, speed_after
 use bounce_audio::missed::parts;
 use nalgebra::DVector;
 
-/// What changes a bounce; all zero but the restitution and gravity: the baseline.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Effects {
-    pub(super) gravity_m_s2: f64,
-    /// Restitution at 1 m/s.
-    pub(super) restitution: f64,
-    /// By how much it falls for each m/s more.
-    pub(super) slope_s_m: f64,
-    pub(super) drag_per_m: f64,
-    /// Slopes dz/dx and dz/dy of the table.
-    pub(super) table: [f64; 2],
-    /// Where balls head on average when they first come to the table (or leave it, where their fall is not known), in the
-    /// recording's units of length and time.
-    pub(super) heads: [f64; 2],
-    /// How much farther out they head then for each metre that they land farther out, rad/m.
-    pub(super) outwards_per_m: f64,
-    /// Share of the speed along the table that is lost beyond the restitution.
-    pub(super) friction: f64,
-    pub(super) clock_rate: f64,
-    /// By how much later a sound is heard that is louder by a factor of e, s: no ear finds weak and loud onsets alike.
-    pub(super) walk_s: f64,
-    pub(super) position_scale: f64,
-    /// The same, where places have been heard again with the right speed of sound.
-    pub(super) heard_scale: f64,
-    /// 1: flights that hide unheard impacts are taken for what they are; 0: for one flight.
-    pub(super) unheard: f64,
-    /// Candidate terms of an unknown law, added to the logarithm of the restitution: x, y (per m), speed squared (s^2/m^2).
-    pub(super) terms: [f64; 3],
-}
-
-/// Smallest restitution that is computed with.
-const LEAST: f64 = 1e-3;
-
-impl Effects {
-    /// The baseline: gravity and a constant restitution.
-    pub(super) const fn none(gravity_m_s2: f64, restitution: f64) -> Self {
-        Self {
-            gravity_m_s2,
-            restitution,
-            slope_s_m: 0.0,
-            drag_per_m: 0.0,
-            table: [0.0; 2],
-            heads: [0.0; 2],
-            outwards_per_m: 0.0,
-            friction: 0.0,
-            clock_rate: 0.0,
-            walk_s: 0.0,
-            position_scale: 0.0,
-            heard_scale: 0.0,
-            unheard: 0.0,
-            terms: [0.0; 3],
-        }
-    }
-
-    /// Logarithm of the restitution of an impact at a place and a speed.
-    fn log_restitution(&self, place: [f64; 2], speed_m_s: f64) -> f64 {
-        let [x, y, squared] = self.terms;
-        (self.restitution - self.slope_s_m * (speed_m_s - 1.0)).max(LEAST).ln()
-            + x * place[0]
-            + y * place[1]
-            + squared * speed_m_s * speed_m_s
-    }
-}
+use super::effects::Effects;
 
 /// How many numbers say by how much an impact is off: the logarithm of its speed's ratio, and two of its direction.
 pub(super) const PER_IMPACT: usize = 3;
@@ -78,16 +16,16 @@ pub(super) enum Measured {
     Time(usize),
     /// Where, along an axis.
     Place(usize, usize),
-    /// Where it first headed along an axis.
-    Came(usize),
+    /// Where the ball first headed along an axis.
+    Approach(usize),
 }
 
 /// How far off an impact may be, beside a typical one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Relative {
-    /// Its time.
+    /// Error of its time over that of a typical one.
     pub(super) time: f64,
-    /// Its place: the lower triangular root of its covariance.
+    /// Error of its place over that of a typical one: the lower triangular root of the covariance.
     pub(super) place: [[f64; 2]; 2],
 }
 
@@ -109,14 +47,14 @@ pub(super) struct Drop {
     pub(super) relative: Vec<Relative>,
     /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known),
     /// beyond what balls do on average that land where it did.
-    pub(super) came: [f64; 2],
+    pub(super) approach: [f64; 2],
     /// Where balls land on average.
     pub(super) middle_m: [f64; 2],
     /// When each microphone heard each impact, s; empty where there are fewer than four.
     pub(super) arrivals_s: Vec<Vec<f64>>,
     /// How many impacts went unheard before the first one heard (only with a known height) and within each flight.
     pub(super) unheard: Vec<usize>,
-    /// Of those, how many are known because the file's numbers jump.
+    /// How many of the unheard impacts are known because the file's numbers jump.
     pub(super) known: Vec<usize>,
 }
 
@@ -168,7 +106,7 @@ impl Drop {
         match index {
             i if i < times => Measured::Time(i),
             i if i < times + places => Measured::Place((i - times) / 2, (i - times) % 2),
-            i => Measured::Came(i - times - places),
+            i => Measured::Approach(i - times - places),
         }
     }
 
@@ -177,7 +115,7 @@ impl Drop {
         DVector::from_fn(self.measured(), |i, _| match self.quantity(i) {
             Measured::Time(k) => self.times_s[k],
             Measured::Place(k, axis) => self.places_m[k][axis],
-            Measured::Came(axis) => self.came[axis],
+            Measured::Approach(axis) => self.approach[axis],
         })
     }
 
@@ -186,11 +124,11 @@ impl Drop {
         match self.quantity(index) {
             Measured::Time(k) => self.times_s[k] += by,
             Measured::Place(k, axis) => self.places_m[k][axis] += by,
-            Measured::Came(axis) => self.came[axis] += by,
+            Measured::Approach(axis) => self.approach[axis] += by,
         }
     }
 
-    /// The same drop with its places on the straight line nearest to them, along which each flight gets as far as the square of
+    /// The drop with its places on the straight line nearest to them, along which each flight gets as far as the square of
     /// its duration: restitution shortens the speed along the table and that across it alike.
     pub(super) fn straight(&self) -> Self {
         let far: Vec<f64> = std::iter::once(0.0)
@@ -224,11 +162,12 @@ impl Drop {
         self.relative.get(impact).copied().unwrap_or(Relative::TYPICAL)
     }
 
-    /// Where it headed when it first came.
+    /// Where the ball headed, seen from above, when it first came to the table (or left it, where its fall is not known).
     pub(super) fn comes(&self, effects: &Effects) -> [f64; 2] {
         let place = self.place(0);
-        [0, 1]
-            .map(|k| self.came[k] + effects.heads[k] + effects.outwards_per_m * (place[k] - self.middle_m[k]))
+        [0, 1].map(|k| {
+            self.approach[k] + effects.heads[k] + effects.outwards_per_m * (place[k] - self.middle_m[k])
+        })
     }
 
     /// The flight from one impact to the next as the effects see it, or the part of it beside an unheard impact.

@@ -7,9 +7,12 @@ mod array;
 mod assemble;
 mod chance;
 mod drop;
+mod effects;
 mod experiments;
 mod model;
 mod read;
+mod rows;
+mod setup;
 mod sound;
 mod spec;
 mod spread;
@@ -19,12 +22,13 @@ mod weights;
 use missing_physics::model::Spec;
 
 use self::array::Microphones;
-use self::model::Setup;
+use self::assemble::Drops;
 use self::read::{Rig, heard};
-use self::spread::Known;
-use super::reading::number;
+use self::setup::Setup;
+use self::spread::Calibration;
+use crate::domain::{CheckedRecording, Domain, Template};
+use crate::reading::{GRAVITY_M_S2, number};
 use crate::recording::{Column, Header, ReadError};
-use crate::{Domain, GRAVITY_M_S2, Loaded, Template};
 
 const COLUMNS: [Column; 5] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -87,30 +91,41 @@ impl Domain for Bounce {
         false
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let rig = Rig::read(header)?;
         let noise = header.section("noise")?;
         let sigma = |name: &str| noise.number(name, f64::MIN_POSITIVE, 1e3);
-        let known = Known { time_s: sigma("t_s")?, place_m: [sigma("x_m")?, sigma("y_m")?], said: None };
+        let calibration =
+            Calibration { time_s: sigma("t_s")?, place_m: [sigma("x_m")?, sigma("y_m")?], estimated: None };
+        let file = header.file.clone();
         if let Some(listened) = sound::listen(header, &rig)? {
-            let known = Known { said: listened.said, ..known };
+            let calibration = Calibration { estimated: listened.estimated, ..calibration };
             let impacts = sound::impacts(&listened.heard);
-            let unfit = |(_, expected): (usize, String)| header.root().unfit("audio", "sound", expected);
-            let mut loaded =
-                assemble::assemble(listened.heard, &rig, known, &listened.microphones).map_err(unfit)?;
-            loaded.additions.insert("impacts".into(), impacts);
-            loaded.undetermined.extend(listened.strays);
-            if listened.microphones.places_m.len() == 3 {
-                loaded.undetermined.push(THREE_MICROPHONES.into());
-            }
-            return Ok(loaded);
+            let ambiguous_array = listened.microphones.places_m.len() == 3;
+            let drops = Drops::new(listened.heard, rig, calibration, listened.microphones);
+            return Ok(CheckedRecording::new(drops.contents(), move || {
+                let mut loaded = drops.assemble().map_err(|(_, expected)| ReadError::Value {
+                    file,
+                    key: "audio".into(),
+                    got: "sound".into(),
+                    expected,
+                })?;
+                loaded.additions.insert("impacts".into(), impacts);
+                loaded.undetermined.extend(listened.strays);
+                if ambiguous_array {
+                    loaded.undetermined.push(THREE_MICROPHONES.into());
+                }
+                Ok(loaded)
+            }));
         }
         header.root().text("data", "the name of a CSV file (or [audio] files)")?;
         let table = header.table("data", &COLUMNS)?;
-        let heard = heard(&table, &rig)?;
-        assemble::assemble(heard, &rig, known, &Microphones::default()).map_err(|(row, what)| {
-            let time = table.numbers("t_s").map_or(f64::NAN, |t| t[row]);
-            table.cell(row, "t_s", time, what)
-        })
+        let drops = Drops::new(heard(&table, &rig)?, rig, calibration, Microphones::default());
+        Ok(CheckedRecording::new(drops.contents(), move || {
+            drops.assemble().map_err(|(row, what)| {
+                let time = table.numbers("t_s").map_or(f64::NAN, |t| t[row]);
+                table.cell(row, "t_s", time, what)
+            })
+        }))
     }
 }

@@ -1,44 +1,27 @@
 //! The full model of a bouncing ball: by how much each impact is off, for every effect at once.
 
 use std::collections::HashMap;
-use std::ops::Range;
 
 use missing_physics::data::Run;
-use missing_physics::model::{ErrorModel, Extensions, Model, MultimodalModel, PredictError, Spec};
+use missing_physics::model::{
+    ErrorModel, Extensions, Model, MultimodalModel, ParameterRef, PredictError, Spec,
+};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::array::{Microphones, Wrong};
-use super::chance::errors_by_chance;
-use super::drop::{Drop, Effects, PER_IMPACT};
-use super::spec::{Places, build, hand};
+use super::chance::null_errors;
+use super::drop::{Drop, PER_IMPACT};
+use super::effects::Effects;
+use super::rows::Rows;
+use super::setup::Setup;
+use super::spec::{Layout, build, hand};
 use super::weights::{Linear, Spread, Weights};
-use crate::builder::At;
-
-/// What is known of the set-up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Setup {
-    pub(super) gravity_m_s2: f64,
-    /// Drag (1/m) of a drag coefficient of one, where mass and diameter are known.
-    pub(super) drag_unit: Option<f64>,
-    /// Whether places were measured.
-    pub(super) placed: bool,
-    /// Whether the height of the drop is known.
-    pub(super) dropped: bool,
-    /// Whether there are drops enough to say how a hand lets go of balls.
-    pub(super) released: bool,
-    /// Whether the impacts come from sound, with their loudness.
-    pub(super) listened: bool,
-    /// Runs in which an impact went unheard, and runs.
-    pub(super) unheard: [usize; 2],
-    /// Microphones whose places are known.
-    pub(super) microphones: usize,
-}
 
 /// A drop with its weights and the errors that the engine is shown as its data.
 #[derive(Debug)]
-struct Known {
+struct ShownDrop {
     weights: Weights,
     shown: Vec<f64>,
     /// Where each impact was heard, and when by each microphone.
@@ -56,29 +39,13 @@ pub(super) const COPIES: usize = 5;
 pub(super) struct BounceModel {
     setup: Setup,
     spec: Spec,
-    places: Places,
+    layout: Layout,
     spread: Spread,
     /// Other spreads that the drops leave possible.
     plausible: Vec<Spread>,
     nominal: Effects,
     microphones: Microphones,
-    drops: HashMap<String, Known>,
-}
-
-/// The impacts of a drop that are rows of its run.
-#[derive(Debug, Clone)]
-struct Rows {
-    heard: Range<usize>,
-    /// Those of which more is known than when each microphone heard them.
-    known: Range<usize>,
-}
-
-impl Rows {
-    /// The number among the known ones of a row's impact; none where no more is known of it.
-    fn known(&self, row: usize) -> Option<usize> {
-        let impact = self.heard.start + row;
-        self.known.contains(&impact).then(|| impact - self.known.start)
-    }
+    drops: HashMap<String, ShownDrop>,
 }
 
 impl BounceModel {
@@ -88,17 +55,17 @@ impl BounceModel {
         (spread, plausible): (Spread, Vec<Spread>),
         microphones: Microphones,
     ) -> Self {
-        let (mut builder, mut places) = build(&setup, nominal.restitution);
+        let (mut builder, mut layout) = build(&setup, nominal.restitution);
         if setup.dropped && setup.released {
-            places.hand = Some(hand(&mut builder, &nominal));
+            layout.hand = Some(hand(&mut builder, &nominal));
         }
         if setup.listened {
-            places.walk = Some(builder.shared("onset_walk_s", "s", 0.0, [-1e-4, 1e-4], 1e-6));
+            layout.walk = Some(builder.shared("onset_walk_s", "s", 0.0, [-1e-4, 1e-4], 1e-6));
         }
         Self {
             setup,
             spec: builder.build_unchecked(),
-            places,
+            layout,
             spread,
             plausible,
             microphones,
@@ -133,7 +100,7 @@ impl BounceModel {
     ) -> Option<Run> {
         let heard: Vec<([f64; 2], Vec<f64>)> =
             drop.places_m.iter().copied().zip(drop.arrivals_s.iter().cloned()).collect();
-        let rows = self.rows(drop);
+        let rows = Rows::of(drop, self.microphones.spare());
         let of_row = |column: &[f64]| column[rows.heard.clone()].to_vec();
         let places = &linear.drop.places_m;
         let mut inputs = vec![of_row(numbers), of_row(&linear.drop.speeds(&self.nominal))];
@@ -158,15 +125,8 @@ impl BounceModel {
             };
             rows.heard.clone().map(misfit).collect::<Vec<f64>>()
         }));
-        self.drops.insert(label.to_owned(), Known { weights, shown, heard, rows, null_samples });
+        self.drops.insert(label.to_owned(), ShownDrop { weights, shown, heard, rows, null_samples });
         Some(Run { label: label.to_owned(), inputs, outputs, kind: 0 })
-    }
-
-    /// Of the first and the last impact it may be known only when each microphone heard them.
-    fn rows(&self, drop: &Drop) -> Rows {
-        let known = drop.first()..drop.first() + drop.impacts();
-        let all = drop.arrivals_s.len() == drop.times_s.len() && self.microphones.spare() > 0;
-        Rows { heard: if all { 0..drop.times_s.len() } else { known.clone() }, known }
     }
 
     fn null_samples(
@@ -180,7 +140,7 @@ impl BounceModel {
         rng.set_stream(self.drops.len() as u64);
         let sigmas = self.spread.of_channels();
         let mut world = |truth: &Spread| {
-            let errors = errors_by_chance(likely, &self.nominal, [truth, &self.spread], copies, &mut rng);
+            let errors = null_errors(likely, &self.nominal, [truth, &self.spread], copies, &mut rng);
             let mut shaped = |errors: Vec<f64>| {
                 let of = |k: usize| -> Vec<f64> {
                     let error = |impact: usize| errors[drop.row(impact, k)] / sigmas[k];
@@ -199,7 +159,7 @@ impl BounceModel {
     }
 
     fn wrong(&self, shared: &[f64]) -> Wrong {
-        let p = &self.places;
+        let p = &self.layout;
         let scale = p.position.map_or(0.0, |at| shared[at.slot]);
         let Some([x, y, which]) = p.microphone else { return Wrong { scale, ..Wrong::default() } };
         let which = shared[which.slot];
@@ -208,18 +168,18 @@ impl BounceModel {
     }
 
     /// By how much each impact of a drop moves in time and place if the array is wrong; nothing where no array heard it.
-    fn moved(&self, known: &Known, array: &Wrong) -> Vec<[f64; 3]> {
-        if *array == Wrong::default() || known.heard.len() < known.weights.linear.drop.times_s.len() {
+    fn moved(&self, drop: &ShownDrop, array: &Wrong) -> Vec<[f64; 3]> {
+        if *array == Wrong::default() || drop.heard.len() < drop.weights.linear.drop.times_s.len() {
             return Vec::new();
         }
         let moved =
-            known.heard.iter().map(|(place, arrivals)| self.microphones.moved(*place, arrivals, array));
+            drop.heard.iter().map(|(place, arrivals)| self.microphones.moved(*place, arrivals, array));
         moved.collect::<Option<_>>().unwrap_or_default()
     }
 
     fn effects(&self, shared: &[f64]) -> Effects {
-        let p = &self.places;
-        let at = |at: Option<At>| at.map_or(0.0, |at| shared[at.slot]);
+        let p = &self.layout;
+        let at = |at: Option<ParameterRef>| at.map_or(0.0, |at| shared[at.slot]);
         Effects {
             gravity_m_s2: self.setup.gravity_m_s2,
             restitution: shared[p.restitution.slot],
@@ -252,14 +212,14 @@ impl Model for BounceModel {
         out: &mut [f64],
     ) -> Result<(), PredictError> {
         let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
-        let known = self.drops.get(&run.label).ok_or_else(|| wrong("no such drop"))?;
+        let drop = self.drops.get(&run.label).ok_or_else(|| wrong("no such drop"))?;
         let array = self.wrong(shared);
-        let moved = self.moved(known, &array);
+        let moved = self.moved(drop, &array);
         let mut effects = self.effects(shared);
         if !moved.is_empty() {
             effects.heard_scale = std::mem::take(&mut effects.position_scale);
         }
-        let errors = known
+        let errors = drop
             .weights
             .errors(&effects, &moved)
             .ok_or_else(|| wrong("the covariance of its errors has no root"))?;
@@ -267,10 +227,10 @@ impl Model for BounceModel {
         let (impacts, heard) = out.split_at_mut(PER_IMPACT * n);
         let listened = if heard.is_empty() { 0 } else { n };
         for (row, (place, arrivals)) in
-            known.heard.iter().skip(known.rows.heard.start).take(listened).enumerate()
+            drop.heard.iter().skip(drop.rows.heard.start).take(listened).enumerate()
         {
             let right = self.microphones.misfit(*place, arrivals, &Wrong::default());
-            let by = moved.get(known.rows.heard.start + row).map_or([0.0; 2], |[_, x, y]| [*x, *y]);
+            let by = moved.get(drop.rows.heard.start + row).map_or([0.0; 2], |[_, x, y]| [*x, *y]);
             let now = self.microphones.misfit([place[0] + by[0], place[1] + by[1]], arrivals, &array);
             for (k, (right, now)) in right.iter().zip(&now).enumerate() {
                 heard[k * n + row] = right - now;
@@ -278,9 +238,9 @@ impl Model for BounceModel {
         }
         for (channel, values) in impacts.chunks_exact_mut(n.max(1)).enumerate() {
             for (row, value) in values.iter_mut().enumerate() {
-                *value = known.rows.known(row).map_or(0.0, |impact| {
-                    let at = known.weights.linear.drop.row(impact, channel);
-                    known.shown[at] - errors[at]
+                *value = drop.rows.known(row).map_or(0.0, |impact| {
+                    let at = drop.weights.linear.drop.row(impact, channel);
+                    drop.shown[at] - errors[at]
                 });
             }
         }
@@ -294,7 +254,7 @@ impl Model for BounceModel {
 
 impl MultimodalModel for BounceModel {
     fn starts(&self, mechanism: usize, _runs: &[Run], _residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        match self.places.microphone {
+        match self.layout.microphone {
             Some([.., which])
                 if self.spec.mechanisms[mechanism].integer_parameters.contains(&which.index) =>
             {
@@ -311,7 +271,7 @@ impl ErrorModel for BounceModel {
     }
 
     fn null_samples(&self, run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
-        self.drops.get(&run.label).map_or(&[], |known| &known.null_samples)
+        self.drops.get(&run.label).map_or(&[], |drop| &drop.null_samples)
     }
 
     /// Errors come apart by their own covariance.
@@ -321,45 +281,4 @@ impl ErrorModel for BounceModel {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
-    use super::super::chance::tests::{EFFECTS, drop};
-    use super::*;
-
-    /// Of a ball that is let go somewhere, the first and the last impact are known by their arrivals alone: the fourth microphone's.
-    #[test]
-    fn impacts_of_which_only_arrivals_are_known_are_rows_too() {
-        let corners = [[0.0, 0.0, 0.1], [0.6, 0.0, 0.1], [0.6, 0.6, 0.1], [0.0, 0.6, 0.1]];
-        let spread =
-            Spread { time_s: 3e-5, place_m: [1e-3; 2], kappa: 1e4, came_rad: 0.01, restitution: 0.0 };
-        let numbers: Vec<f64> = (1..=6).map(f64::from).collect();
-        for (count, rows, spare) in [(4, 6, 1), (3, 4, 0)] {
-            let microphones = Microphones { places_m: corners[..count].to_vec(), speed_of_sound_m_s: 340.0 };
-            let setup = Setup {
-                gravity_m_s2: 9.81,
-                drag_unit: None,
-                placed: true,
-                dropped: false,
-                released: false,
-                listened: true,
-                unheard: [0, 1],
-                microphones: count,
-            };
-            let mut model = BounceModel::new(setup, EFFECTS, (spread, vec![spread]), microphones);
-            let drop = Drop { height_m: None, arrivals_s: vec![vec![0.5; count]; 6], ..drop() };
-            let linear = Linear::about_straight(&drop, &EFFECTS);
-            let run = model.run("1", linear, &drop, &numbers, 1).unwrap();
-            assert_eq!((run.len(), run.outputs.len()), (rows, PER_IMPACT + spare));
-            assert!(run.inputs.iter().flatten().all(|v| v.is_finite()));
-            for (channel, column) in run.outputs.iter().enumerate() {
-                let known = column.iter().filter(|v| v.is_finite()).count();
-                assert_eq!(known, if channel < PER_IMPACT { 4 } else { rows });
-            }
-            assert_eq!(run.inputs[0][0], if spare == 1 { 1.0 } else { 2.0 });
-            let mut out = vec![0.0; run.len() * run.outputs.len()];
-            let start: Vec<f64> = model.spec.parameters.iter().map(|p| p.start).collect();
-            model.predict(&run, &start, &[], &mut out).unwrap();
-            assert!(out.iter().all(|v| v.is_finite()));
-        }
-    }
-}
+mod tests;

@@ -3,7 +3,7 @@
 use bounce_audio::flight::drag_per_m;
 
 use super::drop::Drop;
-use crate::GRAVITY_M_S2;
+use crate::reading::GRAVITY_M_S2;
 use crate::reading::check_runs;
 use crate::recording::{Header, ReadError, Table};
 

@@ -17,8 +17,8 @@ use crate::recording::{Header, ReadError, inside};
 pub(super) struct Listened {
     pub(super) heard: Vec<Heard>,
     pub(super) microphones: Microphones,
-    /// What the ear says of its own errors: sigma of a typical time and place.
-    pub(super) said: Option<[f64; 2]>,
+    /// Hearing's own estimate of its errors: sigma of a typical time (s) and place (m).
+    pub(super) estimated: Option<[f64; 2]>,
     /// Sounds that were taken for none of the ball's, in words.
     pub(super) strays: Vec<String>,
 }
@@ -43,8 +43,8 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
     let mut heard: Vec<Heard> =
         all.iter().enumerate().map(|(run, impacts)| drop_of(run, impacts, rig)).collect();
     let microphones = Microphones { places_m: microphones.unwrap_or_default(), speed_of_sound_m_s: speed };
-    let said = weigh(&mut heard, &all);
-    Ok(Some(Listened { heard, microphones, said, strays }))
+    let estimated = weigh(&mut heard, &all);
+    Ok(Some(Listened { heard, microphones, estimated, strays }))
 }
 
 /// The impacts in a file, in the order of time.

@@ -2,42 +2,41 @@
 
 use std::sync::Arc;
 
-use missing_physics::model::{Derived, Quantity};
+use missing_physics::model::{Derived, ParameterRef, Quantity, SpecBuilder};
 
-use super::drop::Effects;
-use super::model::Setup;
-use crate::builder::{At, Builder};
+use super::effects::Effects;
+use super::setup::Setup;
 
 /// Where each parameter stands; `None` where the data cannot show it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Places {
-    pub(super) restitution: At,
-    pub(super) slope: At,
-    pub(super) drag: At,
-    pub(super) table: Option<[At; 2]>,
-    pub(super) friction: Option<At>,
+pub(super) struct Layout {
+    pub(super) restitution: ParameterRef,
+    pub(super) slope: ParameterRef,
+    pub(super) drag: ParameterRef,
+    pub(super) table: Option<[ParameterRef; 2]>,
+    pub(super) friction: Option<ParameterRef>,
     /// Where balls head on average when they first come to the table, and how much farther out for each metre that they land
     /// farther out.
-    pub(super) hand: Option<[At; 3]>,
-    pub(super) clock: Option<At>,
-    pub(super) position: Option<At>,
-    pub(super) unheard: Option<At>,
+    pub(super) hand: Option<[ParameterRef; 3]>,
+    pub(super) clock: Option<ParameterRef>,
+    pub(super) position: Option<ParameterRef>,
+    pub(super) unheard: Option<ParameterRef>,
     /// By how much later a louder sound is heard.
-    pub(super) walk: Option<At>,
+    pub(super) walk: Option<ParameterRef>,
     /// Offsets along x and y of a microphone, and which it is.
-    pub(super) microphone: Option<[At; 3]>,
+    pub(super) microphone: Option<[ParameterRef; 3]>,
     /// Candidate terms of an unknown law: linear in x and y, and in the speed squared.
-    pub(super) terms: Option<[At; 2]>,
-    pub(super) squared: At,
+    pub(super) terms: Option<[ParameterRef; 2]>,
+    pub(super) squared: ParameterRef,
 }
 
 /// The specification of a set-up, the restitution starting at a value.
-pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
-    let mut b = Builder::default();
+pub(super) fn build(setup: &Setup, restitution: f64) -> (SpecBuilder, Layout) {
+    let mut b = SpecBuilder::default();
     b.baseline("ballistic flight from impact to impact, a constant restitution, a level table");
-    let mut p = Places {
+    let mut p = Layout {
         restitution: b.shared("restitution", "", restitution, [1e-2, 2.0], 0.02),
-        ..Places::default()
+        ..Layout::default()
     };
     air_and_speed(&mut b, &mut p, setup);
     if setup.placed {
@@ -67,7 +66,7 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
                 "scale of the places",
                 "All distances on the table are too long or too short, as by a wrong speed of sound.",
                 "x_recorded = (1 + scale) x",
-                "thesis, section 4.3; Cramer 1993, doi:10.1121/1.405827 (speed of sound)",
+                "[Matl 2021], section 4.3; Cramer 1993, doi:10.1121/1.405827 (speed of sound)",
             ],
             &["clock-rate", "table-tilt"],
         );
@@ -86,7 +85,7 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
                 "impacts that were not heard",
                 "In some runs two flights were taken for one, because the impact between them went unheard.",
                 "a flight of (1 + e) T is one of T and one of e T",
-                "thesis, section 4.3",
+                "[Matl 2021], section 4.3",
             ],
             &["velocity-dependent-restitution"],
         );
@@ -104,7 +103,7 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (Builder, Places) {
 }
 
 /// How a hand lets go of balls whose height is known: nobody states that it gives them no velocity of its own.
-pub(super) fn hand(b: &mut Builder, nominal: &Effects) -> [At; 3] {
+pub(super) fn hand(b: &mut SpecBuilder, nominal: &Effects) -> [ParameterRef; 3] {
     let [x, y] = nominal.heads;
     [
         b.shared("heads_x_rad", "rad", x, [-1.0, 1.0], 0.005),
@@ -113,7 +112,7 @@ pub(super) fn hand(b: &mut Builder, nominal: &Effects) -> [At; 3] {
     ]
 }
 
-fn air_and_speed(b: &mut Builder, p: &mut Places, setup: &Setup) {
+fn air_and_speed(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup) {
     p.drag = match setup.drag_unit {
         Some(_) => b.shared("drag_coefficient", "", 0.0, [0.0, 10.0], 0.1),
         None => b.shared("k_per_m", "1/m", 0.0, [0.0, 2.0], 0.02),
@@ -157,7 +156,7 @@ fn air_and_speed(b: &mut Builder, p: &mut Places, setup: &Setup) {
     });
 }
 
-fn table(b: &mut Builder, p: &mut Places) {
+fn table(b: &mut SpecBuilder, p: &mut Layout) {
     let slopes = ["slope_x", "slope_y"].map(|name| b.shared(name, "", 0.0, [-0.6, 0.6], 0.01));
     let mechanism = b.mechanism(
         "table-tilt",
@@ -166,7 +165,7 @@ fn table(b: &mut Builder, p: &mut Places) {
             "tilt of the table",
             "The table is not level.",
             "z = slope_x x + slope_y y; the velocity is mirrored at the tilted plane",
-            "thesis, section 4.4",
+            "[Matl 2021], section 4.4",
         ],
         &["tangential-friction"],
     );
@@ -191,7 +190,7 @@ fn table(b: &mut Builder, p: &mut Places) {
     p.friction = Some(friction);
 }
 
-fn microphone(b: &mut Builder, p: &mut Places, count: usize) {
+fn microphone(b: &mut SpecBuilder, p: &mut Layout, count: usize) {
     let [x, y] = ["offset_x_m", "offset_y_m"].map(|name| b.shared(name, "m", 0.0, [-0.3, 0.3], 0.005));
     let which = b.shared("microphone", "", -1.0, [-1.0, count as f64 - 1.0], 1.0);
     let mechanism = b.mechanism(
@@ -215,7 +214,7 @@ fn microphone(b: &mut Builder, p: &mut Places, count: usize) {
 }
 
 /// What the logarithm of the restitution could depend on, should no mechanism hold.
-fn terms(b: &mut Builder, p: &mut Places, placed: bool) {
+fn terms(b: &mut SpecBuilder, p: &mut Layout, placed: bool) {
     let mut term = |name: &str, unit: &str, scale: f64, formula: &str, variable: &str| {
         let at = b.shared(name, unit, 0.0, [-1e3 * scale, 1e3 * scale], scale);
         b.term(at, formula, Quantity::new("ln(restitution)", ""), vec![variable.into()]);

@@ -7,24 +7,25 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::drop::{Drop, Effects};
+use super::drop::Drop;
+use super::effects::Effects;
 use super::weights::{Linear, Spread};
 
 /// Sigmas that were calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Known {
+pub(super) struct Calibration {
     pub(super) time_s: Option<f64>,
     pub(super) place_m: [Option<f64>; 2],
-    /// What the ear says of its own sigmas, of times and of places: right to a factor.
-    pub(super) said: Option<[f64; 2]>,
+    /// Hearing's own estimate of its sigmas, of times (s) and of places (m): right to a factor.
+    pub(super) estimated: Option<[f64; 2]>,
 }
 
-impl Known {
-    /// Minus twice the logarithm of what the ear's word makes of a spread.
-    fn doubt(&self, spread: &Spread) -> f64 {
+impl Calibration {
+    /// Minus twice the logarithm of the prior that hearing's own estimate makes of a spread.
+    fn prior(&self, spread: &Spread) -> f64 {
         /// One sigma of the factor's logarithm, on sounds with echoes and without.
         const FACTOR: f64 = 0.5;
-        self.said.map_or(0.0, |[time, place]| {
+        self.estimated.map_or(0.0, |[time, place]| {
             let off = [spread.time_s / time, spread.place_m[0] / place].map(|factor| factor.ln() / FACTOR);
             off[0] * off[0] + off[1] * off[1]
         })
@@ -37,7 +38,7 @@ enum Unknown {
     Restitution,
     Place,
     Kappa,
-    Came,
+    Approach,
 }
 
 type Change = fn(&mut Effects, f64);
@@ -55,8 +56,7 @@ const NUISANCES: [Change; 6] = [
 /// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
 /// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
 /// take for a smaller slope.
-const OF_THE_HAND: [Change; 3] =
-    [|e, d| e.heads[0] += d, |e, d| e.heads[1] += d, |e, d| e.outwards_per_m += d];
+const HAND: [Change; 3] = [|e, d| e.heads[0] += d, |e, d| e.heads[1] += d, |e, d| e.outwards_per_m += d];
 
 /// Whether there are drops enough to say how a hand lets go of balls.
 pub(super) const fn released(drops: usize) -> bool {
@@ -70,7 +70,7 @@ fn nuisances(drops: &[Drop]) -> Vec<Change> {
         all.push(|e, d| e.clock_rate += d);
     }
     if released(drops.len()) {
-        all.extend(OF_THE_HAND);
+        all.extend(HAND);
     }
     all
 }
@@ -81,7 +81,7 @@ struct Likelihood<'a> {
     drops: &'a [(Linear, DVector<f64>, DMatrix<f64>)],
     /// How many nuisances there are.
     columns: usize,
-    known: Known,
+    calibration: Calibration,
     start: Spread,
 }
 
@@ -96,7 +96,7 @@ impl Likelihood<'_> {
                 Unknown::Restitution => spread.restitution *= factor,
                 Unknown::Place => spread.place_m = spread.place_m.map(|p| p * factor),
                 Unknown::Kappa => spread.kappa *= factor,
-                Unknown::Came => spread.came_rad *= factor,
+                Unknown::Approach => spread.approach_rad *= factor,
             }
         }
         spread
@@ -104,11 +104,11 @@ impl Likelihood<'_> {
 
     fn unknowns(&self) -> Vec<Unknown> {
         let mut list = Vec::new();
-        if self.known.time_s.is_none() {
+        if self.calibration.time_s.is_none() {
             list.extend([Unknown::Time, Unknown::Restitution]);
         }
-        list.extend([Unknown::Kappa, Unknown::Came]);
-        if self.known.place_m == [None; 2] {
+        list.extend([Unknown::Kappa, Unknown::Approach]);
+        if self.calibration.place_m == [None; 2] {
             list.push(Unknown::Place);
         }
         list
@@ -173,8 +173,8 @@ impl Likelihood<'_> {
         let lower = factor.l_dirty();
         let determinant: f64 = (0..columns).map(|i| lower[(i, i)].ln()).sum();
         let best = factor.solve(&pull);
-        let doubt = self.known.doubt(spread);
-        Some((total + squares - pull.dot(&best) + 2.0 * determinant + doubt, -best))
+        let prior = self.calibration.prior(spread);
+        Some((total + squares - pull.dot(&best) + 2.0 * determinant + prior, -best))
     }
 }
 
@@ -207,15 +207,15 @@ pub(super) struct Judged {
 const PLAUSIBLE: usize = 16;
 
 /// The spread of all drops and each drop about its likely course; `None` where a drop makes no sense.
-pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<Judged> {
-    let [x, y] = known.place_m;
-    let [time_s, place_m] = known.said.unwrap_or([1e-4, 5e-3]);
+pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration) -> Option<Judged> {
+    let [x, y] = calibration.place_m;
+    let [time_s, place_m] = calibration.estimated.unwrap_or([1e-4, 5e-3]);
     let mut spread = Spread {
-        time_s: known.time_s.unwrap_or(time_s),
+        time_s: calibration.time_s.unwrap_or(time_s),
         place_m: [x.or(y).unwrap_or(place_m), y.or(x).unwrap_or(place_m)],
         kappa: 3e3,
-        came_rad: 0.03,
-        restitution: if known.time_s.is_some() { 0.0 } else { 1e-3 },
+        approach_rad: 0.03,
+        restitution: if calibration.time_s.is_some() { 0.0 } else { 1e-3 },
     };
     let mut plausible = vec![spread; PLAUSIBLE];
     let mut begin = *effects;
@@ -223,7 +223,7 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, known: Known) -> Option<J
     let nuisances = nuisances(drops);
     for _ in 0..ROUNDS {
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, &nuisances)).collect();
-        let likelihood = Likelihood { drops: &parts, columns: nuisances.len(), known, start: spread };
+        let likelihood = Likelihood { drops: &parts, columns: nuisances.len(), calibration, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);
         let (_, moved) = likelihood.value(&spread)?;
         plausible = Likelihood { start: spread, ..likelihood }.plausible();

@@ -4,23 +4,24 @@
 //! errors of times are correlated, and the engine finds by how much where there are drops enough.
 
 use missing_physics::data::Run;
-use missing_physics::model::{ErrorModel, Extensions, Model, PredictError, Scope, Spec};
+use missing_physics::model::{
+    ErrorModel, Extensions, Model, ParameterRef, PredictError, Scope, Spec, UNBOUNDED,
+};
 
 use bounce_audio::impact::{rebound, speed_after_drop};
 
 use super::drop::Drop;
-use super::model::Setup;
-use super::spec::{Places, build};
-use crate::builder::{ANY, At};
+use super::setup::Setup;
+use super::spec::{Layout, build};
 
 /// The model of times alone.
 #[derive(Debug)]
 pub(super) struct TimesModel {
     setup: Setup,
     spec: Spec,
-    places: Places,
-    begins: At,
-    leaves: Option<At>,
+    layout: Layout,
+    begins: ParameterRef,
+    leaves: Option<ParameterRef>,
     height_m: Option<f64>,
     longest_noise: f64,
 }
@@ -38,13 +39,13 @@ const FOUND: usize = 2;
 impl TimesModel {
     /// `stated`: whether the clock's sigma is.
     pub(super) fn new(setup: Setup, restitution: f64, height_m: Option<f64>, stated: bool) -> Self {
-        let (spec, places, begins, leaves) = build_times(&setup, restitution);
+        let (spec, layout, begins, leaves) = build_times(&setup, restitution);
         let longest_noise = match setup.unheard[1] {
             2.. => f64::INFINITY,
             _ if setup.listened || stated => LONGEST_IN_ONE,
             _ => LONGEST_MARKED,
         };
-        Self { setup, spec, places, begins, leaves, height_m, longest_noise }
+        Self { setup, spec, layout, begins, leaves, height_m, longest_noise }
     }
 
     /// The run of a drop.
@@ -78,7 +79,7 @@ impl TimesModel {
         hidden: usize,
         out: &mut [f64],
     ) -> Result<(), String> {
-        let p = &self.places;
+        let p = &self.layout;
         let drag = shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0);
         let squared = shared[p.squared.slot];
         let restitution = |speed: f64| {
@@ -115,7 +116,7 @@ impl TimesModel {
             return Err("its impacts are not numbered".into());
         }
         self.times(run, shared, nuisance, KNOWN, out)?;
-        let split = self.places.unheard.map_or(0.0, |at| shared[at.slot]);
+        let split = self.layout.unheard.map_or(0.0, |at| shared[at.slot]);
         if split != 0.0 {
             let mut apart = vec![0.0; out.len()];
             self.times(run, shared, nuisance, FOUND, &mut apart)?;
@@ -125,11 +126,16 @@ impl TimesModel {
     }
 }
 
-fn build_times(setup: &Setup, restitution: f64) -> (Spec, Places, At, Option<At>) {
-    let (mut b, places) = build(setup, restitution);
-    let begins = b.nuisance("first_impact_s", "s", ANY, 0.1);
+/// The specification of a set-up in which only times were measured: where a drop begins, and how fast it leaves the table there, are each
+/// run's own.
+pub(super) fn build_times(
+    setup: &Setup,
+    restitution: f64,
+) -> (Spec, Layout, ParameterRef, Option<ParameterRef>) {
+    let (mut b, layout) = build(setup, restitution);
+    let begins = b.nuisance("first_impact_s", "s", UNBOUNDED, 0.1);
     let leaves = (!setup.dropped).then(|| b.nuisance("leaves_m_s", "m/s", [0.0, 1e3], 0.5));
-    (b.build_unchecked(), places, begins, leaves)
+    (b.build_unchecked(), layout, begins, leaves)
 }
 
 impl Model for TimesModel {

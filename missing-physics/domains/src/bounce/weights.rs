@@ -6,7 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::drop::{Drop, Effects, Measured, PER_IMPACT};
+use super::drop::{Drop, Measured, PER_IMPACT};
+use super::effects::Effects;
 
 /// Sigmas of what is measured, and the spread of directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +17,7 @@ pub(super) struct Spread {
     /// Concentration of the directions after an impact (von Mises and Fisher).
     pub(super) kappa: f64,
     /// How far from straight down a ball first comes to the table, along each axis, rad.
-    pub(super) came_rad: f64,
+    pub(super) approach_rad: f64,
     /// Scatter of the restitution's logarithm from impact to impact; zero where the clock's sigma is known.
     pub(super) restitution: f64,
 }
@@ -41,8 +42,8 @@ pub(super) struct Linear {
     /// Where the ball heads after each impact: a direction scatters across it.
     headings: Vec<[f64; 2]>,
     /// What the errors have beyond the straight line, being curved: on average, and its covariance.
-    curved: DVector<f64>,
-    bent: DMatrix<f64>,
+    curvature: DVector<f64>,
+    curvature_covariance: DMatrix<f64>,
 }
 
 impl Linear {
@@ -66,10 +67,18 @@ impl Linear {
         let change = (rubbed - &free) / FRICTION;
         let off = measured.values() - drop.values();
         let shift = [&free * &off, &change * &off];
-        let curved = DVector::zeros(free.nrows());
-        let bent = DMatrix::zeros(free.nrows(), free.nrows());
+        let curvature = DVector::zeros(free.nrows());
+        let curvature_covariance = DMatrix::zeros(free.nrows(), free.nrows());
         let headings = drop.headings(effects);
-        Self { measured: measured.clone(), drop, sensitivity: [free, change], shift, headings, curved, bent }
+        Self {
+            measured: measured.clone(),
+            drop,
+            sensitivity: [free, change],
+            shift,
+            headings,
+            curvature,
+            curvature_covariance,
+        }
     }
 
     /// The errors under some effects.
@@ -91,11 +100,11 @@ impl Linear {
     }
 
     fn errors_of(&self, drop: &Drop, effects: &Effects) -> DVector<f64> {
-        let mut out = DVector::zeros(self.curved.len());
+        let mut out = DVector::zeros(self.curvature.len());
         drop.errors(effects, out.as_mut_slice());
         out += &self.shift[0];
         out += &self.shift[1] * effects.friction;
-        out + &self.curved
+        out + &self.curvature
     }
 
     /// Takes independent standard normal values to errors of the measured values.
@@ -108,7 +117,7 @@ impl Linear {
                 Measured::Place(k, axis) => (0..=axis).for_each(|j| {
                     root[(i, i - axis + j)] = spread.place_m[axis] * self.drop.relative(k).place[axis][j];
                 }),
-                Measured::Came(_) => root[(i, i)] = spread.came_rad,
+                Measured::Approach(_) => root[(i, i)] = spread.approach_rad,
             }
         }
         root
@@ -128,7 +137,7 @@ impl Linear {
 
     fn covariance(&self, spread: &Spread, friction: f64) -> DMatrix<f64> {
         let scaled = self.scaled(spread, friction);
-        let mut covariance = &scaled * scaled.transpose() + &self.bent;
+        let mut covariance = &scaled * scaled.transpose() + &self.curvature_covariance;
         self.scatter(&mut covariance, spread);
         // At least what rounding does, far below any clock.
         let scatter = spread.restitution.powi(2).max(1e-18);
@@ -151,19 +160,19 @@ impl Linear {
     /// Scaled derivatives of the directions, which say which drop is likely, and the factor of their covariance.
     ///
     /// Speeds have no say: they hang on places by the squares of small angles, which no straight line follows.
-    fn telling(&self, spread: &Spread) -> Option<(DMatrix<f64>, Cholesky<f64, Dyn>)> {
+    fn of_directions(&self, spread: &Spread) -> Option<(DMatrix<f64>, Cholesky<f64, Dyn>)> {
         let rows = self.drop.directions();
         let derivatives = self.scaled(spread, 0.0).rows(0, rows).into_owned();
         let covariance = self.covariance(spread, 0.0).view((0, 0), (rows, rows)).into_owned();
         Some((derivatives, covariance.cholesky()?))
     }
 
-    /// The same about the likely drop: the one whose errors are as small as they should be. `None` where it makes no sense.
+    /// The linearisation about the likely drop: the one whose errors are as small as they should be. `None` where that makes no sense.
     pub(super) fn likely(&self, effects: &Effects, spread: &Spread) -> Option<Self> {
         let effects = Effects { friction: 0.0, ..*effects };
-        let (told, factor) = self.telling(spread)?;
-        let errors = self.errors(&effects).rows(0, told.nrows()).into_owned();
-        let pulled = self.root(spread) * told.tr_mul(&factor.solve(&errors));
+        let (derivatives, factor) = self.of_directions(spread)?;
+        let errors = self.errors(&effects).rows(0, derivatives.nrows()).into_owned();
+        let pulled = self.root(spread) * derivatives.tr_mul(&factor.solve(&errors));
         let mut drop = self.measured.clone();
         pulled.iter().enumerate().for_each(|(i, pull)| drop.nudge(i, -pull));
         if drop.times_s.windows(2).any(|w| w[1] <= w[0]) {
@@ -178,17 +187,17 @@ impl Linear {
     fn curve(&mut self, effects: &Effects, spread: &Spread) -> Option<()> {
         // Air bends nothing here that gravity does not.
         let effects = Effects { drag_per_m: 0.0, ..*effects };
-        let (mut told, factor) = self.telling(spread)?;
-        factor.l_dirty().solve_lower_triangular_mut(&mut told).then_some(())?;
-        let n = told.ncols();
-        let eigen = SymmetricEigen::new(DMatrix::identity(n, n) - told.tr_mul(&told));
+        let (mut derivatives, factor) = self.of_directions(spread)?;
+        factor.l_dirty().solve_lower_triangular_mut(&mut derivatives).then_some(())?;
+        let n = derivatives.ncols();
+        let eigen = SymmetricEigen::new(DMatrix::identity(n, n) - derivatives.tr_mul(&derivatives));
         let root = self.root(spread);
         // Steps of half a sigma keep times in their order.
         const STEP: f64 = 0.5;
         let axes: Vec<DVector<f64>> = (0..n)
             .map(|k| &root * eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt())
             .collect();
-        let rows = self.curved.len();
+        let rows = self.curvature.len();
         let at = |step: &DVector<f64>| {
             let mut drop = self.drop.clone();
             step.iter().enumerate().for_each(|(i, v)| drop.nudge(i, STEP * v));
@@ -198,7 +207,7 @@ impl Linear {
         };
         let centre = at(&DVector::zeros(n));
         let single: Vec<[DVector<f64>; 2]> = axes.iter().map(|a| [at(a), at(&-a)]).collect();
-        let (mut curved, mut bent) = (DVector::zeros(rows), DMatrix::zeros(rows, rows));
+        let (mut curvature, mut curvature_covariance) = (DVector::zeros(rows), DMatrix::zeros(rows, rows));
         for j in 0..n {
             for k in 0..=j {
                 let second = if j == k {
@@ -207,12 +216,12 @@ impl Linear {
                     at(&(&axes[j] + &axes[k])) - &single[j][0] - &single[k][0] + &centre
                 } / (STEP * STEP);
                 if j == k {
-                    curved += &second * 0.5;
+                    curvature += &second * 0.5;
                 }
-                bent.ger(if j == k { 0.5 } else { 1.0 }, &second, &second, 1.0);
+                curvature_covariance.ger(if j == k { 0.5 } else { 1.0 }, &second, &second, 1.0);
             }
         }
-        (self.curved, self.bent) = (curved, bent);
+        (self.curvature, self.curvature_covariance) = (curvature, curvature_covariance);
         Some(())
     }
 }

@@ -1,12 +1,11 @@
 //! What a recording says of its simulator: program, parameters, mechanisms.
 
+use missing_physics::model::{ParameterRef, SpecBuilder, UNBOUNDED};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use missing_physics::model::Scope;
-
+use super::model::Names;
 use super::process::Start;
-use crate::builder::{ANY, At, Builder};
 use crate::recording::{Header, ReadError, Section, quoted};
 
 /// The program, where the recording names one, and the step of derivatives.
@@ -28,11 +27,8 @@ pub(super) fn program(header: &Header) -> Result<(Option<Start>, f64), ReadError
     Ok((start, step))
 }
 
-/// Parameters by the names that the program knows them by.
-pub(super) type Names = Vec<(String, Scope, usize)>;
-
 /// Adds the declared parameters and mechanisms to a specification.
-pub(super) fn declare(header: &Header, b: &mut Builder) -> Result<Names, ReadError> {
+pub(super) fn declare(header: &Header, b: &mut SpecBuilder) -> Result<Names, ReadError> {
     let mut names = Names::new();
     for section in header.root().sections("parameter")? {
         parameter(&section, "start", None, b, &mut names)?;
@@ -49,7 +45,7 @@ pub(super) fn declare(header: &Header, b: &mut Builder) -> Result<Names, ReadErr
         let name = section.optional_text("name", "a text")?.unwrap_or(id);
         let texts = [name, text("explanation")?, text("equation")?, text("reference")?];
         let confused = section.texts("confused_with")?.unwrap_or_default();
-        let nuisance: Vec<At> = section
+        let nuisance: Vec<ParameterRef> = section
             .sections("parameter")?
             .iter()
             .map(|s| parameter(s, "off", Some(0.0), b, &mut names))
@@ -67,16 +63,16 @@ fn parameter(
     section: &Section<'_>,
     start: &str,
     default: Option<f64>,
-    b: &mut Builder,
+    b: &mut SpecBuilder,
     names: &mut Names,
-) -> Result<At, ReadError> {
+) -> Result<ParameterRef, ReadError> {
     let expected = "a name, unlike the other parameters'";
     let name = section.text("name", expected)?;
     if name.is_empty() || names.iter().any(|(n, _, _)| n == name) {
         return Err(section.unfit("name", quoted(name), expected));
     }
     let unit = section.optional_text("unit", "a unit, such as \"1/s\"")?.unwrap_or_default();
-    let [lowest, highest] = ANY;
+    let [lowest, highest] = UNBOUNDED;
     let lower = section.number("lower", lowest, highest)?.unwrap_or(lowest);
     let upper = section.number("upper", highest.min(lower), highest)?.unwrap_or(highest);
     if !(upper > lower) {

@@ -1,5 +1,6 @@
 //! The domain `custom`: anybody's simulator, as a program that is asked or as columns that it has written.
 
+mod answer;
 mod declare;
 mod model;
 mod process;
@@ -8,15 +9,14 @@ mod terms;
 use std::collections::HashMap;
 
 use missing_physics::data::{Recording, Run};
-use missing_physics::model::{Experiment, Quantity, Scope, Spec};
+use missing_physics::model::{Experiment, Quantity, Scope, Spec, SpecBuilder};
 
-use super::builder::Builder;
-use super::reading::{calibration, check_runs, number, resolution};
+use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::reading::{calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Table, quoted};
-use crate::{Domain, Loaded, Template};
-use model::{Asked, CustomModel, Simulation};
+pub use answer::{Failure, read_answer};
+use model::{CustomModel, Program, Simulation};
 use process::Pool;
-pub use process::{Failure, read_answer};
 use terms::Sizes;
 
 /// A run with fewer rows says nothing of a curve.
@@ -74,11 +74,11 @@ impl Domain for Custom {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let inputs = quantities(header, "input")?;
         let channels = quantities(header, "channel")?;
         let (program, relative_step) = declare::program(header)?;
-        let mut b = Builder::default();
+        let mut b = SpecBuilder::default();
         let parameters = declare::declare(header, &mut b)?;
         b.baseline(header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE));
         let channel_names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
@@ -113,18 +113,14 @@ impl Domain for Custom {
         );
         let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
         let simulation = match program {
-            Some(start) => Simulation::Asked(Box::new(Asked {
-                pool: Pool::new(start),
-                inputs: inputs.iter().map(|q| q.name.clone()).collect(),
-                channels: channels.iter().map(|q| q.name.clone()).collect(),
-                parameters,
-                kept: Default::default(),
-            })),
+            Some(start) => {
+                Simulation::Program(Box::new(Program::new(Pool::new(start), &inputs, &channels, parameters)))
+            }
             None if !parameters.is_empty() => {
                 let expected = "a program, for the parameters and mechanisms that are declared";
                 return Err(header.section("simulator")?.unfit("command", "absent", expected));
             }
-            None => Simulation::Made(made(&table, &simulated)?),
+            None => Simulation::Precomputed(precomputed(&table, &simulated)?),
         };
         let resolution = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution)).collect();
         let recording = Recording {
@@ -136,13 +132,7 @@ impl Domain for Custom {
             resolution,
         };
         let model = CustomModel { spec: b.build_unchecked(), simulation, terms, relative_step };
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments,
-            undetermined: Vec::new(),
-            additions: serde_json::Map::new(),
-        })
+        Ok(Loaded::new(recording, model, experiments, Vec::new()).into())
     }
 }
 
@@ -194,7 +184,7 @@ fn runs(table: &Table<'_>, inputs: &[Quantity], channels: &[Quantity]) -> Result
 }
 
 /// What was simulated before, by run.
-fn made(table: &Table<'_>, simulated: &[String]) -> Result<HashMap<String, Vec<f64>>, ReadError> {
+fn precomputed(table: &Table<'_>, simulated: &[String]) -> Result<HashMap<String, Vec<f64>>, ReadError> {
     let expected = "the simulation's prediction, or a program in [simulator] command";
     let labels = table.labels("run", "the label of each row's run")?;
     let columns: Vec<&[f64]> = simulated

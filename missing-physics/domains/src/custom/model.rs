@@ -1,47 +1,45 @@
 //! A model of which the tool knows nothing but its predictions.
 
-use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 use missing_physics::data::Run;
-use missing_physics::model::{Extensions, ExternalProgram, Model, PredictError, Scope, Spec};
+use missing_physics::model::{Extensions, ExternalProgram, Model, PredictError, Quantity, Scope, Spec};
 
-use super::process::{Failure, Pool};
+use super::answer::Failure;
+use super::process::Pool;
 use super::terms::Candidate;
+use crate::memo::{Memo, bits};
 
-/// Predictions that are kept, in numbers altogether.
-const MOST_KEPT: usize = 16 << 20;
+/// How many predicted numbers are remembered altogether.
+const MOST_NUMBERS: usize = 16 << 20;
 
 /// Where predictions come from.
 #[derive(Debug)]
 pub(super) enum Simulation {
     /// They were made before: all channels of each run.
-    Made(HashMap<String, Vec<f64>>),
+    Precomputed(HashMap<String, Vec<f64>>),
     /// A program is asked.
-    Asked(Box<Asked>),
+    Program(Box<Program>),
 }
+
+/// Parameters by the names that the program knows them by, with scope and slot.
+pub(super) type Names = Vec<(String, Scope, usize)>;
 
 /// A program that predicts.
 #[derive(Debug)]
-pub(super) struct Asked {
-    pub(super) pool: Pool,
+pub(super) struct Program {
+    pool: Pool,
     /// Names of the inputs, as the program gets them.
-    pub(super) inputs: Vec<String>,
+    inputs: Vec<String>,
     /// Names of the channels, as the program answers them.
-    pub(super) channels: Vec<String>,
-    /// Names of the parameters, with scope and slot.
-    pub(super) parameters: Vec<(String, Scope, usize)>,
-    pub(super) kept: Mutex<Kept>,
+    channels: Vec<String>,
+    parameters: Names,
+    /// Predictions by run, number of rows, and the bits of the parameters.
+    predictions: Memo<(String, usize, Vec<u64>), Arc<Vec<f64>>>,
 }
 
-/// Predictions by run and parameters.
-#[derive(Debug, Default)]
-pub(super) struct Kept {
-    by: HashMap<(String, Vec<u64>), Arc<Vec<f64>>>,
-    numbers: usize,
-}
-
-/// The model.
+/// The model of the domain `custom`.
 #[derive(Debug)]
 pub(super) struct CustomModel {
     pub(super) spec: Spec,
@@ -50,7 +48,14 @@ pub(super) struct CustomModel {
     pub(super) relative_step: f64,
 }
 
-impl Asked {
+impl Program {
+    /// A program that is started when it is first asked.
+    pub(super) fn new(pool: Pool, inputs: &[Quantity], channels: &[Quantity], parameters: Names) -> Self {
+        let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.clone()).collect();
+        let (inputs, channels) = (names(inputs), names(channels));
+        Self { pool, inputs, channels, parameters, predictions: Memo::new(MOST_NUMBERS) }
+    }
+
     fn predict(
         &self,
         run: &Run,
@@ -58,30 +63,20 @@ impl Asked {
         nuisance: &[f64],
         rows: usize,
     ) -> Result<Arc<Vec<f64>>, Failure> {
-        let value = |scope: &Scope, slot: &usize| match scope {
+        let value = |(_, scope, slot): &(String, Scope, usize)| match scope {
             Scope::Shared => shared[*slot],
             Scope::PerRun => nuisance[*slot],
         };
-        let bits = self.parameters.iter().map(|(_, scope, slot)| value(scope, slot).to_bits()).collect();
-        let key = (run.label.clone(), bits);
-        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = lock().by.get(&key).filter(|k| k.len() == rows) {
-            return Ok(Arc::clone(kept));
-        }
-        let parameters: BTreeMap<&str, f64> =
-            self.parameters.iter().map(|(name, scope, slot)| (name.as_str(), value(scope, slot))).collect();
-        let inputs =
-            self.inputs.iter().map(String::as_str).zip(run.inputs.iter().map(Vec::as_slice)).collect();
-        let mut out = vec![0.0; rows];
-        self.pool.predict(&run.label, parameters, inputs, &self.channels, &mut out)?;
-        let out = Arc::new(out);
-        let mut kept = lock();
-        if kept.numbers + rows > MOST_KEPT {
-            *kept = Kept::default();
-        }
-        kept.numbers += rows;
-        kept.by.insert(key, Arc::clone(&out));
-        Ok(out)
+        let values: Vec<f64> = self.parameters.iter().map(value).collect();
+        self.predictions.get_or((run.label.clone(), rows, bits(&values)), rows, || {
+            let names = self.parameters.iter().map(|(name, ..)| name.as_str());
+            let parameters = names.zip(values.iter().copied()).collect();
+            let inputs =
+                self.inputs.iter().map(String::as_str).zip(run.inputs.iter().map(Vec::as_slice)).collect();
+            let mut out = vec![0.0; rows];
+            self.pool.predict(&run.label, parameters, inputs, &self.channels, &mut out)?;
+            Ok(Arc::new(out))
+        })
     }
 }
 
@@ -99,13 +94,13 @@ impl Model for CustomModel {
     ) -> Result<(), PredictError> {
         let fail = |reason: String| PredictError { run: run.label.clone(), reason };
         match &self.simulation {
-            Simulation::Made(made) => {
+            Simulation::Precomputed(made) => {
                 let made = made.get(&run.label).filter(|m| m.len() == out.len());
                 out.copy_from_slice(made.ok_or_else(|| fail("no such run was simulated".into()))?);
             }
-            Simulation::Asked(asked) => match asked.predict(run, shared, nuisance, out.len()) {
+            Simulation::Program(program) => match program.predict(run, shared, nuisance, out.len()) {
                 Ok(predicted) => out.copy_from_slice(&predicted),
-                Err(Failure::Here(why) | Failure::Forever(why)) => return Err(fail(why)),
+                Err(Failure::NoPrediction(why) | Failure::Fatal(why)) => return Err(fail(why)),
             },
         }
         if self.terms.iter().any(|t| shared[t.slot] != 0.0) {
@@ -129,9 +124,9 @@ impl Model for CustomModel {
 impl ExternalProgram for CustomModel {
     fn fatal_error(&self) -> Option<PredictError> {
         match &self.simulation {
-            Simulation::Made(_) => None,
-            Simulation::Asked(asked) => {
-                asked.pool.fault().map(|reason| PredictError { run: "(any)".into(), reason })
+            Simulation::Precomputed(_) => None,
+            Simulation::Program(program) => {
+                program.pool.fault().map(|reason| PredictError { run: "(any)".into(), reason })
             }
         }
     }

@@ -8,14 +8,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use crate::recording::{brief, quoted};
+use super::answer::{Failure, read_answer};
+use crate::recording::quoted;
 
 /// The longest line that a simulator may answer, bytes.
 const LONGEST_LINE: u64 = 64 << 20;
 /// How many of its last words on stderr are kept.
-const KEPT_ERRORS: usize = 3;
+const LAST_WORDS: usize = 3;
 /// How long a simulator has for its first answer beyond the time limit: programs take their time to start.
 const START: Duration = Duration::from_secs(30);
 /// How long a simulator that is no longer needed has for its own end.
@@ -28,27 +29,6 @@ struct Request<'a> {
     run: &'a str,
     parameters: BTreeMap<&'a str, f64>,
     inputs: BTreeMap<&'a str, &'a [f64]>,
-}
-
-/// What is answered: predicted channels, or why there are none.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Reply {
-    id: u64,
-    #[serde(default)]
-    channels: BTreeMap<String, Vec<Option<f64>>>,
-    error: Option<String>,
-}
-
-/// Why a simulator gives no prediction.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Failure {
-    /// None at these parameters; others may do.
-    #[error("{0}")]
-    Here(String),
-    /// None any more.
-    #[error("{0}")]
-    Forever(String),
 }
 
 /// How a simulator is started.
@@ -105,7 +85,7 @@ impl Pool {
             .and_then(|line| read_answer(&line, id, channels, out));
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match &answer {
-            Err(Failure::Forever(why)) => {
+            Err(Failure::Fatal(why)) => {
                 state.fault.get_or_insert_with(|| why.clone());
                 state.running -= 1;
             }
@@ -121,7 +101,7 @@ impl Pool {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(fault) = &state.fault {
-                return Err(Failure::Forever(fault.clone()));
+                return Err(Failure::Fatal(fault.clone()));
             }
             state.asked += 1;
             let id = state.asked;
@@ -136,63 +116,13 @@ impl Pool {
                     }
                     Err(why) => {
                         state.fault = Some(why.clone());
-                        Err(Failure::Forever(why))
+                        Err(Failure::Fatal(why))
                     }
                 };
             }
             state = self.freed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
-}
-
-/// Reads a simulator's line that answers question `id` into `out`: the channels one after the other, as many rows of each.
-///
-/// # Errors
-/// [`Failure::Here`] where the simulator says that it cannot, or a number is not finite; [`Failure::Forever`] where the line is no
-/// such answer, with what came.
-pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) -> Result<(), Failure> {
-    let forever = |why: String| Err(Failure::Forever(why));
-    // Python and others write NaN and Infinity, which are no JSON.
-    let reply: Result<Reply, _> = serde_json::from_str(line).or_else(|e| {
-        let plain = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
-        serde_json::from_str(&plain).map_err(|_| e)
-    });
-    let reply = match reply {
-        Ok(reply) => reply,
-        Err(e) => {
-            return forever(format!(
-                "the simulator answered {}, expected {{\"id\": {id}, \"channels\": {{…}}}} on one line ({})",
-                quoted(line),
-                brief(&e.to_string())
-            ));
-        }
-    };
-    if reply.id != id {
-        return forever(format!("the simulator answered question {}, expected question {id}", reply.id));
-    }
-    if let Some(why) = reply.error {
-        return Err(Failure::Here(format!("the simulator says {}", quoted(&why))));
-    }
-    let rows = out.len() / channels.len().max(1);
-    for (name, out) in channels.iter().zip(out.chunks_exact_mut(rows.max(1))) {
-        let Some(values) = reply.channels.get(name) else {
-            let names: Vec<&str> = reply.channels.keys().map(String::as_str).collect();
-            let got = if names.is_empty() { "none".into() } else { names.join(", ") };
-            return forever(format!("the simulator answered the channels {}, expected {name}", brief(&got)));
-        };
-        if values.len() != rows {
-            return forever(format!(
-                "the simulator answered {} values of {name}, expected {rows}, one for each row",
-                values.len()
-            ));
-        }
-        for (row, (out, value)) in out.iter_mut().zip(values).enumerate() {
-            *out = value.filter(|v| v.is_finite()).ok_or_else(|| {
-                Failure::Here(format!("the simulator answered no finite number for {name} at row {row}"))
-            })?;
-        }
-    }
-    Ok(())
 }
 
 /// A simulator that runs.
@@ -249,7 +179,7 @@ impl Process {
                 if !line.is_empty() {
                     kept.push_back(line);
                 }
-                if kept.len() > KEPT_ERRORS {
+                if kept.len() > LAST_WORDS {
                     kept.pop_front();
                 }
             }
@@ -260,7 +190,7 @@ impl Process {
     /// The line that answers a question.
     fn ask(&mut self, request: &Request<'_>, limit: Duration) -> Result<String, Failure> {
         let mut line = serde_json::to_string(request)
-            .map_err(|e| Failure::Here(format!("the question cannot be written: {e}")))?;
+            .map_err(|e| Failure::NoPrediction(format!("the question cannot be written: {e}")))?;
         line.push('\n');
         let limit = if std::mem::take(&mut self.fresh) { limit + START } else { limit };
         if self.questions.as_ref().is_none_or(|q| q.send(line).is_err()) {
@@ -269,12 +199,12 @@ impl Process {
         match self.answers.recv_timeout(limit) {
             Ok(line) => String::from_utf8(line).map_err(|e| {
                 let got = String::from_utf8_lossy(e.as_bytes()).into_owned();
-                Failure::Forever(format!("the simulator answered {}, which is no text", quoted(&got)))
+                Failure::Fatal(format!("the simulator answered {}, which is no text", quoted(&got)))
             }),
             Err(RecvTimeoutError::Timeout) => {
                 let _ = self.child.kill();
                 let limit = limit.as_secs_f64();
-                Err(Failure::Forever(format!(
+                Err(Failure::Fatal(format!(
                     "the simulator gave no answer within {limit} s{}",
                     self.last_words()
                 )))
@@ -289,7 +219,7 @@ impl Process {
             Some(status) => format!("ended ({status})"),
             None => "closed its output".into(),
         };
-        Failure::Forever(format!("the simulator {how} before it answered{}", self.last_words()))
+        Failure::Fatal(format!("the simulator {how} before it answered{}", self.last_words()))
     }
 
     fn last_words(&self) -> String {

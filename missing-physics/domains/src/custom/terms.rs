@@ -1,9 +1,7 @@
 //! What an unknown law could be made of, where nothing is known but names: powers and products of the known inputs, of the
 //! predicted channels and of how fast these change.
 
-use missing_physics::model::Quantity;
-
-use crate::builder::Builder;
+use missing_physics::model::{Quantity, SpecBuilder};
 
 /// A variable of a term.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,7 +64,7 @@ pub(super) struct Sizes<'a> {
 const MOST_VARIABLES: usize = 8;
 
 /// Adds the candidate terms of every channel to a specification.
-pub(super) fn add(b: &mut Builder, sizes: &Sizes<'_>) -> Vec<Candidate> {
+pub(super) fn add(b: &mut SpecBuilder, sizes: &Sizes<'_>) -> Vec<Candidate> {
     let known = variables(sizes);
     let mut candidates = Vec::new();
     for (channel, (quantity, typical)) in sizes.channels.iter().enumerate() {

@@ -3,7 +3,7 @@
 use missing_physics::model::Experiment;
 
 use super::model::DoughModel;
-use super::read::{RunOfRolls, Step};
+use super::rolls::{RunOfRolls, Step};
 
 /// Runs of a proposed experiment.
 const REPEATS: usize = 4;

@@ -20,7 +20,7 @@ impl Forces {
         &self.0
     }
 
-    /// What of a roll of a force takes place where the band slips below another; all of it where it never slips.
+    /// The part of a roll of a force that takes place where the band slips below another; all of it where it never slips.
     pub(super) fn grip(&self, force_n: f64, slip_n: f64) -> f64 {
         if slip_n > 0.0 {
             1.0 / (1.0 + ((self.place(slip_n) - self.place(force_n)) / ONSET).exp())

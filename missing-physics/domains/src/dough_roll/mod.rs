@@ -5,32 +5,21 @@
 
 mod experiments;
 mod forces;
+mod least;
 mod model;
 mod read;
+mod rolls;
 mod spec;
 
 use dough_mbrl::dynamics::Dynamics;
 use missing_physics::data::Recording;
 use missing_physics::model::{Quantity, Spec};
 
-use self::model::{CHANNELS, DoughModel};
-use super::reading::number;
-use crate::recording::{Column, Header, ReadError};
-use crate::{Domain, Loaded, Template};
-
-const COLUMNS: [Column; 11] = [
-    Column { name: "run", what: "label of the run", label: true },
-    number("step", "number of the roll in its run"),
-    number("length_m", "length in metres"),
-    number("width_m", "width in metres"),
-    number("height_m", "height in metres"),
-    number("throw_m", "throw of the band in metres"),
-    number("depth_m", "depth of the roll in metres"),
-    number("next_length_m", "length after the roll in metres"),
-    number("next_width_m", "width after the roll in metres"),
-    number("next_height_m", "height after the roll in metres"),
-    number("t_s", "time in seconds"),
-];
+use self::model::DoughModel;
+use self::read::Read;
+use self::rolls::{CHANNELS, RunOfRolls, Step};
+use crate::domain::{CheckedRecording, Contents, Domain, Loaded, RunContents, Template};
+use crate::recording::{Header, ReadError};
 
 /// The domain.
 #[derive(Debug, Clone, Copy)]
@@ -71,58 +60,80 @@ impl Domain for DoughRoll {
         false
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let read = read::read(header)?;
-        let dynamics = Dynamics::learn(&read.training).map_err(|e| ReadError::TooFewRows {
-            file: read.blame.file.clone(),
-            what: "the training".into(),
-            got: read.training.iter().map(Vec::len).sum(),
-            expected: format!("rolls that determine the dynamics: {e}"),
-        })?;
-        let steps: Vec<_> = read.runs.iter().flat_map(|(_, steps)| steps.iter().copied()).collect();
-        let mut model = DoughModel::new(read.band, dynamics, read.timed, &steps);
-        let runs = model.add(&read.runs);
-        let experiments = experiments::experiments(&mut model, &read.runs);
-        let variable = |name: &str, unit: &str| Quantity::new(name, unit);
-        let recording = Recording {
-            channels: CHANNELS.iter().map(|name| Quantity::new(*name, "m")).collect(),
-            // What dough and band are comes before the number of the roll and the time, with which a dough only grows.
-            variables: vec![
-                variable("length_m", "m"),
-                variable("width_m", "m"),
-                variable("height_m", "m"),
-                variable("throw_m", "m"),
-                variable("depth_m", "m"),
-                variable("force_n", "N"),
-                variable("step", ""),
-                variable("t_s", "s"),
-            ],
-            runs,
-            noise_along: None,
-            calibration: vec![None; CHANNELS.len()],
-            resolution: vec![0.0; CHANNELS.len()],
-        };
-        let mut undetermined = vec![
-            "what the training rolls did not show (deeper rolls, longer doughs) counts as not known, not as misfit"
-                .into(),
-        ];
-        if !read.timed {
-            undetermined
-                .push("without t_s, drying is not told from a band that tires or another stiffness".into());
-        }
-        if read.one_picture() {
-            undetermined.push(
-                "a state before a roll repeats the one after the roll before it: from one picture, noise is not told \
-                 from what rolls do, and p-values mislead; take a second picture before each roll"
-                    .into(),
-            );
-        }
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments,
-            undetermined,
-            additions: serde_json::Map::new(),
-        })
+        Ok(CheckedRecording::new(contents(&read), || prepare(read)))
     }
+}
+
+/// What a recording holds.
+fn contents(read: &Read) -> Contents {
+    let steps: Vec<Step> = read.runs.iter().flat_map(|(_, steps)| steps.iter().copied()).collect();
+    let run = |(label, steps): &RunOfRolls| {
+        RunContents::new(label, &steps.iter().map(|s| s.roll.state[0]).collect::<Vec<f64>>())
+    };
+    Contents {
+        channels: channels(),
+        calibration: vec![None; CHANNELS.len()],
+        variable: Quantity::new("length_m", "m"),
+        runs: read.runs.iter().map(run).collect(),
+        spec: spec::for_rolls(&read.band, read.timed, &steps).0,
+    }
+}
+
+fn channels() -> Vec<Quantity> {
+    CHANNELS.iter().map(|name| Quantity::new(*name, "m")).collect()
+}
+
+/// Learns the dynamics from the training rolls, and follows the others by them.
+fn prepare(read: Read) -> Result<Loaded, ReadError> {
+    let dynamics = Dynamics::learn(&read.training).map_err(|e| ReadError::TooFewRows {
+        file: read.training_file.clone(),
+        what: "the training".into(),
+        got: read.training.iter().map(Vec::len).sum(),
+        expected: format!("rolls that determine the dynamics: {e}"),
+    })?;
+    let steps: Vec<Step> = read.runs.iter().flat_map(|(_, steps)| steps.iter().copied()).collect();
+    let mut model = DoughModel::new(read.band, dynamics, read.timed, &steps);
+    let runs = model.add(&read.runs);
+    let experiments = experiments::experiments(&mut model, &read.runs);
+    let recording = Recording {
+        channels: channels(),
+        // What dough and band are comes before the number of the roll and the time, with which a dough only grows.
+        variables: [
+            ("length_m", "m"),
+            ("width_m", "m"),
+            ("height_m", "m"),
+            ("throw_m", "m"),
+            ("depth_m", "m"),
+            ("force_n", "N"),
+            ("step", ""),
+            ("t_s", "s"),
+        ]
+        .map(|(name, unit)| Quantity::new(name, unit))
+        .into(),
+        runs,
+        noise_along: None,
+        calibration: vec![None; CHANNELS.len()],
+        resolution: vec![0.0; CHANNELS.len()],
+    };
+    Ok(Loaded::new(recording, model, experiments, undetermined(&read)))
+}
+
+fn undetermined(read: &Read) -> Vec<String> {
+    let mut undetermined = vec![
+        "what the training rolls did not show (deeper rolls, longer doughs) counts as not known, not as misfit".into(),
+    ];
+    if !read.timed {
+        undetermined
+            .push("without t_s, drying is not told from a band that tires or another stiffness".into());
+    }
+    if read.one_picture() {
+        undetermined.push(
+            "a state before a roll repeats the one after the roll before it: from one picture, noise is not told \
+             from what rolls do, and p-values mislead; take a second picture before each roll"
+                .into(),
+        );
+    }
+    undetermined
 }

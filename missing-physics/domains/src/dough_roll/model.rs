@@ -4,8 +4,6 @@ use std::collections::HashMap;
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
 
-use argmin::core::{CostFunction, Error, Executor, State as _};
-use argmin::solver::brent::BrentOpt;
 use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::{Dynamics, Roll};
 use dough_mbrl::filter::{Beside, Fresh, Step as Followed, follow};
@@ -19,9 +17,10 @@ use missing_physics::model::{
 use nalgebra::{DVector, Vector3};
 
 use super::forces::Forces;
-use super::read::{RunOfRolls, Step};
-use super::spec::{Effects, Places, build};
-use crate::kept::{Kept, bits};
+use super::least::least;
+use super::rolls::{RunOfRolls, Step};
+use super::spec::{Effects, Layout, for_rolls, force_n};
+use crate::memo::{Memo, bits};
 
 /// Doughs whose errors are tied by what was not learned.
 #[derive(Debug)]
@@ -29,7 +28,7 @@ struct Block {
     doughs: Vec<Dough>,
     fresh: Fresh,
     tie: Tie,
-    /// Errors where nothing has happened.
+    /// Errors where every effect is off.
     off: DVector<f64>,
 }
 
@@ -41,10 +40,10 @@ struct Dough {
     first: usize,
 }
 
-/// The errors of a block, by the bits of the shared parameters.
-type Errors = Kept<(usize, Vec<u64>), Arc<DVector<f64>>>;
-/// Errors that are kept.
-const MOST_KEPT: usize = 256;
+/// The errors of a block, by its number and the bits of the shared parameters.
+type Errors = Memo<(usize, Vec<u64>), Arc<DVector<f64>>>;
+/// How many blocks' errors are remembered.
+const MOST_ERRORS: usize = 256;
 /// Forces below which a band may slip that are looked at, and those from which a fit begins.
 const MOST_SLIPS: usize = 200;
 const STARTS: usize = 5;
@@ -54,38 +53,32 @@ const STARTS: usize = 5;
 pub(super) struct DoughModel {
     band: Band,
     dynamics: Dynamics,
-    /// Of the recording's rolls.
+    /// Forces of the recording's rolls.
     forces: Forces,
     spec: Spec,
-    places: Places,
+    layout: Layout,
     blocks: Vec<Block>,
     /// What the recording shows at first sight, all rolls alike: how what was not learned ties errors is said there.
-    shown: Option<Effects>,
+    first_estimate: Option<Effects>,
     /// Block and dough of each run.
     runs: HashMap<String, (usize, usize)>,
-    kept: Errors,
+    memo: Errors,
     slips: OnceLock<Vec<(f64, DVector<f64>)>>,
     /// Typical sigma of each channel: errors are shown in metres.
     scale: [f64; 6],
 }
 
-/// Channels: the three dimensions after a roll, and before it.
-pub(super) const CHANNELS: [&str; 6] =
-    ["next_length_m", "next_width_m", "next_height_m", "length_m", "width_m", "height_m"];
-
 impl DoughModel {
     pub(super) fn new(band: Band, dynamics: Dynamics, timed: bool, steps: &[Step]) -> Self {
-        let forces = Forces::of(steps.iter().map(|s| band.force_n(s.roll.action[0], s.roll.action[1])));
-        let strongest = forces.rising().last().copied().unwrap_or_default();
-        let longest = steps.iter().map(|s| s.t_s).fold(0.0, f64::max);
-        let last = steps.iter().map(|s| s.step).fold(1.0, f64::max);
-        let (spec, places) = build(timed.then_some(longest.max(1.0)), strongest.max(1e-9), last);
+        let forces = Forces::of(steps.iter().map(|s| force_n(&band, s)));
+        let (spec, layout) = for_rolls(&band, timed, steps);
         let noise = dynamics.noise();
         let scale = std::array::from_fn(|c| {
             (noise.measured[usize::from(c < 3)][c % 3] + noise.process[c % 3]).sqrt()
         });
-        let (blocks, runs, kept, slips) = (Vec::new(), HashMap::new(), Kept::new(MOST_KEPT), OnceLock::new());
-        Self { band, dynamics, forces, spec, places, blocks, shown: None, runs, kept, slips, scale }
+        let (blocks, runs, memo, slips) =
+            (Vec::new(), HashMap::new(), Memo::new(MOST_ERRORS), OnceLock::new());
+        Self { band, dynamics, forces, spec, layout, blocks, first_estimate: None, runs, memo, slips, scale }
     }
 
     /// Adds runs whose errors are tied, and says what the engine is to see of them.
@@ -99,17 +92,17 @@ impl DoughModel {
         }
         let fresh: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
         let fresh = Fresh::of(&fresh, self.dynamics.noise());
-        let shown = self.shown.unwrap_or_else(|| self.at_first_sight(&doughs, &fresh));
-        self.shown = Some(shown);
+        let shown = self.first_estimate.unwrap_or_else(|| self.estimate_at_first(&doughs, &fresh));
+        self.first_estimate = Some(shown);
         let tie = self.tie(&doughs, &fresh, &shown);
         let mut block = Block { doughs, fresh, tie, off: DVector::zeros(first) };
         block.off = self.errors(&block, &Effects::OFF);
         self.blocks.push(block);
-        runs.iter().enumerate().map(|(k, (label, _))| self.shown(label, k)).collect()
+        runs.iter().enumerate().map(|(k, (label, _))| self.run(label, k)).collect()
     }
 
     /// The common response, springback and loss that are most likely, one after the other.
-    fn at_first_sight(&self, doughs: &[Dough], fresh: &Fresh) -> Effects {
+    fn estimate_at_first(&self, doughs: &[Dough], fresh: &Fresh) -> Effects {
         let cost = |effects: &Effects| -> f64 {
             let off = |d| surprise(&self.follow(d, fresh, effects, &|_| 0.0));
             doughs.iter().map(off).map(|s| s.spread + s.square).sum()
@@ -152,7 +145,7 @@ impl DoughModel {
         })
     }
 
-    /// What of the learned response of a roll takes place.
+    /// The part of the learned response of a roll that takes place.
     fn response(&self, dough: &Dough, roll: usize, effects: &Effects, length_m: f64) -> f64 {
         let step = &dough.steps[roll];
         let grip = self.forces.grip(self.force_n(step), effects.slip_n);
@@ -160,7 +153,7 @@ impl DoughModel {
     }
 
     fn force_n(&self, step: &Step) -> f64 {
-        self.band.force_n(step.roll.action[0], step.roll.action[1])
+        force_n(&self.band, step)
     }
 
     /// The errors of a block under some effects: independent, of variance one.
@@ -168,7 +161,7 @@ impl DoughModel {
         self.errors_of(block, effects, &|_, _| 0.0)
     }
 
-    /// Those of rolls whose response is larger by a part of itself, by dough and roll.
+    /// The errors of a block where the response of each roll is larger by a part of itself, by dough and roll.
     fn errors_of(
         &self,
         block: &Block,
@@ -200,7 +193,7 @@ impl DoughModel {
     }
 
     /// What a change of the recording's errors leaves of a residual, as a sum of squares.
-    fn misses(&self, runs: &[Run], residual: &[Vec<Vec<f64>>], change: &DVector<f64>) -> f64 {
+    fn squared_misfit(&self, runs: &[Run], residual: &[Vec<Vec<f64>>], change: &DVector<f64>) -> f64 {
         let mut sum = 0.0;
         for (run, residual) in runs.iter().zip(residual) {
             let Ok((0, dough)) = self.place(run) else { continue };
@@ -221,15 +214,15 @@ impl DoughModel {
         self.runs.get(&run.label).copied().ok_or_else(unknown)
     }
 
-    /// The same, kept for the other runs of the block.
-    fn kept_errors(&self, block: usize, shared: &[f64]) -> Arc<DVector<f64>> {
-        let make = || Arc::new(self.errors(&self.blocks[block], &self.places.effects(shared)));
-        let Ok(errors) = self.kept.get_or((block, bits(shared)), || Ok::<_, Infallible>(make()));
+    /// The errors of a block at shared parameters, remembered for its other runs.
+    fn errors_at(&self, block: usize, shared: &[f64]) -> Arc<DVector<f64>> {
+        let make = || Arc::new(self.errors(&self.blocks[block], &self.layout.effects(shared)));
+        let Ok(errors) = self.memo.get_or((block, bits(shared)), 1, || Ok::<_, Infallible>(make()));
         errors
     }
 
     /// What the engine is to see of a dough.
-    fn shown(&self, label: &str, dough: usize) -> Run {
+    fn run(&self, label: &str, dough: usize) -> Run {
         let block = &self.blocks[self.blocks.len() - 1];
         let dough = &block.doughs[dough];
         let of = |f: &dyn Fn(&Step) -> f64| dough.steps.iter().map(f).collect::<Vec<f64>>();
@@ -259,25 +252,6 @@ impl DoughModel {
     }
 }
 
-/// A cost of one variable, as argmin takes it.
-struct OneVariable<F>(F);
-
-impl<F: Fn(f64) -> f64> CostFunction for OneVariable<F> {
-    type Param = f64;
-    type Output = f64;
-
-    fn cost(&self, at: &f64) -> Result<f64, Error> {
-        Ok((self.0)(*at))
-    }
-}
-
-/// Where a function of one variable is least, to a ten thousandth of the range, by Brent's method.
-fn least([low, high]: [f64; 2], cost: impl Fn(f64) -> f64) -> f64 {
-    let solver = BrentOpt::new(low, high).set_tolerance(0.0, 1e-4 * (high - low));
-    let found = Executor::new(OneVariable(cost), solver).configure(|state| state.max_iters(40)).run();
-    found.ok().and_then(|f| f.state().get_best_param().copied()).unwrap_or(0.5 * (low + high))
-}
-
 impl Model for DoughModel {
     fn spec(&self) -> &Spec {
         &self.spec
@@ -291,7 +265,7 @@ impl Model for DoughModel {
         out: &mut [f64],
     ) -> Result<(), PredictError> {
         let (block, dough) = self.place(run)?;
-        let errors = self.kept_errors(block, shared);
+        let errors = self.errors_at(block, shared);
         let block = &self.blocks[block];
         let (n, first) = (run.len(), block.doughs[dough].first);
         for (at, value) in out.iter_mut().enumerate() {
@@ -315,23 +289,26 @@ impl Model for DoughModel {
 impl MultimodalModel for DoughModel {
     /// Forces below which the band may slip: between two of those of the rolls there is no slope to follow, so that all are looked at.
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        let slip = self.places.slip.index;
+        let slip = self.layout.slip.index;
         if self.spec.mechanisms[mechanism].parameters != [slip] {
             return Vec::new();
         }
-        let misses: Vec<(f64, f64)> =
-            self.slips().iter().map(|(force_n, off)| (*force_n, self.misses(runs, residual, off))).collect();
+        let misfits: Vec<(f64, f64)> = self
+            .slips()
+            .iter()
+            .map(|(force_n, off)| (*force_n, self.squared_misfit(runs, residual, off)))
+            .collect();
         let least = |&at: &usize| {
-            let near = &misses[at.saturating_sub(1)..(at + 2).min(misses.len())];
-            near.iter().all(|other| misses[at].1 <= other.1)
+            let near = &misfits[at.saturating_sub(1)..(at + 2).min(misfits.len())];
+            near.iter().all(|other| misfits[at].1 <= other.1)
         };
-        let mut tops: Vec<usize> = (0..misses.len()).filter(least).collect();
-        tops.sort_by(|&a, &b| misses[a].1.total_cmp(&misses[b].1));
-        tops.iter().take(STARTS).map(|&at| vec![(slip, misses[at].0)]).collect()
+        let mut tops: Vec<usize> = (0..misfits.len()).filter(least).collect();
+        tops.sort_by(|&a, &b| misfits[a].1.total_cmp(&misfits[b].1));
+        tops.iter().take(STARTS).map(|&at| vec![(slip, misfits[at].0)]).collect()
     }
 
     fn jumps(&self, shared_slot: usize) -> &[f64] {
-        if shared_slot == self.places.slip.slot { self.forces.rising() } else { &[] }
+        if shared_slot == self.layout.slip.slot { self.forces.rising() } else { &[] }
     }
 }
 
@@ -344,7 +321,7 @@ impl CoupledRows for DoughModel {
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError> {
         const PART: f64 = 1e-4;
-        let effects = self.places.effects(shared);
+        let effects = self.layout.effects(shared);
         let places = runs.iter().map(|run| self.place(run)).collect::<Result<Vec<_>, _>>()?;
         let mut changes = vec![Vec::new(); runs.len()];
         for (number, block) in self.blocks.iter().enumerate() {

@@ -3,22 +3,23 @@
 use dough_mbrl::band::Band;
 use dough_mbrl::dynamics::Roll;
 
-use super::COLUMNS;
-use super::model::CHANNELS;
-use crate::reading::check_runs;
-use crate::recording::{Header, ReadError, Table, inside};
+use super::rolls::{CHANNELS, RunOfRolls, Step};
+use crate::reading::{check_runs, number};
+use crate::recording::{Column, Header, ReadError, Table, inside};
 
-/// A roll with its place in the recording.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
-    pub(super) roll: Roll,
-    pub(super) step: f64,
-    /// Time, 0 where it was not recorded.
-    pub(super) t_s: f64,
-}
-
-/// The rolls of a run, in order.
-pub(super) type RunOfRolls = (String, Vec<Step>);
+const COLUMNS: [Column; 11] = [
+    Column { name: "run", what: "label of the run", label: true },
+    number("step", "number of the roll in its run"),
+    number("length_m", "length in metres"),
+    number("width_m", "width in metres"),
+    number("height_m", "height in metres"),
+    number("throw_m", "throw of the band in metres"),
+    number("depth_m", "depth of the roll in metres"),
+    number("next_length_m", "length after the roll in metres"),
+    number("next_width_m", "width after the roll in metres"),
+    number("next_height_m", "height after the roll in metres"),
+    number("t_s", "time in seconds"),
+];
 
 /// What a recording says.
 #[derive(Debug)]
@@ -28,8 +29,8 @@ pub(super) struct Read {
     pub(super) training: Vec<Vec<Roll>>,
     pub(super) runs: Vec<RunOfRolls>,
     pub(super) timed: bool,
-    /// The file and the row to blame where the training rolls do not do.
-    pub(super) blame: Table<'static>,
+    /// The file of the training rolls.
+    pub(super) training_file: String,
 }
 
 impl Read {
@@ -61,27 +62,27 @@ pub(super) fn read(header: &Header) -> Result<Read, ReadError> {
     }
     let table = header.table("data", &COLUMNS)?;
     let (mut runs, timed) = rolls(&table)?;
-    let (training, blame) = match rig.optional_text("training", "the name of a CSV file")? {
+    let (training, training_file) = match rig.optional_text("training", "the name of a CSV file")? {
         Some(name) => {
             let table =
                 Table::read(&inside(&header.folder, &header.file, "rig.training", name)?, &COLUMNS, false)?;
-            (rolls(&table)?.0, table)
+            (rolls(&table)?.0, table.file)
         }
         None => {
             let later = runs.split_off(runs.len().div_ceil(2));
-            (std::mem::replace(&mut runs, later), table)
+            (std::mem::replace(&mut runs, later), table.file)
         }
     };
     let training = training.into_iter().map(|(_, steps)| steps.iter().map(|s| s.roll).collect()).collect();
     if runs.is_empty() {
         return Err(ReadError::TooFewRows {
-            file: blame.file,
+            file: training_file,
             what: "the file".into(),
             got: 1,
             expected: "at least 2 runs, or rig.training: the first half of the runs is learned from".into(),
         });
     }
-    Ok(Read { band, training, runs, timed, blame })
+    Ok(Read { band, training, runs, timed, training_file })
 }
 
 fn band(header: &Header) -> Result<Band, ReadError> {

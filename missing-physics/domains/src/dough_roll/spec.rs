@@ -1,8 +1,9 @@
 //! Parameters and mechanisms of a rolled dough.
 
-use missing_physics::model::{Quantity, Spec};
+use dough_mbrl::band::Band;
+use missing_physics::model::{ParameterRef, Quantity, Spec, SpecBuilder};
 
-use crate::builder::{At, Builder};
+use super::rolls::Step;
 
 /// What may have become of the response since it was learned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,20 +45,20 @@ impl Effects {
 
 /// Where each parameter stands.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Places {
-    factor: At,
-    drying: Option<At>,
+pub(super) struct Layout {
+    factor: ParameterRef,
+    drying: Option<ParameterRef>,
     /// The force below which the band slips.
-    pub(super) slip: At,
-    springback: At,
-    loss: At,
-    softening: At,
-    parity: At,
-    throw: At,
-    length: At,
+    pub(super) slip: ParameterRef,
+    springback: ParameterRef,
+    loss: ParameterRef,
+    softening: ParameterRef,
+    parity: ParameterRef,
+    throw: ParameterRef,
+    length: ParameterRef,
 }
 
-impl Places {
+impl Layout {
     pub(super) fn effects(&self, shared: &[f64]) -> Effects {
         Effects {
             factor: shared[self.factor.slot],
@@ -73,10 +74,22 @@ impl Places {
     }
 }
 
+/// The force with which a band rolls, N.
+pub(super) fn force_n(band: &Band, step: &Step) -> f64 {
+    band.force_n(step.roll.action[0], step.roll.action[1])
+}
+
+/// The specification of a recording's rolls, `timed` where their times were recorded.
+pub(super) fn for_rolls(band: &Band, timed: bool, steps: &[Step]) -> (Spec, Layout) {
+    let most = |of: &dyn Fn(&Step) -> f64, least: f64| steps.iter().map(of).fold(least, f64::max);
+    let (longest, strongest) = (most(&|s| s.t_s, 1.0), most(&|s| force_n(band, s), 1e-9));
+    build(timed.then_some(longest), strongest, most(&|s| s.step, 1.0))
+}
+
 /// The specification; `longest_s` where times were recorded, the strongest roll's force, the last step of a run.
-pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spec, Places) {
-    let mut b = Builder::default();
-    let mut p = Places::default();
+pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spec, Layout) {
+    let mut b = SpecBuilder::default();
+    let mut p = Layout::default();
     b.baseline("the dynamics learned from the training rolls, as uncertain as they leave them");
     p.factor = b.shared("factor", "", 1.0, [0.0, 20.0], 0.05);
     b.mechanism(
@@ -86,7 +99,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
             "another stiffness",
             "The dough answers every roll by a common factor more (or less) than the one it was learned from.",
             "logarithmic strain = factor x learned strain (1: no effect)",
-            "thesis, section 7.5",
+            "[Matl 2021], section 7.5",
         ],
         &["drying", "band-softening"],
     );
@@ -113,7 +126,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
             "slip",
             "Below a force the band slips over the dough and does nothing.",
             "change = 0 for F < force, F = (k0 + k1 (throw - throw0)) depth (1 + k2 depth)",
-            "thesis, section 7.3",
+            "[Matl 2021], section 7.3",
         ],
         &["stiffness-change"],
     );
@@ -137,7 +150,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
             "dough left on the tool",
             "Each roll leaves a part of the dough on the tool.",
             "each dimension after a roll is (1 - fraction)^(1/3) of what was learned",
-            "thesis, section 7.6",
+            "[Matl 2021], section 7.6",
         ],
         &["springback"],
     );
@@ -158,7 +171,7 @@ pub(super) fn build(longest_s: Option<f64>, strongest_n: f64, last: f64) -> (Spe
 }
 
 /// What the response could depend on, should no mechanism hold.
-fn terms(b: &mut Builder, p: &mut Places) {
+fn terms(b: &mut SpecBuilder, p: &mut Layout) {
     let mut term = |name: &str, unit: &str, scale: f64, formula: &str, variable: &str| {
         let at = b.shared(name, unit, 0.0, [-1e3 * scale, 1e3 * scale], scale);
         b.term(at, formula, Quantity::new("relative response", ""), vec![variable.into()]);

@@ -7,9 +7,10 @@ use granular_infer::shard;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::campaign::{Campaign, within};
 use crate::recording::ReadError;
 
+/// Seed of all campaigns.
+pub(super) const SEED: u64 = 1;
 /// Pours of a new campaign.
 const POURS: u32 = 500;
 /// Pours between two writes of the cache.
@@ -37,12 +38,12 @@ pub(super) fn cached(
         let made: Vec<_> = (next..last)
             .into_par_iter()
             .map(|pour| {
-                let conditions = ranges.draw(Campaign::SEED, u64::from(pour));
+                let conditions = ranges.draw(SEED, u64::from(pour));
                 (pour, rig.pour(&conditions, u64::from(pour)))
             })
             .collect();
         for (pour, grains) in made {
-            let grains = grains.map_err(|e| ReadError::Open {
+            let grains = grains.map_err(|e| ReadError::Unfit {
                 file: "the rig".into(),
                 why: format!("no grains can be poured with it: {e}"),
             })?;
@@ -61,7 +62,7 @@ pub(super) fn cached(
     }
     bar.finish_and_clear();
     pours = shard::read(&bytes, rig)
-        .map_err(|e| ReadError::Open { file: "the pours".into(), why: e.to_string() })?;
+        .map_err(|e| ReadError::Unfit { file: "the pours".into(), why: e.to_string() })?;
     Ok(pours)
 }
 
@@ -78,8 +79,7 @@ impl Cache {
         let set = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
         let user = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")));
         // FNV-1a over everything that the pours depend on, but for the heights.
-        let text =
-            format!("3 {} {rig:?} {:?}", Campaign::SEED, Ranges { height_m: [0.0; 2], ..Ranges::default() });
+        let text = format!("3 {} {rig:?} {:?}", SEED, Ranges { height_m: [0.0; 2], ..Ranges::default() });
         let hash = text
             .bytes()
             .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
@@ -99,7 +99,7 @@ impl Cache {
                 let (low, high) = heights.split_once('-')?;
                 Some([f64::from(low.parse::<u32>().ok()?) / 1e6, f64::from(high.parse::<u32>().ok()?) / 1e6])
             })
-            .filter(|heights| within(*heights, [low, high]) && narrow(*heights))
+            .filter(|heights| holds(*heights, [low, high]) && narrow(*heights))
             .collect();
         // The narrowest; a folder is in no order.
         there.sort_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0])).then(a[0].total_cmp(&b[0])));
@@ -111,6 +111,11 @@ impl Cache {
         let [low, high] = heights_m.map(|h| (h * 1e6).round() as u32);
         Some(self.folder.as_ref()?.join(format!("{}-{low}-{high}.bin", self.begin)))
     }
+}
+
+/// Whether a campaign's heights hold a recording's, with some to spare.
+pub(super) fn holds(campaign: [f64; 2], [low, high]: [f64; 2]) -> bool {
+    low >= 1.2 * campaign[0] && high <= 0.98 * campaign[1]
 }
 
 #[cfg(test)]

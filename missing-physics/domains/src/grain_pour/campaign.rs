@@ -3,7 +3,7 @@
 use granular_infer::campaign::{Conditions, Grains, Ranges, Rig};
 use granular_infer::shard;
 
-use super::cache::{Cache, cached};
+use super::cache::{Cache, cached, holds};
 use crate::recording::ReadError;
 
 /// The rig of the pours that come with the tool, and the pours (`cargo run --release -p granular-infer --example campaign`).
@@ -57,22 +57,19 @@ impl Scale {
 }
 
 impl Campaign {
-    /// Seed of all campaigns.
-    pub(super) const SEED: u64 = 1;
-
     /// The campaign for a rig whose funnel stands between two heights in m.
     ///
     /// # Errors
-    /// [`ReadError::Open`] where no pour can be made, or the cache is not what it should be.
+    /// [`ReadError::Unfit`] where no pour can be made, or the cache is not what it should be.
     pub(super) fn of(rig: &Rig, [low, high]: [f64; 2]) -> Result<Self, ReadError> {
         let length = rig.diameter_m / BUNDLED_RIG.diameter_m;
         let adhesion = rig.density_kg_m3() / BUNDLED_RIG.density_kg_m3() * length.powi(2);
         let scale = Scale { length, adhesion };
         let heights_m = [low, high].map(|h| h / length);
         let ranges = Ranges::default();
-        if within(ranges.height_m, heights_m) && similar(rig, length) {
+        if holds(ranges.height_m, heights_m) && similar(rig, length) {
             let fail =
-                |why: String| ReadError::Open { file: "the pours that come with the tool".into(), why };
+                |why: String| ReadError::Unfit { file: "the pours that come with the tool".into(), why };
             let mut bytes = Vec::new();
             std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(BUNDLED), &mut bytes)
                 .map_err(|e| fail(e.to_string()))?;
@@ -86,11 +83,6 @@ impl Campaign {
         let pours = cached(&rig, &ranges, cache.file(height_m))?;
         Ok(Self { ranges, pours, scale })
     }
-}
-
-/// Whether a campaign's heights hold a recording's, with some to spare.
-pub(super) fn within(campaign: [f64; 2], [low, high]: [f64; 2]) -> bool {
-    low >= 1.2 * campaign[0] && high <= 0.98 * campaign[1]
 }
 
 /// A rig as it is poured: with the bundled grains, and to 10 um, so that recordings of one rig share their pours.
@@ -117,6 +109,7 @@ fn similar(rig: &Rig, scale: f64) -> bool {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use super::super::cache::SEED;
     use super::*;
 
     /// What a recording may say of its rig, of other grains and at another scale, leaves the poured rig alone; conditions go down as
@@ -154,10 +147,10 @@ mod tests {
             (radii.len() as f64, radii.iter().sum::<f64>() / radii.len() as f64)
         };
         let spheres = campaign.pours.iter().filter(|(_, g)| g.radii_m.len() == BUNDLED_RIG.count);
-        for (pour, kept) in spheres.take(3) {
-            let conditions = campaign.ranges.draw(Campaign::SEED, u64::from(*pour));
+        for (pour, bundled) in spheres.take(3) {
+            let conditions = campaign.ranges.draw(SEED, u64::from(*pour));
             let again = BUNDLED_RIG.pour(&conditions, u64::from(*pour)).unwrap();
-            let ((n, r), (n_again, r_again)) = (mean_radius(kept), mean_radius(&again));
+            let ((n, r), (n_again, r_again)) = (mean_radius(bundled), mean_radius(&again));
             assert!((n_again / n - 1.0).abs() < 0.1, "{pour}: {n} and {n_again} grains near the axis");
             assert!((r_again / r - 1.0).abs() < 0.1, "{pour}: {r} and {r_again} m");
         }

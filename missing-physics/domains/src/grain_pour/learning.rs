@@ -11,8 +11,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::cache::SEED;
 use super::campaign::Campaign;
 use super::read::Read;
+use crate::reading::upper_median;
 
 /// Most blur that pictures are made with, px.
 pub(super) const MOST_BLUR_PX: f64 = 3.0;
@@ -24,18 +26,16 @@ const FAR_COUNTS: f64 = 0.05;
 
 /// Pictures of a campaign's pours, as the recording's camera would have taken them.
 pub(super) fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
-    let mut noises: Vec<f64> = read.pictures.iter().map(|p| p.map.noise_m).collect();
-    noises.sort_by(f64::total_cmp);
-    let noise = noises.get(noises.len() / 2).copied().unwrap_or(0.0);
+    let noise = upper_median(read.pictures.iter().map(|p| p.map.noise_m).collect()).unwrap_or(0.0);
     let unit = read.camera.depth_unit_m;
     // Rounding to counts adds its own part again.
     let noise_m = (noise * noise - unit * unit / 12.0).max(0.0).sqrt();
     let volume_m3 = read.rig.count as f64 * PI / 6.0 * read.rig.diameter_m.powi(3);
     let flaws = missing(campaign, read, Flaws { noise_m, ..Flaws::default() });
     let one = |(pour, grains): &(u32, Grains)| {
-        let conditions = campaign.ranges.draw(Campaign::SEED, u64::from(*pour));
+        let conditions = campaign.ranges.draw(SEED, u64::from(*pour));
         let depth = read.camera.render(&scaled(grains, campaign.scale.length));
-        let mut rng = ChaCha8Rng::seed_from_u64(Campaign::SEED);
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         rng.set_stream(u64::from(*pour));
         let blurred = MOST_BLUR_PX * rng.random::<f64>();
         [0.0, blurred]
@@ -67,10 +67,9 @@ pub(super) fn counts(ranges: &Ranges, c: &Conditions, likely: &[Conditions]) -> 
 /// Pours whose grains roll out of sight, as they do on slippery or tilted ground, follow laws of their own: a centroid goes uphill when what
 /// is downhill has left. Where the recording has no such picture they only make the emulator worse.
 pub(super) fn in_sight(samples: Vec<Sample>, seen: &[[f64; COUNT]], count: usize) -> Vec<Sample> {
-    let mut volumes: Vec<f64> = samples.iter().map(|s| volume_in_sight(&s.statistics, count)).collect();
-    volumes.sort_by(f64::total_cmp);
+    let volumes = samples.iter().map(|s| volume_in_sight(&s.statistics, count)).collect();
     // A recording with more in sight than any pour (of other grains than it says) must leave something to learn from.
-    let usual = volumes.get(volumes.len() / 2).copied().unwrap_or(0.0);
+    let usual = upper_median(volumes).unwrap_or(0.0);
     let least = seen.iter().map(|s| volume_in_sight(s, count)).fold(usual, f64::min);
     samples.into_iter().filter(|s| volume_in_sight(&s.statistics, count) >= IN_SIGHT * least).collect()
 }
@@ -135,12 +134,12 @@ mod tests {
         let all: Vec<Sample> = (0..20)
             .map(|k| Sample { conditions, blur_px2: 0.0, statistics: heap(0.1 * f64::from(k) + 0.05) })
             .collect();
-        let kept = |seen: &[f64]| {
+        let left = |seen: &[f64]| {
             let seen: Vec<[f64; COUNT]> = seen.iter().map(|h| heap(*h)).collect();
             in_sight(all.clone(), &seen, 1000).len()
         };
-        assert_eq!(kept(&[1.0, 0.9]), 20 - 6);
-        assert_eq!(kept(&[0.9, 0.1]), 20 - 1);
-        assert_eq!(kept(&[50.0]), 20 - 7);
+        assert_eq!(left(&[1.0, 0.9]), 20 - 6);
+        assert_eq!(left(&[0.9, 0.1]), 20 - 1);
+        assert_eq!(left(&[50.0]), 20 - 7);
     }
 }

@@ -3,12 +3,13 @@
 //! Every picture becomes two dozen statistics. Their means and their spread from pour to pour are learned from a campaign of
 //! simulated pours, each seen by the recording's own camera; the engine gets the statistics independent and of variance one.
 
+#[cfg(test)]
+mod another_simulator;
 mod cache;
 mod campaign;
-#[cfg(test)]
-mod codes;
 mod discrepancy;
 mod excess;
+mod law;
 mod learning;
 mod model;
 mod read;
@@ -20,15 +21,9 @@ use missing_physics::model::{Experiment, Quantity, Spec};
 
 use self::campaign::Campaign;
 use self::model::PourModel;
-use super::reading::number;
-use crate::recording::{Column, Header, ReadError};
-use crate::{Domain, Loaded, Template};
-
-const COLUMNS: [Column; 3] = [
-    Column { name: "run", what: "label of the run", label: true },
-    number("funnel_height_m", "height of the funnel's outlet in metres"),
-    Column { name: "depth_image", what: "name of a 16-bit PNG file", label: true },
-];
+use self::read::Read;
+use crate::domain::{CheckedRecording, Contents, Domain, Loaded, RunContents, Template};
+use crate::recording::{Header, ReadError};
 
 /// Pours of a proposed experiment.
 const REPEATS: usize = 3;
@@ -71,52 +66,59 @@ impl Domain for GrainPour {
         false
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let read = read::read(header)?;
-        let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m).collect();
-        let range = [
-            heights.iter().copied().fold(f64::INFINITY, f64::min),
-            heights.iter().copied().fold(0.0, f64::max),
-        ];
-        let campaign = Campaign::of(&read.rig, range)?;
-        let mut model = PourModel::new(&campaign, &read).map_err(|e| ReadError::Open {
-            file: header.file.clone(),
-            why: format!("nothing can be learned for this camera: {e}"),
-        })?;
-        let runs: Vec<Run> = read
-            .pictures
-            .iter()
-            .map(|picture| run(&picture.label, picture.height_m, &model.shown(picture, &read)))
-            .collect();
-        let experiments = [0.6 * range[0], 1.15 * range[1]]
-            .map(|height| {
-                height.clamp(
-                    1.02 * campaign.scale.length * campaign.ranges.height_m[0],
-                    0.98 * campaign.scale.length * campaign.ranges.height_m[1],
-                )
-            })
-            .map(|height| propose(&mut model, height));
-        let recording = Recording {
-            channels: STATISTICS.iter().map(|(name, _)| Quantity::new(name, "sigma")).collect(),
-            variables: vec![Quantity::new("funnel_height_m", "m")],
-            runs,
-            noise_along: None,
-            calibration: vec![Some(1.0); COUNT],
-            resolution: vec![0.0; COUNT],
-        };
-        let mut undetermined = vec![
-            "each statistic is shown less what those before it say of it, in standard deviations from pour to pour".into(),
-            "grains that are not spheres are rods in the model: cubes and flakes are told as rods of some length, or unexplained".into(),
-        ];
-        undetermined.extend(excess::words(&read, &model.baseline(&read, &campaign)));
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments: experiments.into(),
-            undetermined,
-            additions: serde_json::Map::new(),
-        })
+        let file = header.file.clone();
+        Ok(CheckedRecording::new(contents(&read), || prepare(read, file)))
     }
+}
+
+/// What a recording holds.
+fn contents(read: &Read) -> Contents {
+    Contents {
+        channels: channels(),
+        calibration: vec![Some(1.0); COUNT],
+        variable: funnel_height(),
+        runs: read.pictures.iter().map(|p| RunContents::new(&p.label, &[p.height_m])).collect(),
+        spec: model::any_spec(),
+    }
+}
+
+fn channels() -> Vec<Quantity> {
+    STATISTICS.iter().map(|(name, _)| Quantity::new(name, "sigma")).collect()
+}
+
+fn funnel_height() -> Quantity {
+    Quantity::new("funnel_height_m", "m")
+}
+
+/// Learns what pictures of such pours show: from the pours that come with the tool or, for another rig, from new ones.
+fn prepare(read: Read, file: String) -> Result<Loaded, ReadError> {
+    let range = read.heights_m();
+    let campaign = Campaign::of(&read.rig, range)?;
+    let mut model = PourModel::new(&campaign, &read).map_err(|e| ReadError::Unfit {
+        file,
+        why: format!("nothing can be learned for this camera: {e}"),
+    })?;
+    let runs = read.pictures.iter().map(|p| run(&p.label, p.height_m, &model.whitened(p, &read))).collect();
+    let ([lowest, highest], length) = (campaign.ranges.height_m, campaign.scale.length);
+    let experiments = [0.6 * range[0], 1.15 * range[1]]
+        .map(|height| height.clamp(1.02 * length * lowest, 0.98 * length * highest))
+        .map(|height| propose(&mut model, height));
+    let recording = Recording {
+        channels: channels(),
+        variables: vec![funnel_height()],
+        runs,
+        noise_along: None,
+        calibration: vec![Some(1.0); COUNT],
+        resolution: vec![0.0; COUNT],
+    };
+    let mut undetermined = vec![
+        "each statistic is shown less what those before it say of it, in standard deviations from pour to pour".into(),
+        "grains that are not spheres are rods in the model: cubes and flakes are told as rods of some length, or unexplained".into(),
+    ];
+    undetermined.extend(excess::words(&read, &model.baseline(&read, &campaign)));
+    Ok(Loaded::new(recording, model, experiments.into(), undetermined))
 }
 
 /// A run of one row.

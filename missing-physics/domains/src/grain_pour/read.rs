@@ -7,9 +7,14 @@ use granular_infer::camera::Camera;
 use granular_infer::campaign::Rig;
 use granular_infer::seeing::HeightMap;
 
-use super::COLUMNS;
-use crate::reading::check_runs;
-use crate::recording::{Header, ReadError, Table, inside, one_line, read_bytes};
+use crate::reading::{check_runs, number};
+use crate::recording::{Column, Header, ReadError, Table, inside, one_line, quoted, read_bytes};
+
+const COLUMNS: [Column; 3] = [
+    Column { name: "run", what: "label of the run", label: true },
+    number("funnel_height_m", "height of the funnel's outlet in metres"),
+    Column { name: "depth_image", what: "name of a 16-bit PNG file", label: true },
+];
 
 /// A pour and its picture.
 #[derive(Debug, Clone)]
@@ -26,6 +31,14 @@ pub(super) struct Read {
     /// The camera of all pictures.
     pub(super) camera: Camera,
     pub(super) pictures: Vec<Picture>,
+}
+
+impl Read {
+    /// The lowest and the highest place of the funnel, m.
+    pub(super) fn heights_m(&self) -> [f64; 2] {
+        let heights = self.pictures.iter().map(|p| p.height_m);
+        [heights.clone().fold(f64::INFINITY, f64::min), heights.fold(0.0, f64::max)]
+    }
 }
 
 /// Reads a recording.
@@ -81,7 +94,7 @@ fn text_cell(table: &Table, row: usize, column: &str, got: &str, expected: &str)
         file: table.file.clone(),
         row: table.lines[row],
         column: column.into(),
-        got: crate::recording::quoted(got),
+        got: quoted(got),
         expected: expected.into(),
     }
 }

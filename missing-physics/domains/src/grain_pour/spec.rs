@@ -3,39 +3,36 @@
 use std::sync::Arc;
 
 use granular_infer::campaign::Ranges;
-use missing_physics::model::{Derived, Quantity, Spec};
-
-use crate::builder::{At, Builder};
+use missing_physics::model::{Derived, ParameterRef, Quantity, Spec, SpecBuilder};
 
 /// Where each parameter stands among the shared ones.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Places {
-    pub(super) friction: At,
-    pub(super) rolling: At,
-    pub(super) restitution: At,
-    pub(super) rolling_damping: At,
-    pub(super) adhesion: At,
-    pub(super) ground_ratio: At,
-    pub(super) size_variance: At,
-    pub(super) tilt: [At; 2],
-    pub(super) funnel_offset: At,
-    pub(super) blur_px2: At,
-    pub(super) depth_offset: At,
-    pub(super) drag: At,
-    pub(super) aspect: At,
+pub(super) struct Layout {
+    pub(super) friction: ParameterRef,
+    pub(super) rolling: ParameterRef,
+    pub(super) restitution: ParameterRef,
+    pub(super) rolling_damping: ParameterRef,
+    pub(super) adhesion: ParameterRef,
+    pub(super) ground_ratio: ParameterRef,
+    pub(super) size_variance: ParameterRef,
+    pub(super) tilt: [ParameterRef; 2],
+    pub(super) funnel_offset: ParameterRef,
+    pub(super) blur_px2: ParameterRef,
+    pub(super) depth_offset: ParameterRef,
+    pub(super) drag: ParameterRef,
+    pub(super) aspect: ParameterRef,
     /// Candidate terms of an unknown law: the heap stands aside, is oval, is rougher, is larger.
-    pub(super) aside: [At; 2],
-    pub(super) oval: [At; 2],
-    pub(super) rougher: At,
-    pub(super) larger: At,
+    pub(super) aside: [ParameterRef; 2],
+    pub(super) oval: [ParameterRef; 2],
+    pub(super) rougher: ParameterRef,
+    pub(super) larger: ParameterRef,
 }
 
 /// The specification; where baseline fits begin, and by how much the funnel may be off, m.
-pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: f64) -> (Spec, Places) {
-    let mut b = Builder::default();
-    let mut p = Places::default();
-    b.baseline("equal rigid spheres with sliding friction, (damped) rolling friction and restitution, poured onto level ground"
-            );
+pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: f64) -> (Spec, Layout) {
+    let mut b = SpecBuilder::default();
+    let mut p = Layout::default();
+    b.baseline("equal rigid spheres with sliding friction, (damped) rolling friction and restitution, poured onto level ground");
     let within = |[low, high]: [f64; 2], v: f64| v.clamp(low, high);
     p.friction =
         b.shared("mu_s", "", within(ranges.sliding_friction, start[0]), ranges.sliding_friction, 0.1);
@@ -52,7 +49,7 @@ pub(super) fn build(ranges: &Ranges, start: [f64; 4], lowest_m: f64, highest_m: 
 }
 
 /// What the grains may be.
-fn grains(b: &mut Builder, p: &mut Places, ranges: &Ranges) {
+fn grains(b: &mut SpecBuilder, p: &mut Layout, ranges: &Ranges) {
     let most = ranges.work_of_adhesion_j_m2;
     p.adhesion = b.shared("work_of_adhesion_j_m2", "J/m2", 0.0, [0.0, most], 0.08 * most);
     b.mechanism(
@@ -100,7 +97,7 @@ fn grains(b: &mut Builder, p: &mut Places, ranges: &Ranges) {
 }
 
 /// What ground, air and funnel may be.
-fn scene(b: &mut Builder, p: &mut Places, ranges: &Ranges, lowest_m: f64, highest_m: f64) {
+fn scene(b: &mut SpecBuilder, p: &mut Layout, ranges: &Ranges, lowest_m: f64, highest_m: f64) {
     let most = ranges.ground_ratio;
     p.ground_ratio = b.shared("ratio", "", 1.0, [1.0 / most, most], 0.2);
     let (ratio, grain) = (p.ground_ratio.slot, p.friction.slot);
@@ -130,7 +127,7 @@ fn scene(b: &mut Builder, p: &mut Places, ranges: &Ranges, lowest_m: f64, highes
             "tilted ground",
             "Ground, funnel and camera lean together: grains fall and roll downhill, the ground looks level.",
             "gravity has the parts g sin(downhill_x), g sin(downhill_y) along the ground",
-            "Newton; thesis, section 3.4 (camera and ground)",
+            "Newton; [Matl 2021], section 3.4 (camera and ground)",
         ],
         &[],
     );
@@ -149,7 +146,7 @@ fn scene(b: &mut Builder, p: &mut Places, ranges: &Ranges, lowest_m: f64, highes
             "another height of the funnel",
             "The funnel stands higher or lower than stated, by the same in every pour.",
             "height = funnel_height_m + offset_m",
-            "thesis, section 3.7 (funnel height and ring)",
+            "[Matl 2021], section 3.7 (funnel height and ring)",
         ],
         &["air-drag"],
     );
@@ -169,7 +166,7 @@ fn scene(b: &mut Builder, p: &mut Places, ranges: &Ranges, lowest_m: f64, highes
 }
 
 /// What the camera may do.
-fn camera(b: &mut Builder, p: &mut Places) {
+fn camera(b: &mut SpecBuilder, p: &mut Layout) {
     p.blur_px2 = b.shared("variance_px2", "px2", 0.0, [0.0, 9.0], 0.5);
     let slot = p.blur_px2.slot;
     let blur = b.mechanism(
@@ -179,7 +176,7 @@ fn camera(b: &mut Builder, p: &mut Places) {
             "a blurred depth",
             "The depth of a pixel is a mean over its neighbours: single grains flatten, edges soften.",
             "depth convolved with a Gaussian of variance sigma_px^2, before the pixels' noise",
-            "thesis, section 3.5 (figure 3.3)",
+            "[Matl 2021], section 3.5 (figure 3.3)",
         ],
         &["size-spread"],
     );
@@ -203,7 +200,7 @@ fn camera(b: &mut Builder, p: &mut Places) {
 }
 
 /// How a picture may differ, should no mechanism hold.
-fn terms(b: &mut Builder, p: &mut Places) {
+fn terms(b: &mut SpecBuilder, p: &mut Layout) {
     let mut term = |name: &str, scale: f64, formula: &str, adds_to: &str| {
         let at = b.shared(name, "", 0.0, [-100.0 * scale, 100.0 * scale], scale);
         b.term(at, formula, Quantity::new(adds_to, ""), vec!["funnel_height_m".into()]);

@@ -5,7 +5,8 @@ use missing_physics::data::Run;
 use missing_physics::fit::finite_differences;
 use missing_physics::model::{Model, Scope};
 
-use super::model::{Condition, IndentationModel, Setup};
+use super::model::IndentationModel;
+use super::setup::{Condition, Setup};
 
 const ROWS: usize = 36;
 

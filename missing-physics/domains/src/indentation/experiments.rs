@@ -13,7 +13,7 @@ const REPEATS: usize = 3;
 /// Part of a proposed curve's depth from above the contact down to it.
 const ABOVE: f64 = 0.5;
 
-/// The same curve shallower, again and deeper, each slower and faster too, and held; and from above the contact, where nothing but
+/// The deepest curve shallower, again and deeper, each slower and faster too, and held; and from above the contact, where nothing but
 /// the sensor is felt.
 pub(super) fn experiments(model: &IndentationModel, recording: &Recording) -> Vec<Experiment> {
     let deepest = model.deepest_m();

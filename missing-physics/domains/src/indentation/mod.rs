@@ -3,17 +3,20 @@
 #[cfg(test)]
 mod derivatives;
 mod experiments;
-pub mod model;
+mod model;
+mod setup;
 mod spec;
 
 use hertz_contact::indenter::Indenter;
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
-use super::reading::{calibration, check_runs, number, resolution};
+use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::reading::{calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Section, Table, quoted};
-use crate::{Domain, Loaded, Template};
-use model::{Condition, IndentationModel, Setup};
+pub use model::IndentationModel;
+use setup::start_modulus;
+pub use setup::{Condition, Setup};
 
 const COLUMNS: [Column; 8] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -81,104 +84,125 @@ impl Domain for Indentation {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let rig = header.section("rig")?;
         let (indenter, radius_known) = indenter(&rig)?;
         let poisson_ratio = rig.number("poisson_ratio", -0.99, 0.5)?.unwrap_or(0.5);
         let thickness_m = rig.number("thickness_m", 1e-9, 1e3)?;
         let table = header.table("data", &COLUMNS)?;
-        let labels = table.labels("run", "the label of each row's run")?;
-        let column = |name: &str, what: &str| table.numbers(name).ok_or_else(|| table.missing(name, what));
-        let (depths, forces) =
-            (column("delta_m", "indentation in metres")?, column("force_n", "force in newtons")?);
-        let times = table.numbers("t_s");
-        let segments = segments(&table)?;
-        let keys = conditions(&table)?;
-        let calibration = calibration(header, &["force_n"])?;
-        let by_run = check_runs(&table, labels, FEWEST_ROWS, times.map(|_| "t_s"))?;
-        let mut known: Vec<String> = Vec::new();
-        let mut runs = Vec::new();
-        for (label, rows) in by_run {
-            let pick = |column: &[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
-            let key = match &keys {
-                None => String::new(),
-                Some((column, keys)) => {
-                    if let Some(&row) = rows.iter().find(|&&r| keys[r] != keys[rows[0]]) {
-                        return Err(ReadError::Cell {
-                            file: table.file.clone(),
-                            row: table.lines[row],
-                            column: (*column).into(),
-                            got: quoted(&keys[row]),
-                            expected: format!("{}, as in the rest of its run", quoted(&keys[rows[0]])),
-                        });
-                    }
-                    keys[rows[0]].clone()
-                }
-            };
-            let kind = known.iter().position(|k| *k == key).unwrap_or_else(|| {
-                known.push(key);
-                known.len() - 1
-            });
-            if known.len() > MOST_CONDITIONS {
-                let expected = format!("at most {MOST_CONDITIONS} conditions");
-                return Err(ReadError::TooFewRows {
-                    file: table.file.clone(),
-                    what: "the file".into(),
-                    got: known.len(),
-                    expected,
-                });
-            }
-            let mut inputs = vec![pick(depths)];
-            inputs.extend(times.map(pick));
-            inputs.extend(segments.as_deref().map(pick));
-            runs.push(Run { label, inputs, outputs: vec![pick(forces)], kind: kind as u32 });
-        }
+        let curves = Curves::of(&table)?;
+        let timed = curves.times.is_some();
+        let runs = curves.by_run(&table)?;
         let mut variables = vec![Quantity::new("delta_m", "m")];
-        variables.extend(times.map(|_| Quantity::new("t_s", "s")));
-        variables.extend(segments.as_ref().map(|_| Quantity::new("segment", "")));
+        variables.extend(curves.times.map(|_| Quantity::new("t_s", "s")));
+        variables.extend(curves.segments.as_ref().map(|_| Quantity::new("segment", "")));
+        let setup = Setup { indenter, radius_known, poisson_ratio, thickness_m, timed };
+        let conditions = runs.conditions.iter().enumerate().map(|(kind, key)| Condition {
+            name: setup.modulus_name(curves.conditions.as_ref().map(|(column, _)| (*column, key.as_str()))),
+            start_pa: start_modulus(&setup, &runs.runs, kind as u32),
+        });
+        let conditions: Vec<Condition> = conditions.collect();
         let recording = Recording {
             channels: vec![Quantity::new("force_n", "N")],
             variables,
-            runs,
-            noise_along: times.map(|_| 1),
-            calibration,
-            resolution: vec![resolution(forces)],
+            runs: runs.runs,
+            noise_along: curves.times.map(|_| 1),
+            calibration: calibration(header, &["force_n"])?,
+            resolution: vec![resolution(curves.forces)],
         };
-        let setup = Setup { indenter, radius_known, poisson_ratio, thickness_m, timed: times.is_some() };
-        let deepest = depths.iter().fold(0.0, |m: f64, d| m.max(*d));
+        let deepest = curves.depths.iter().fold(0.0, |m: f64, d| m.max(*d));
         if !(deepest > 0.0) {
-            return Err(table.cell(0, "delta_m", depths[0], "some rows above 0: nothing was pressed"));
+            return Err(table.cell(0, "delta_m", curves.depths[0], "some rows above 0: nothing was pressed"));
         }
-        let strongest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs())).max(f64::MIN_POSITIVE);
-        let names: Vec<Condition> = known
-            .iter()
-            .enumerate()
-            .map(|(kind, key)| Condition {
-                name: setup.modulus_name(keys.as_ref().map(|(column, _)| (*column, key.as_str()))),
-                start_pa: model::start_modulus(&setup, &recording.runs, kind as u32),
-            })
-            .collect();
+        let strongest = curves.forces.iter().fold(0.0, |m: f64, f| m.max(f.abs())).max(f64::MIN_POSITIVE);
         let longest = recording
             .runs
             .iter()
             .filter_map(|r| Some(r.inputs.get(1)?.last()? - r.inputs.get(1)?.first()?))
             .fold(0.0, f64::max);
-        let model = IndentationModel::new(setup, &names, deepest, strongest, longest)
+        let model = IndentationModel::new(setup, &conditions, deepest, strongest, longest)
             .map_err(|e| rig.unfit("indenter", "this indenter", e))?;
         let experiments = experiments::experiments(&model, &recording);
         let mut undetermined =
             vec!["only E / (1 - nu^2) is measured: the modulus is for the stated Poisson's ratio".to_owned()];
-        if times.is_none() {
+        if !timed {
             undetermined
                 .push("without t_s a body that relaxes cannot be told: viscoelasticity was not tried".into());
         }
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments,
-            undetermined,
-            additions: serde_json::Map::new(),
+        Ok(Loaded::new(recording, model, experiments, undetermined).into())
+    }
+}
+
+/// The columns of a table of curves.
+struct Curves<'t> {
+    labels: &'t [String],
+    depths: &'t [f64],
+    forces: &'t [f64],
+    times: Option<&'t [f64]>,
+    segments: Option<Vec<f64>>,
+    /// The condition column, if there is one: its name, and the value of each row as text.
+    conditions: Option<(&'static str, Vec<String>)>,
+}
+
+/// Curves run by run, and the conditions to which their [`Run::kind`] points.
+struct Runs {
+    runs: Vec<Run>,
+    conditions: Vec<String>,
+}
+
+impl<'t> Curves<'t> {
+    fn of(table: &'t Table<'_>) -> Result<Self, ReadError> {
+        let column = |name: &str, what: &str| table.numbers(name).ok_or_else(|| table.missing(name, what));
+        Ok(Self {
+            labels: table.labels("run", "the label of each row's run")?,
+            depths: column("delta_m", "indentation in metres")?,
+            forces: column("force_n", "force in newtons")?,
+            times: table.numbers("t_s"),
+            segments: segments(table)?,
+            conditions: conditions(table)?,
         })
+    }
+
+    fn by_run(&self, table: &Table<'_>) -> Result<Runs, ReadError> {
+        let mut conditions: Vec<String> = Vec::new();
+        let mut runs = Vec::new();
+        for (label, rows) in check_runs(table, self.labels, FEWEST_ROWS, self.times.map(|_| "t_s"))? {
+            let condition = self.condition(table, &rows)?;
+            let kind = conditions.iter().position(|c| *c == condition).unwrap_or_else(|| {
+                conditions.push(condition);
+                conditions.len() - 1
+            });
+            if conditions.len() > MOST_CONDITIONS {
+                return Err(ReadError::TooFewRows {
+                    file: table.file.clone(),
+                    what: "the file".into(),
+                    got: conditions.len(),
+                    expected: format!("at most {MOST_CONDITIONS} conditions"),
+                });
+            }
+            let pick = |column: &[f64]| rows.iter().map(|&r| column[r]).collect::<Vec<f64>>();
+            let mut inputs = vec![pick(self.depths)];
+            inputs.extend(self.times.map(pick));
+            inputs.extend(self.segments.as_deref().map(pick));
+            runs.push(Run { label, inputs, outputs: vec![pick(self.forces)], kind: kind as u32 });
+        }
+        Ok(Runs { runs, conditions })
+    }
+
+    /// The condition of a run's rows, which have to agree; empty where there is no condition column.
+    fn condition(&self, table: &Table<'_>, rows: &[usize]) -> Result<String, ReadError> {
+        let Some((column, keys)) = &self.conditions else { return Ok(String::new()) };
+        let first = &keys[rows[0]];
+        match rows.iter().find(|&&r| keys[r] != *first) {
+            None => Ok(first.clone()),
+            Some(&row) => Err(ReadError::Cell {
+                file: table.file.clone(),
+                row: table.lines[row],
+                column: (*column).into(),
+                got: quoted(&keys[row]),
+                expected: format!("{}, as in the rest of its run", quoted(first)),
+            }),
+        }
     }
 }
 

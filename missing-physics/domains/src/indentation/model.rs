@@ -5,71 +5,18 @@ use hertz_contact::indenter::Indenter;
 use hertz_contact::law::{Acting, Base, Indentation, Law, Layer};
 use hertz_contact::viscoelastic::{Contact, LinearSolid, Scratch};
 use missing_physics::data::Run;
-use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Spec};
+use missing_physics::model::{Extensions, Model, MultimodalModel, ParameterRef, PredictError, Spec};
 
-use super::spec::{self, Places};
-use crate::builder::At;
-use crate::dual::{Asked, InDuals};
-
-/// What is known of the set-up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setup {
-    /// The indenter; of radius 1 m where the radius is not known.
-    pub indenter: Indenter,
-    /// Whether its radius is known.
-    pub radius_known: bool,
-    /// Poisson's ratio of the body.
-    pub poisson_ratio: f64,
-    /// Thickness of the body on a rigid base, where it is known, m.
-    pub thickness_m: Option<f64>,
-    /// Whether rows have times (input 1).
-    pub timed: bool,
-}
-
-/// A condition: the name of its modulus and where that starts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Condition {
-    /// Name of the parameter.
-    pub name: String,
-    /// Its start, Pa.
-    pub start_pa: f64,
-}
-
-impl Setup {
-    /// The name of a condition's modulus; `key` is the condition's column and value.
-    pub fn modulus_name(&self, key: Option<(&str, &str)>) -> String {
-        let base = match self.indenter {
-            _ if self.radius_known => "modulus_pa",
-            Indenter::Sphere { .. } => "modulus_root_radius_pa_m05",
-            _ => "modulus_radius_n_m",
-        };
-        match key {
-            None => base.into(),
-            Some((column, value)) => format!("{base} at {column} = {value}"),
-        }
-    }
-}
-
-/// Young's modulus (Pa) that fits the rows of one condition best, in the elastic law with contact at zero.
-pub(super) fn start_modulus(setup: &Setup, runs: &[Run], kind: u32) -> f64 {
-    let law = Indentation::elastic(setup.indenter, 1.0, setup.poisson_ratio);
-    let (mut product, mut square) = (0.0, 0.0);
-    for run in runs.iter().filter(|r| r.kind == kind) {
-        for (depth, force) in run.inputs[0].iter().zip(&run.outputs[0]).filter(|(_, f)| f.is_finite()) {
-            let unit = law.force(*depth);
-            (product, square) = (product + unit * force, square + unit * unit);
-        }
-    }
-    let modulus = product / square;
-    if modulus > 0.0 && modulus.is_finite() { modulus } else { 1.0 }
-}
+use super::setup::{Condition, Setup};
+use super::spec::{self, Layout};
+use crate::dual::{DualModel, JacobianRequest};
 
 /// The model of the domain `indentation`.
 #[derive(Debug)]
 pub struct IndentationModel {
     setup: Setup,
     spec: Spec,
-    places: Places,
+    layout: Layout,
     layer: Option<Layer>,
     deepest_m: f64,
     longest_s: f64,
@@ -97,9 +44,9 @@ impl IndentationModel {
             None
         };
         Indentation::elastic(setup.indenter, 1.0, setup.poisson_ratio).check().map_err(|e| e.to_string())?;
-        let (spec, places) =
+        let (spec, layout) =
             spec::build(&setup, conditions, layer.is_some(), deepest_m, strongest_n, longest_s);
-        Ok(Self { setup, spec, places, layer, deepest_m, longest_s })
+        Ok(Self { setup, spec, layout, layer, deepest_m, longest_s })
     }
 
     /// The deepest indentation of the recording, m.
@@ -113,13 +60,13 @@ impl IndentationModel {
     }
 
     /// The modulus of a run's condition.
-    fn modulus(&self, run: &Run) -> Option<At> {
-        let moduli = &self.places.moduli;
+    fn modulus(&self, run: &Run) -> Option<ParameterRef> {
+        let moduli = &self.layout.moduli;
         moduli.get(run.kind as usize).or_else(|| moduli.first()).copied()
     }
 
     /// Forces of a law over the depths of a run.
-    fn follow<T: Number>(
+    fn forces<T: Number>(
         &self,
         run: &Run,
         law: &impl Law<T>,
@@ -146,20 +93,20 @@ impl IndentationModel {
 
     /// The square of its root; where there is none, a derivative that keeps its direction, as a small root has it.
     fn work_of_adhesion<T: Number>(&self, root: T) -> T {
-        let scale = self.places.adhesion.map_or(0.0, |at| self.spec.parameters[at.index].scale);
+        let scale = self.layout.adhesion.map_or(0.0, |at| self.spec.parameters[at.index].scale);
         if root.re() > 0.0 { root * root } else { root * (1e-5 * scale) }
     }
 }
 
-impl InDuals for IndentationModel {
+impl DualModel for IndentationModel {
     /// A modulus acts on the runs of its own condition.
     fn acts_on(&self, run: &Run, shared_slot: usize) -> bool {
-        let of_run = self.modulus(run).map(|at| at.slot);
-        of_run == Some(shared_slot) || self.places.moduli.iter().all(|at| at.slot != shared_slot)
+        let nuisance = self.modulus(run).map(|at| at.slot);
+        nuisance == Some(shared_slot) || self.layout.moduli.iter().all(|at| at.slot != shared_slot)
     }
 
     /// The forces of a run; an effect whose derivative is asked for is there at its off value too.
-    fn predict_in<T: Number>(
+    fn predict_dual<T: Number>(
         &self,
         run: &Run,
         shared: &[T],
@@ -167,11 +114,12 @@ impl InDuals for IndentationModel {
         moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String> {
-        let p = &self.places;
+        let p = &self.layout;
         let depths = run.inputs.first().ok_or("delta_m is missing")?;
-        let value = |at: Option<At>| at.map_or(T::from(0.0), |at| shared[at.slot]);
-        let on =
-            |at: Option<At>| at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot));
+        let value = |at: Option<ParameterRef>| at.map_or(T::from(0.0), |at| shared[at.slot]);
+        let on = |at: Option<ParameterRef>| {
+            at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot))
+        };
         let modulus = self.modulus(run).ok_or("no condition")?;
         let known = self.setup.thickness_m.map_or(0.0, f64::recip);
         let law = Indentation {
@@ -198,7 +146,7 @@ impl InDuals for IndentationModel {
             rim: on(Some(p.rim_stiffness)),
             compliance: on(Some(p.compliance)),
         };
-        self.follow(run, &law.contact(acting), relaxation, &true_depths, out)?;
+        self.forces(run, &law.contact(acting), relaxation, &true_depths, out)?;
         out.iter_mut().for_each(|force| *force += nuisance[p.lift.slot]);
         Ok(())
     }
@@ -216,7 +164,7 @@ impl Model for IndentationModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict_in(run, shared, nuisance, &[], out)
+        self.predict_dual(run, shared, nuisance, &[], out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
@@ -230,7 +178,7 @@ impl Model for IndentationModel {
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        Asked { run, shared, nuisance, shared_free, nuisance_free }.answer(self, out, jacobian)
+        JacobianRequest { run, shared, nuisance, shared_free, nuisance_free }.fill(self, out, jacobian)
     }
 
     fn extensions(&self) -> Extensions<'_> {
@@ -240,7 +188,7 @@ impl Model for IndentationModel {
 
 impl MultimodalModel for IndentationModel {
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        let p = &self.places;
+        let p = &self.layout;
         match self.spec.mechanisms[mechanism].id.as_str() {
             "rim-contact" => [0.2, 0.35, 0.5, 0.65, 0.8, 0.9]
                 .iter()

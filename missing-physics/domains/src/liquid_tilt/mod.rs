@@ -1,17 +1,20 @@
 //! The domain `liquid-tilt`: a closed container of liquid, tilted slowly and felt at the wrist.
 
 mod experiments;
-pub mod model;
+mod model;
+mod setup;
+mod spec;
 
 use liquid_haptics::container::mesh::MeshContainer;
 use liquid_haptics::wrench::Grasp;
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
-use super::reading::{calibration, check_runs, number, resolution};
+use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Section, Table, inside, quoted, read_bytes};
-use crate::{Domain, Loaded, Template};
-use model::{LiquidTiltModel, Setup, Vessel};
+pub use model::LiquidTiltModel;
+pub use setup::{Setup, Vessel};
 
 const CHANNELS: [&str; 3] = ["fx_n", "fy_n", "tau_z_nm"];
 const COLUMNS: [Column; 7] = [
@@ -65,7 +68,7 @@ impl Domain for LiquidTilt {
             gripper_mass_kg: 0.5,
             grasp_height_m: 0.1,
             shell_center_m: 0.1,
-            gravity_m_s2: 9.80665,
+            gravity_m_s2: GRAVITY_M_S2,
         };
         let setup = Setup {
             vessel: Vessel::Cylinder { radius_m: 0.05, length_m: 0.2 },
@@ -80,7 +83,7 @@ impl Domain for LiquidTilt {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let rig = header.section("rig")?;
         let vessel = vessel(header, &rig)?;
         let grasp = Grasp {
@@ -88,7 +91,7 @@ impl Domain for LiquidTilt {
             gripper_mass_kg: rig.required("gripper_mass_kg", 0.0, 1e6)?,
             grasp_height_m: rig.required("grasp_height_m", -1e3, 1e3)?,
             shell_center_m: 0.5 * vessel.length_m(),
-            gravity_m_s2: rig.number("gravity_m_s2", 1e-3, 1e3)?.unwrap_or(9.80665),
+            gravity_m_s2: rig.number("gravity_m_s2", 1e-3, 1e3)?.unwrap_or(GRAVITY_M_S2),
         };
         let density_kg_m3 = rig.number("density_kg_m3", 1.0, 1e5)?;
         let table = header.table("data", &COLUMNS)?;
@@ -133,13 +136,7 @@ impl Domain for LiquidTilt {
                 "mass and volume are free in each run: a known liquid (density_kg_m3) or measured volumes (volume_m3) would tell more mechanisms apart".into(),
             );
         }
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments,
-            undetermined,
-            additions: serde_json::Map::new(),
-        })
+        Ok(Loaded::new(recording, model, experiments, undetermined).into())
     }
 }
 

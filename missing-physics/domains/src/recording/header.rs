@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::{Column, ReadError, inside, one_line, quoted, read_text};
+use super::error::ReadError;
+use super::files::{inside, read_text};
+use super::table::{self, Column};
+use super::words::{one_line, quoted};
 
 /// A parsed `recording.toml`.
 #[derive(Debug)]
@@ -38,7 +41,7 @@ impl Header {
         Self::read_with(folder, false)
     }
 
-    /// The same for a recording in whose tables cells may be empty, where nothing was measured.
+    /// Reads the header of a recording in whose tables cells may be empty, where nothing was measured.
     ///
     /// # Errors
     /// As [`Header::read`].
@@ -67,9 +70,9 @@ impl Header {
     ///
     /// # Errors
     /// [`ReadError`]: no such key, no such file, or the first thing that is wrong in it.
-    pub fn table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<super::Table<'c>, ReadError> {
+    pub fn table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<table::Table<'c>, ReadError> {
         let name = self.root().text(key, "the name of a CSV file")?;
-        super::Table::read(&inside(&self.folder, &self.file, key, name)?, known, self.gaps)
+        table::Table::read(&inside(&self.folder, &self.file, key, name)?, known, self.gaps)
     }
 
     /// The keys outside any section.

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use super::{LARGEST_FILE, ReadError, one_line, quoted, read_text};
+use super::error::{LARGEST_FILE, ReadError};
+use super::files::read_text;
+use super::words::{one_line, quoted};
 
 /// Numbers beyond this are mistakes of unit or format.
 const LARGEST_NUMBER: f64 = 1e12;

@@ -44,7 +44,7 @@ fn amplitudes(run: &Run, omega: f64) -> Vec<[f64; 2]> {
 }
 
 /// Squares left of one run's amplitudes by a damping ratio and a friction, its first amplitude fitted to the cycles before the stop.
-fn left(cycles: &[[f64; 2]], omega: f64, ratio: f64, friction: f64) -> f64 {
+fn misfit(cycles: &[[f64; 2]], omega: f64, ratio: f64, friction: f64) -> f64 {
     let c = 2.0 * friction / (PI * ratio);
     let fade = |t: f64| (-ratio * omega * t).exp();
     let mut first = f64::INFINITY;
@@ -71,7 +71,7 @@ pub(super) fn starts(runs: &[Run], omega: f64, largest: f64, most: usize) -> Vec
         .flat_map(|i| (0..POINTS).map(move |j| [i, j]))
         .map(|[i, j]| {
             let (ratio, friction) = (at(i, 0), at(j, 1) * largest);
-            (cycles.iter().map(|c| left(c, omega, ratio, friction)).sum(), [i, j])
+            (cycles.iter().map(|c| misfit(c, omega, ratio, friction)).sum(), [i, j])
         })
         .collect();
     grid.sort_by(|a, b| a.0.total_cmp(&b.0));

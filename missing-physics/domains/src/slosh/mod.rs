@@ -2,18 +2,19 @@
 
 mod envelope;
 mod experiments;
-pub mod model;
+mod model;
+mod setup;
 mod spec;
 mod start;
 
-use liquid_haptics::slosh::UprightCylinder;
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
-use super::reading::{calibration, check_runs, number, resolution};
+use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Section};
-use crate::{Domain, Loaded, Template};
-use model::{Channel, Setup, SloshModel};
+pub use model::{FILLS, SloshModel};
+pub use setup::{Channel, Setup};
 
 const COLUMNS: [Column; 4] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -23,7 +24,6 @@ const COLUMNS: [Column; 4] = [
 ];
 /// A run with fewer rows says nothing of a wave.
 const FEWEST_ROWS: usize = 8;
-const GRAVITY_M_S2: f64 = 9.80665;
 
 /// The domain.
 #[derive(Debug, Clone, Copy)]
@@ -65,7 +65,7 @@ impl Domain for Slosh {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let (mut setup, rig) = setup(header)?;
         let table = header.table("data", &COLUMNS)?;
         let labels = table.labels("run", "the label of each row's run")?;
@@ -112,13 +112,7 @@ impl Domain for Slosh {
             "the amplitude of the wave and the lever to the sensor are one number: neither is known alone"
                 .into(),
         ];
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments,
-            undetermined,
-            additions: serde_json::Map::new(),
-        })
+        Ok(Loaded::new(recording, model, experiments, undetermined).into())
     }
 }
 
@@ -158,10 +152,4 @@ fn setup(header: &Header) -> Result<(Setup, Section<'_>), ReadError> {
         channel: Channel::Torque,
     };
     Ok((setup, rig))
-}
-
-/// The cylinder with a share of the recorded volume in it.
-fn cylinder(setup: &Setup, share: f64) -> Result<UprightCylinder, liquid_haptics::slosh::SloshError> {
-    let depth = share * setup.volume_m3 / (std::f64::consts::PI * setup.radius_m * setup.radius_m);
-    UprightCylinder::new(setup.radius_m, depth, setup.gravity_m_s2)
 }

@@ -4,52 +4,9 @@ use liquid_haptics::slosh::{Decay, Effects, SloshError, UprightCylinder};
 use missing_physics::data::Run;
 use missing_physics::model::{Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec};
 
-use super::cylinder;
-use super::spec::{ARM_RAD_S, Places, build, second_band};
+use super::setup::{Channel, Setup, cylinder};
+use super::spec::{ARM_RAD_S, Layout, build, second_band};
 use super::start::{first_wave, peaks, viscosity_guess};
-
-/// What was measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Channel {
-    /// The torque about the horizontal axis across the motion.
-    Torque,
-    /// The sideways force.
-    Force,
-}
-
-impl Channel {
-    /// Name of the column.
-    pub fn name(self) -> &'static str {
-        if self == Self::Torque { "tau_z_nm" } else { "fx_n" }
-    }
-
-    /// Unit of the readings.
-    pub fn unit(self) -> &'static str {
-        if self == Self::Torque { "N m" } else { "N" }
-    }
-
-    /// The unit as a suffix of a parameter's name.
-    pub(super) fn suffix(self) -> &'static str {
-        if self == Self::Torque { "nm" } else { "n" }
-    }
-}
-
-/// What is known of the set-up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setup {
-    /// Inner radius of the cylinder in m.
-    pub radius_m: f64,
-    /// Its length in m, where it is known.
-    pub length_m: Option<f64>,
-    /// Volume of the liquid in m^3.
-    pub volume_m3: f64,
-    /// Density of the liquid in kg/m^3.
-    pub density_kg_m3: f64,
-    /// Gravity in m/s^2.
-    pub gravity_m_s2: f64,
-    /// What was measured.
-    pub channel: Channel,
-}
 
 /// Shares of the recorded volume that a run may have in its container, by [`Run::kind`].
 pub const FILLS: [f64; 4] = [1.0, 0.25, 0.5, 1.5];
@@ -59,7 +16,7 @@ pub const FILLS: [f64; 4] = [1.0, 0.25, 0.5, 1.5];
 pub struct SloshModel {
     setup: Setup,
     spec: Spec,
-    places: Places,
+    layout: Layout,
     cylinders: Vec<UprightCylinder>,
     largest: f64,
     /// Indices of the mechanisms `arm-compliance`, `second-mode` and `contact-line-friction`.
@@ -94,13 +51,13 @@ impl SloshModel {
         let readings = runs.iter().flat_map(|r| &r.outputs[0]).filter(|v| v.is_finite());
         let largest = if largest > 0.0 { largest } else { readings.fold(0.0, |m: f64, v| m.max(v.abs())) };
         let largest = if largest > 0.0 { largest } else { 1.0 };
-        let (spec, places) = build(&setup, &cylinders[0], largest, viscosity);
+        let (spec, layout) = build(&setup, &cylinders[0], largest, viscosity);
         let find = |id: &str| spec.mechanisms.iter().position(|m| m.id == id).unwrap_or(usize::MAX);
         let (arm, second) = (find("arm-compliance"), find("second-mode"));
         let friction = find("contact-line-friction");
         let of = |scope| (0..spec.parameters.len()).filter(|&i| spec.parameters[i].scope == scope).collect();
         let (shared, nuisance) = (of(Scope::Shared), of(Scope::PerRun));
-        Ok(Self { setup, spec, places, cylinders, largest, arm, second, friction, shared, nuisance })
+        Ok(Self { setup, spec, layout, cylinders, largest, arm, second, friction, shared, nuisance })
     }
 
     /// Whether a run of this kind fits into the container.
@@ -114,7 +71,7 @@ impl SloshModel {
     /// Nuisance parameters of a run in which the wave starts from its crest at the given reading.
     pub fn wave(&self, amplitude: f64) -> Vec<f64> {
         let mut nuisance = vec![0.0; self.spec.count(Scope::PerRun)];
-        nuisance[self.places.cos.slot] = amplitude;
+        nuisance[self.layout.cos.slot] = amplitude;
         nuisance
     }
 
@@ -134,7 +91,7 @@ impl SloshModel {
 
     /// The first mode.
     fn wave_at(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        let (p, cylinder) = (&self.places, self.cylinder(run));
+        let (p, cylinder) = (&self.layout, self.cylinder(run));
         let mode = Decay {
             omega_rad_s: cylinder
                 .angular_frequency_rad_s(0, shared[p.tension.slot] / self.setup.density_kg_m3),
@@ -152,7 +109,7 @@ impl SloshModel {
 
     /// What is added to the first mode's reading: other oscillations, and the sensor's transient.
     fn add_others(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        let (p, cylinder) = (&self.places, self.cylinder(run));
+        let (p, cylinder) = (&self.layout, self.cylinder(run));
         let times = run.inputs.first().ok_or("there is no column of times")?;
         let mode =
             |omega_rad_s, damping_ratio| Decay { omega_rad_s, damping_ratio, effects: Effects::default() };
@@ -181,7 +138,7 @@ impl SloshModel {
 
     /// Whether a parameter acts on what is added to the first mode, and not on that mode.
     fn is_added(&self, shared: bool, slot: usize) -> bool {
-        let p = &self.places;
+        let p = &self.layout;
         if shared {
             [p.second_omega, p.second_damping, p.arm_omega, p.arm_damping, p.lag]
                 .iter()
@@ -245,10 +202,10 @@ impl Model for SloshModel {
     }
 
     fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
-        let viscosity = self.spec.parameters[self.places.viscosity.index].start;
+        let viscosity = self.spec.parameters[self.layout.viscosity.index].start;
         if let Some([a, b]) = first_wave(&self.cylinders[0], viscosity, run) {
-            nuisance[self.places.cos.slot] = a;
-            nuisance[self.places.sin.slot] = b;
+            nuisance[self.layout.cos.slot] = a;
+            nuisance[self.layout.sin.slot] = b;
         }
     }
 
@@ -259,7 +216,7 @@ impl Model for SloshModel {
 
 impl MultimodalModel for SloshModel {
     fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        let p = &self.places;
+        let p = &self.layout;
         if mechanism == self.friction {
             // Faint friction beside the viscosity that was found, and what the wave's envelope says.
             let omega = self.cylinders[0].angular_frequency_rad_s(0, 0.0);
@@ -289,7 +246,7 @@ impl MultimodalModel for SloshModel {
 
 impl JointLimits for SloshModel {
     fn implausible(&self, mechanism: usize, shared: &[f64]) -> Option<String> {
-        let omega = shared[self.places.arm_omega.slot];
+        let omega = shared[self.layout.arm_omega.slot];
         (mechanism == self.arm && self.is_slosh(omega))
             .then(|| format!("{omega:.4} rad/s is the frequency of a slosh mode"))
     }
@@ -307,7 +264,7 @@ impl SloshModel {
     }
 }
 
-/// How many places of the envelope's search are tried.
+/// How many points of the envelope's search are tried.
 const ENVELOPES: usize = 8;
 /// How many peaks of a residual's spectrum are tried.
 const PEAKS: usize = 6;

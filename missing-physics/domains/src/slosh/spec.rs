@@ -3,31 +3,30 @@
 use std::sync::Arc;
 
 use liquid_haptics::slosh::{Decay, Effects, UprightCylinder};
-use missing_physics::model::{Derived, DerivedPerRun, Over, Spec};
+use missing_physics::model::{Derived, DerivedPerRun, Over, ParameterRef, Spec, SpecBuilder, UNBOUNDED};
 
-use super::model::Setup;
-use crate::builder::{ANY, At, Builder};
+use super::setup::Setup;
 
 /// Where each parameter stands.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Places {
-    pub(super) viscosity: At,
-    pub(super) tension: At,
-    pub(super) frequency: At,
-    pub(super) friction: At,
-    pub(super) quadratic: At,
-    pub(super) second_omega: At,
-    pub(super) second_damping: At,
-    pub(super) arm_omega: At,
-    pub(super) arm_damping: At,
-    pub(super) lag: At,
-    pub(super) cos: At,
-    pub(super) sin: At,
-    pub(super) second_cos: At,
-    pub(super) second_sin: At,
-    pub(super) arm_cos: At,
-    pub(super) arm_sin: At,
-    pub(super) transient: At,
+pub(super) struct Layout {
+    pub(super) viscosity: ParameterRef,
+    pub(super) tension: ParameterRef,
+    pub(super) frequency: ParameterRef,
+    pub(super) friction: ParameterRef,
+    pub(super) quadratic: ParameterRef,
+    pub(super) second_omega: ParameterRef,
+    pub(super) second_damping: ParameterRef,
+    pub(super) arm_omega: ParameterRef,
+    pub(super) arm_damping: ParameterRef,
+    pub(super) lag: ParameterRef,
+    pub(super) cos: ParameterRef,
+    pub(super) sin: ParameterRef,
+    pub(super) second_cos: ParameterRef,
+    pub(super) second_sin: ParameterRef,
+    pub(super) arm_cos: ParameterRef,
+    pub(super) arm_sin: ParameterRef,
+    pub(super) transient: ParameterRef,
 }
 
 /// Where the second mode's frequency may lie, rad/s: surface tension raises it above that of gravity alone.
@@ -36,11 +35,26 @@ pub(super) fn second_band(cylinder: &UprightCylinder) -> [f64; 2] {
     [0.97 * omega, 1.06 * omega]
 }
 
+/// The smallest viscosity that is looked for, m^2/s.
+const THINNEST_M2_S: f64 = 1e-12;
+
+/// A typical amplitude of what is added to the first mode, as a share of the largest of that mode.
+const SMALL: f64 = 0.1;
+
 /// Bounds of the arm's frequency, rad/s.
 pub(super) const ARM_RAD_S: [f64; 2] = [1.0, 1000.0];
 
-/// The smallest viscosity that is looked for, m^2/s.
-const THINNEST_M2_S: f64 = 1e-12;
+/// What all parameters are scaled by.
+struct Wave<'a> {
+    cylinder: &'a UprightCylinder,
+    /// Frequency of the first mode, rad/s.
+    omega: f64,
+    /// The largest amplitude with which a run begins, in the reading's unit.
+    largest: f64,
+    /// The reading's unit, and that as a suffix of names.
+    unit: &'static str,
+    suffix: &'static str,
+}
 
 /// All parameters, and where each stands: amplitudes and viscosity start from what the runs show.
 pub(super) fn build(
@@ -48,11 +62,11 @@ pub(super) fn build(
     cylinder: &UprightCylinder,
     largest: f64,
     viscosity: f64,
-) -> (Spec, Places) {
-    let mut b = Builder::default();
-    let mut p = Places::default();
+) -> (Spec, Layout) {
+    let mut b = SpecBuilder::default();
+    let mut p = Layout::default();
     let (unit, suffix) = (setup.channel.unit(), setup.channel.suffix());
-    let amplitude = 0.1 * largest;
+    let wave = Wave { cylinder, omega: cylinder.angular_frequency_rad_s(0, 0.0), largest, unit, suffix };
     b.baseline("the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase");
     let thickest = cylinder.kinematic_viscosity_m2_s(0.9);
     p.viscosity = b.shared(
@@ -62,11 +76,23 @@ pub(super) fn build(
         [THINNEST_M2_S, thickest],
         viscosity,
     );
-    p.cos = b.nuisance(&format!("cos_{suffix}"), unit, ANY, largest);
-    p.sin = b.nuisance(&format!("sin_{suffix}"), unit, ANY, largest);
-    let (omega, at_rest) = (cylinder.angular_frequency_rad_s(0, 0.0), 0.02);
+    p.cos = b.nuisance(&format!("cos_{suffix}"), unit, UNBOUNDED, largest);
+    p.sin = b.nuisance(&format!("sin_{suffix}"), unit, UNBOUNDED, largest);
+    surface_tension(&mut b, &mut p, setup.density_kg_m3);
+    nonlinear_frequency(&mut b, &mut p, &wave);
+    damping(&mut b, &mut p, &wave);
+    // The sensor's parameters stand before those of the modes, its mechanism behind theirs.
+    sensor_parameters(&mut b, &mut p, &wave);
+    modes(&mut b, &mut p, &wave);
+    sensor_lag(&mut b, &p);
+    unlagged(&mut b, &p, &wave);
+    (b.build_unchecked(), p)
+}
+
+/// The surface's tension.
+fn surface_tension(b: &mut SpecBuilder, p: &mut Layout, density_kg_m3: f64) {
     // Liquids near room temperature have 0.015 to 0.073 N/m, liquid metals up to 0.6.
-    let strongest = if setup.density_kg_m3 > 5000.0 { 0.7 } else { 0.09 };
+    let strongest = if density_kg_m3 > 5000.0 { 0.7 } else { 0.09 };
     p.tension = b.shared("surface_tension_n_m", "N/m", 0.0, [0.0, strongest], 0.03);
     b.mechanism(
         "surface-tension",
@@ -79,6 +105,11 @@ pub(super) fn build(
         ],
         &["nonlinear-frequency"],
     );
+}
+
+/// A frequency that depends on the amplitude.
+fn nonlinear_frequency(b: &mut SpecBuilder, p: &mut Layout, wave: &Wave<'_>) {
+    let &Wave { omega, largest, unit, suffix, .. } = wave;
     let square = largest * largest;
     p.frequency = b.shared(
         &format!("coefficient_per_{suffix}2"),
@@ -112,7 +143,14 @@ pub(super) fn build(
         over: Over::Largest,
         value: Arc::new(shift),
     }];
-    p.friction = b.shared(&format!("friction_{suffix}"), unit, 0.0, [0.0, largest], at_rest * largest);
+}
+
+/// What takes from the wave beside viscosity: friction of the contact line, and eddies.
+fn damping(b: &mut SpecBuilder, p: &mut Layout, wave: &Wave<'_>) {
+    /// A typical friction, as a share of the largest amplitude.
+    const TYPICAL: f64 = 0.02;
+    let &Wave { largest, unit, suffix, .. } = wave;
+    p.friction = b.shared(&format!("friction_{suffix}"), unit, 0.0, [0.0, largest], TYPICAL * largest);
     b.mechanism(
         "contact-line-friction",
         &[p.friction],
@@ -142,9 +180,17 @@ pub(super) fn build(
         ],
         &["contact-line-friction"],
     );
+}
+
+/// The sensor's time constant, and what is left of its reading at the start of each run.
+fn sensor_parameters(b: &mut SpecBuilder, p: &mut Layout, wave: &Wave<'_>) {
+    let &Wave { omega, largest, unit, suffix, .. } = wave;
     p.lag = b.shared("tau_s", "s", (1.0 / omega).clamp(1e-3, 100.0), [1e-3, 100.0], 1.0 / omega);
-    p.transient = b.nuisance(&format!("transient_{suffix}"), unit, ANY, amplitude);
-    modes(&mut b, &mut p, cylinder, (unit, suffix), amplitude);
+    p.transient = b.nuisance(&format!("transient_{suffix}"), unit, UNBOUNDED, SMALL * largest);
+}
+
+/// The sensor that follows with a delay.
+fn sensor_lag(b: &mut SpecBuilder, p: &Layout) {
     let mechanism = b.mechanism(
         "sensor-lag",
         &[p.lag],
@@ -158,12 +204,11 @@ pub(super) fn build(
     );
     mechanism.companions = vec![p.transient.index];
     mechanism.shape_parameters = vec![p.lag.index];
-    unlagged(&mut b, &p, omega, (unit, suffix));
-    (b.build_unchecked(), p)
 }
 
 /// What a reading is of the wave itself: a sensor that lags, where it does, shows less of it.
-fn unlagged(b: &mut Builder, p: &Places, omega: f64, (unit, suffix): (&str, &str)) {
+fn unlagged(b: &mut SpecBuilder, p: &Layout, wave: &Wave<'_>) {
+    let &Wave { omega, unit, suffix, .. } = wave;
     let off = b.so_far().parameters[p.lag.index].start;
     for (id, name, unit, at, power) in [
         ("contact-line-friction", format!("friction_{suffix}"), unit.to_owned(), p.friction, 1),
@@ -180,19 +225,16 @@ fn unlagged(b: &mut Builder, p: &Places, omega: f64, (unit, suffix): (&str, &str
     }
 }
 
-fn modes(
-    b: &mut Builder,
-    p: &mut Places,
-    cylinder: &UprightCylinder,
-    (unit, suffix): (&str, &str),
-    amplitude: f64,
-) {
+/// Other oscillations than the first mode: the second one, and the arm's.
+fn modes(b: &mut SpecBuilder, p: &mut Layout, wave: &Wave<'_>) {
+    let &Wave { cylinder, largest, unit, suffix, .. } = wave;
+    let amplitude = SMALL * largest;
     let [low, high] = second_band(cylinder);
     p.second_omega =
         b.shared("omega_rad_s", "rad/s", cylinder.angular_frequency_rad_s(1, 0.0), [low, high], 0.3);
     p.second_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.5], 0.01);
-    p.second_cos = b.nuisance(&format!("second_cos_{suffix}"), unit, ANY, amplitude);
-    p.second_sin = b.nuisance(&format!("second_sin_{suffix}"), unit, ANY, amplitude);
+    p.second_cos = b.nuisance(&format!("second_cos_{suffix}"), unit, UNBOUNDED, amplitude);
+    p.second_sin = b.nuisance(&format!("second_sin_{suffix}"), unit, UNBOUNDED, amplitude);
     let second = b.mechanism(
         "second-mode",
         &[p.second_omega, p.second_damping],
@@ -210,8 +252,8 @@ fn modes(
     second.shape_parameters = vec![p.second_omega.index, p.second_damping.index];
     p.arm_omega = b.shared("omega_rad_s", "rad/s", 40.0, ARM_RAD_S, 1.0);
     p.arm_damping = b.shared("damping_ratio", "", 0.01, [1e-4, 0.9], 0.01);
-    p.arm_cos = b.nuisance(&format!("arm_cos_{suffix}"), unit, ANY, amplitude);
-    p.arm_sin = b.nuisance(&format!("arm_sin_{suffix}"), unit, ANY, amplitude);
+    p.arm_cos = b.nuisance(&format!("arm_cos_{suffix}"), unit, UNBOUNDED, amplitude);
+    p.arm_sin = b.nuisance(&format!("arm_sin_{suffix}"), unit, UNBOUNDED, amplitude);
     let arm = b.mechanism(
         "arm-compliance",
         &[p.arm_omega, p.arm_damping],
@@ -229,7 +271,7 @@ fn modes(
 }
 
 /// The amplitude at t = 0 of a wave that each run has in two parts. A sensor that lags (its reading has a transient) shows less of it.
-fn amplitude_of(p: &Places, [omega, cos, sin]: [At; 3], suffix: &str, unit: &str) -> DerivedPerRun {
+fn amplitude_of(p: &Layout, [omega, cos, sin]: [ParameterRef; 3], suffix: &str, unit: &str) -> DerivedPerRun {
     let (omega, cos, sin, lag, transient) = (omega.slot, cos.slot, sin.slot, p.lag.slot, p.transient.slot);
     DerivedPerRun {
         name: format!("amplitude_{suffix}"),
@@ -247,7 +289,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
     use missing_physics::model::Scope;
 
-    use super::super::model::Channel;
+    use super::super::setup::Channel;
     use super::*;
 
     /// A first-order lag shows a wave of omega at 1 / sqrt(1 + (omega tau)^2) of its height, and the reading at which it sticks likewise.

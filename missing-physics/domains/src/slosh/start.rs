@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use liquid_haptics::slosh::UprightCylinder;
 use missing_physics::data::Run;
 
+use crate::reading::upper_median;
+
 /// Frequencies (rad/s) at which the residual's spectrum, summed over the runs, is highest.
 pub(super) fn peaks(runs: &[Run], residual: &[Vec<Vec<f64>>], [lowest, highest]: [f64; 2]) -> Vec<f64> {
     let (mut longest, mut gap): (f64, f64) = (0.0, f64::INFINITY);
@@ -66,7 +68,7 @@ pub(super) fn first_wave(cylinder: &UprightCylinder, viscosity: f64, run: &Run) 
 /// A viscosity to begin with: from how much of the wave is left in the later half of the runs.
 pub(super) fn viscosity_guess(cylinder: &UprightCylinder, runs: &[Run]) -> f64 {
     let w = cylinder.angular_frequency_rad_s(0, 0.0);
-    let mut ratios: Vec<f64> = runs
+    let ratios = runs
         .iter()
         .filter_map(|run| {
             let (times, values) = (run.inputs.first()?, run.outputs.first()?);
@@ -82,7 +84,6 @@ pub(super) fn viscosity_guess(cylinder: &UprightCylinder, runs: &[Run]) -> f64 {
             (fall.is_finite() && fall > 0.0).then_some(fall)
         })
         .collect();
-    ratios.sort_by(f64::total_cmp);
-    let ratio = ratios.get(ratios.len() / 2).copied().unwrap_or(0.01).clamp(1e-4, 0.3);
+    let ratio = upper_median(ratios).unwrap_or(0.01).clamp(1e-4, 0.3);
     cylinder.kinematic_viscosity_m2_s(ratio)
 }

@@ -3,7 +3,8 @@
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::Experiment;
 
-use super::model::{Axes, ROD};
+use super::setup::{Axes, ROD};
+use crate::reading::upper_median;
 
 /// Frames of a proposed run.
 const MOST_FRAMES: usize = 200;
@@ -94,10 +95,8 @@ fn template(recording: &Recording, times: Vec<f64>) -> Run {
 }
 
 fn frame_s(recording: &Recording) -> f64 {
-    let mut gaps: Vec<f64> =
-        recording.runs.iter().flat_map(|r| r.inputs[0].windows(2).map(|w| w[1] - w[0])).collect();
-    gaps.sort_by(f64::total_cmp);
-    gaps.get(gaps.len() / 2).copied().unwrap_or(1.0 / 30.0).max(1e-4)
+    let gaps = recording.runs.iter().flat_map(|r| r.inputs[0].windows(2).map(|w| w[1] - w[0]));
+    upper_median(gaps.collect()).unwrap_or(1.0 / 30.0).max(1e-4)
 }
 
 /// The largest fall in m and the largest speed in m/s that were recorded.

@@ -1,16 +1,18 @@
 //! The domain `trajectory`: an object in flight, filmed, or with an accelerometer on board.
 
 mod experiments;
-pub mod model;
+mod model;
+mod setup;
 mod spec;
 
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Quantity, Spec};
 
-use super::reading::{calibration, check_runs, number, resolution};
+use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Table};
-use crate::{Domain, GRAVITY_M_S2, Loaded, Template};
-use model::{Axes, Setup, TrajectoryModel};
+pub use model::TrajectoryModel;
+pub use setup::{Axes, ROD, Setup};
 
 const COLUMNS: [Column; 9] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -72,7 +74,7 @@ impl Domain for Trajectory {
         Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
     }
 
-    fn load(&self, header: &Header) -> Result<Loaded, ReadError> {
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let rig = header.section("rig")?;
         let mass_kg = rig.number("mass_kg", 1e-9, 1e6)?;
         let diameter_m = rig.number("diameter_m", 1e-6, 1e3)?;
@@ -123,13 +125,7 @@ impl Domain for Trajectory {
             resolution: columns.iter().map(|c| resolution(c)).collect(),
         };
         let experiments = experiments::experiments(axes, gravity_m_s2, &recording);
-        Ok(Loaded {
-            recording,
-            model: Box::new(model),
-            experiments,
-            undetermined: undetermined(axes),
-            additions: serde_json::Map::new(),
-        })
+        Ok(Loaded::new(recording, model, experiments, undetermined(axes)).into())
     }
 }
 

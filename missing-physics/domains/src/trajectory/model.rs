@@ -5,74 +5,9 @@ use missing_physics::data::Run;
 use missing_physics::model::{Model, PredictError, Scope, Spec};
 use num_dual::DualNum;
 
-use super::spec;
-use crate::dual::{Asked, InDuals};
-
-/// What was measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Axes {
-    /// Height alone.
-    Height,
-    /// All three coordinates.
-    Space,
-    /// The specific force along z, by an accelerometer on board.
-    Accelerometer,
-}
-
-/// What is known of the set-up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setup {
-    /// What was measured.
-    pub axes: Axes,
-    /// Mass in kg.
-    pub mass_kg: Option<f64>,
-    /// Diameter in m.
-    pub diameter_m: Option<f64>,
-    /// Gravity in m/s^2.
-    pub gravity_m_s2: f64,
-    /// Density of the air in kg/m^3.
-    pub air_density_kg_m3: f64,
-    /// Whether the spin is known (inputs 1 to 3).
-    pub spin: bool,
-}
-
-/// A run of this kind films a rod of known length: the z channel reads its ends.
-pub const ROD: u32 = 1;
-
-/// The flight's parameters by meaning; each knows where it stands among the shared parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
-    Quadratic,
-    Linear,
-    Buoyancy,
-    LiftX,
-    LiftY,
-    LiftZ,
-    LiftCoefficient,
-    WindX,
-    WindY,
-    CameraScale,
-    TiltX,
-    TiltY,
-    ClockRate,
-    Cubic,
-    PushX,
-    PushY,
-    StiffX,
-    StiffY,
-    StiffZ,
-}
-
-impl Role {
-    /// Whether a flight with it on still has a closed form.
-    fn keeps_closed_form(self) -> bool {
-        use Role::{Cubic, LiftCoefficient, LiftX, LiftY, LiftZ, Quadratic, StiffX, StiffY, StiffZ};
-        !matches!(
-            self,
-            Quadratic | Cubic | LiftX | LiftY | LiftZ | LiftCoefficient | StiffX | StiffY | StiffZ
-        )
-    }
-}
+use super::setup::{Axes, ROD, Setup};
+use super::spec::{self, Role};
+use crate::dual::{DualModel, JacobianRequest};
 
 /// The model of the domain `trajectory`.
 #[derive(Debug)]
@@ -106,8 +41,8 @@ impl TrajectoryModel {
     }
 }
 
-impl InDuals for TrajectoryModel {
-    fn predict_in<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+impl DualModel for TrajectoryModel {
+    fn predict_dual<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,
         run: &Run,
         shared: &[T],
@@ -115,10 +50,83 @@ impl InDuals for TrajectoryModel {
         moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String> {
+        let (flight, camera, closed) = self.effects(run, shared, moving);
+        if run.kind == ROD {
+            self.rod(&camera, nuisance, run.len(), out);
+            return Ok(());
+        }
+        let times = &run.inputs[0];
+        let n = times.len();
+        let zero = T::from(0.0);
+        let start = match self.setup.axes {
+            Axes::Height => {
+                State { position: [zero, zero, nuisance[0]], velocity: [zero, zero, nuisance[1]] }
+            }
+            Axes::Space => State {
+                position: [nuisance[0], nuisance[1], nuisance[2]],
+                velocity: [nuisance[3], nuisance[4], nuisance[5]],
+            },
+            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, nuisance[1]] },
+        };
+        let begin = times.first().copied().unwrap_or(0.0);
+        let elapsed: Vec<f64> = times.iter().map(|t| t - begin).collect();
+        // A stated time is (1 + rate) times the true one. Rather than integrate to times that are dual numbers, go to the
+        // true times and move along the tangent: exact in value and first derivative.
+        let slow = (camera.clock_rate + 1.0).recip();
+        let true_times: Vec<f64> = elapsed.iter().map(|t| t * slow.re()).collect();
+        let mut states = vec![start; n];
+        if closed {
+            flight.states_in_linear_drag(&start, &true_times, &mut states)
+        } else {
+            flight.states(&start, &true_times, &mut states)
+        }
+        .map_err(|e| e.to_string())?;
+        let infinitesimal = slow - slow.re();
+        for (i, state) in states.iter().enumerate() {
+            let a = flight.acceleration(state, &start.position);
+            let shift = infinitesimal * elapsed[i];
+            let mut p = state.position;
+            for (p, v) in p.iter_mut().zip(&state.velocity) {
+                *p += *v * shift;
+            }
+            match self.setup.axes {
+                Axes::Height => out[i] = camera.scale * p[2],
+                // Specific force: what is left of the acceleration once gravity is taken away, plus the sensor's offset.
+                Axes::Accelerometer => out[i] = a[2] + self.setup.gravity_m_s2 + nuisance[0],
+                Axes::Space => {
+                    let p = tilted(p, camera.tilt);
+                    for c in 0..3 {
+                        out[c * n + i] = camera.scale * p[c];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the camera does to places, and its clock to times.
+struct Camera<T> {
+    /// Measured over true lengths.
+    scale: T,
+    /// Its tilt about x and y, rad.
+    tilt: [T; 2],
+    /// By how much its clock runs fast, relative to 1.
+    clock_rate: T,
+}
+
+impl TrajectoryModel {
+    /// The flight and the camera at some shared parameters, and whether the flight's closed form will do: where nothing else is on,
+    /// nor asked for its derivative.
+    fn effects<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+        &self,
+        run: &Run,
+        shared: &[T],
+        moving: &[usize],
+    ) -> (Flight<T>, Camera<T>, bool) {
         let zero = T::from(0.0);
         let mut flight = Flight::ballistic(self.setup.gravity_m_s2);
-        let (mut scale, mut rate, mut tilt) = (zero, zero, [zero; 2]);
-        // The closed form will do where nothing else is on, nor asked for its derivative.
+        let mut camera = Camera { scale: zero, tilt: [zero; 2], clock_rate: zero };
         let mut closed = true;
         for (slot, (role, value)) in self.roles.iter().zip(shared).enumerate() {
             closed &= role.keeps_closed_form() || (value.re() == 0.0 && !moving.contains(&slot));
@@ -143,73 +151,35 @@ impl InDuals for TrajectoryModel {
                 Role::StiffX => flight.stiffness_per_s2[0] = *value,
                 Role::StiffY => flight.stiffness_per_s2[1] = *value,
                 Role::StiffZ => flight.stiffness_per_s2[2] = *value,
-                Role::CameraScale => scale = *value,
-                Role::TiltX => tilt[0] = *value,
-                Role::TiltY => tilt[1] = *value,
-                Role::ClockRate => rate = *value,
+                Role::CameraScale => camera.scale = *value,
+                Role::TiltX => camera.tilt[0] = *value,
+                Role::TiltY => camera.tilt[1] = *value,
+                Role::ClockRate => camera.clock_rate = *value,
             }
         }
-        let times = &run.inputs[0];
-        let n = times.len();
-        let scale = scale + 1.0;
-        if run.kind == ROD {
-            // The ends of a rod of one metre, plumb: no flight, no clock, but the same camera.
-            for i in 0..n {
-                let mut p = [zero, zero, T::from(i as f64)];
-                if self.setup.axes == Axes::Space {
-                    p = tilted(p, tilt);
-                }
-                let first = 3 - out.len() / n.max(1);
-                for (c, p) in p.iter().enumerate().skip(first) {
-                    out[(c - first) * n + i] = nuisance[c - first] + scale * *p;
-                }
+        camera.scale += 1.0;
+        (flight, camera, closed)
+    }
+
+    /// The ends of a rod of one metre, plumb: no flight, no clock, but the same camera.
+    fn rod<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+        &self,
+        camera: &Camera<T>,
+        nuisance: &[T],
+        rows: usize,
+        out: &mut [T],
+    ) {
+        let zero = T::from(0.0);
+        for i in 0..rows {
+            let mut p = [zero, zero, T::from(i as f64)];
+            if self.setup.axes == Axes::Space {
+                p = tilted(p, camera.tilt);
             }
-            return Ok(());
-        }
-        let start = match self.setup.axes {
-            Axes::Height => {
-                State { position: [zero, zero, nuisance[0]], velocity: [zero, zero, nuisance[1]] }
-            }
-            Axes::Space => State {
-                position: [nuisance[0], nuisance[1], nuisance[2]],
-                velocity: [nuisance[3], nuisance[4], nuisance[5]],
-            },
-            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, nuisance[1]] },
-        };
-        let begin = times.first().copied().unwrap_or(0.0);
-        let elapsed: Vec<f64> = times.iter().map(|t| t - begin).collect();
-        // A stated time is (1 + rate) times the true one. Rather than integrate to times that are dual numbers, go to the
-        // true times and move along the tangent: exact in value and first derivative.
-        let slow = (rate + 1.0).recip();
-        let true_times: Vec<f64> = elapsed.iter().map(|t| t * slow.re()).collect();
-        let mut states = vec![start; n];
-        if closed {
-            flight.states_in_linear_drag(&start, &true_times, &mut states)
-        } else {
-            flight.states(&start, &true_times, &mut states)
-        }
-        .map_err(|e| e.to_string())?;
-        let infinitesimal = slow - slow.re();
-        for (i, state) in states.iter().enumerate() {
-            let a = flight.acceleration(state, &start.position);
-            let shift = infinitesimal * elapsed[i];
-            let mut p = state.position;
-            for (p, v) in p.iter_mut().zip(&state.velocity) {
-                *p += *v * shift;
-            }
-            match self.setup.axes {
-                Axes::Height => out[i] = scale * p[2],
-                // Specific force: what is left of the acceleration once gravity is taken away, plus the sensor's offset.
-                Axes::Accelerometer => out[i] = a[2] + self.setup.gravity_m_s2 + nuisance[0],
-                Axes::Space => {
-                    let p = tilted(p, tilt);
-                    for c in 0..3 {
-                        out[c * n + i] = scale * p[c];
-                    }
-                }
+            let first = 3 - out.len() / rows.max(1);
+            for (c, p) in p.iter().enumerate().skip(first) {
+                out[(c - first) * rows + i] = nuisance[c - first] + camera.scale * *p;
             }
         }
-        Ok(())
     }
 }
 
@@ -232,7 +202,7 @@ impl Model for TrajectoryModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict_in(run, shared, nuisance, &[], out)
+        self.predict_dual(run, shared, nuisance, &[], out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
@@ -277,136 +247,11 @@ impl Model for TrajectoryModel {
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        Asked { run, shared, nuisance, shared_free, nuisance_free }.answer(self, out, jacobian)
+        JacobianRequest { run, shared, nuisance, shared_free, nuisance_free }.fill(self, out, jacobian)
     }
 }
 
 #[cfg(test)]
 mod keys;
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use missing_physics::fit::finite_differences;
-
-    fn run(channels: usize, spin: bool) -> Run {
-        let t: Vec<f64> = (0..12).map(|i| 0.3 + 0.07 * f64::from(i)).collect();
-        let mut inputs = vec![t.clone()];
-        if spin {
-            inputs.extend([10.0, -20.0, 5.0].map(|s| vec![s; t.len()]));
-        }
-        Run { label: "1".into(), inputs, outputs: vec![vec![0.0; t.len()]; channels], kind: 0 }
-    }
-
-    /// Derivatives against central differences, everything off and everything on, for all that can be measured.
-    #[test]
-    fn derivatives_agree_with_differences() {
-        for (axes, spin) in
-            [(Axes::Height, false), (Axes::Space, false), (Axes::Space, true), (Axes::Accelerometer, false)]
-        {
-            let model = TrajectoryModel::new(Setup {
-                axes,
-                mass_kg: Some(0.05),
-                diameter_m: Some(0.06),
-                gravity_m_s2: 9.8,
-                air_density_kg_m3: 1.2,
-                spin,
-            });
-            let channels = if axes == Axes::Space { 3 } else { 1 };
-            let run = run(channels, spin);
-            let n_shared = model.spec().count(Scope::Shared);
-            let nuisance: Vec<f64> = (0..model.nuisance_count()).map(|i| 1.0 + 0.7 * i as f64).collect();
-            for on in [0.0, 1.0] {
-                let shared: Vec<f64> = model.spec().parameters[..n_shared]
-                    .iter()
-                    .map(|p| (on * 0.3 * p.scale).min(p.upper))
-                    .collect();
-                let (sf, of): (Vec<usize>, Vec<usize>) =
-                    ((0..n_shared).collect(), (0..nuisance.len()).collect());
-                let rows = channels * run.len();
-                let mut out = vec![0.0; rows];
-                let (mut exact, mut rough) =
-                    (vec![0.0; rows * (sf.len() + of.len())], vec![0.0; rows * (sf.len() + of.len())]);
-                model.jacobian(&run, &shared, &nuisance, &sf, &of, &mut out, &mut exact).unwrap();
-                // Steps away from the bound at zero: drags are differenced on one side there.
-                let inner: Vec<f64> = shared.clone();
-                finite_differences(&model, &run, &inner, &nuisance, &sf, &of, &mut out, &mut rough).unwrap();
-                for k in 0..sf.len() + of.len() {
-                    let (a, b) = (&exact[k * rows..(k + 1) * rows], &rough[k * rows..(k + 1) * rows]);
-                    let size = a.iter().fold(1e-3, |m: f64, v| m.max(v.abs()));
-                    for (a, b) in a.iter().zip(b) {
-                        assert!((a - b).abs() < 2e-4 * size, "{axes:?} column {k} (on: {on}): {a} and {b}");
-                    }
-                }
-            }
-        }
-    }
-
-    /// A plumb rod of a metre is seen by the same camera as a flight, in every coordinate, whatever `out` held before.
-    #[test]
-    fn a_rod_shows_the_camera_and_nothing_else() {
-        let setup = Setup {
-            axes: Axes::Space,
-            mass_kg: None,
-            diameter_m: None,
-            gravity_m_s2: 9.8,
-            air_density_kg_m3: 1.2,
-            spin: false,
-        };
-        let model = TrajectoryModel::new(setup);
-        let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
-        for (role, value) in model.roles.iter().zip(&mut shared) {
-            *value = match role {
-                Role::CameraScale => 0.02,
-                Role::TiltX => -0.03,
-                Role::TiltY => 0.01,
-                Role::ClockRate | Role::Quadratic => 0.04,
-                _ => 0.0,
-            };
-        }
-        let rod = Run {
-            label: "rod".into(),
-            inputs: vec![vec![0.0, 1.0]],
-            outputs: vec![vec![0.0; 2]; 3],
-            kind: ROD,
-        };
-        let nuisance = [0.3, -0.4, 0.5, 7.0, 7.0, 7.0];
-        let mut out = [f64::NAN; 6];
-        model.predict(&rod, &shared, &nuisance, &mut out).unwrap();
-        // e_z turned by -0.03 about x, then by 0.01 about y.
-        let (sx, cx) = (-0.03_f64).sin_cos();
-        let (sy, cy) = 0.01_f64.sin_cos();
-        let top = [sy * cx, -sx, cy * cx];
-        for c in 0..3 {
-            assert!((out[2 * c] - nuisance[c]).abs() < 1e-15, "{out:?}");
-            assert!((out[2 * c + 1] - nuisance[c] - 1.02 * top[c]).abs() < 1e-15, "{out:?}");
-        }
-    }
-
-    #[test]
-    fn the_start_of_a_parabola_is_found() {
-        let setup = Setup {
-            axes: Axes::Space,
-            mass_kg: None,
-            diameter_m: None,
-            gravity_m_s2: 9.8,
-            air_density_kg_m3: 1.2,
-            spin: false,
-        };
-        let model = TrajectoryModel::new(setup);
-        let mut run = run(3, false);
-        let truth = [0.1, -0.2, 1.5, 3.0, 0.4, 5.0];
-        let shared = vec![0.0; model.spec().count(Scope::Shared)];
-        let mut out = vec![0.0; 36];
-        model.predict(&run, &shared, &truth, &mut out).unwrap();
-        for c in 0..3 {
-            run.outputs[c].copy_from_slice(&out[12 * c..12 * (c + 1)]);
-        }
-        run.outputs[1][4] = f64::NAN;
-        let mut nuisance = [0.0; 6];
-        model.nuisance_start(&run, &mut nuisance);
-        for (a, b) in nuisance.iter().zip(truth) {
-            assert!((a - b).abs() < 1e-9, "{nuisance:?}");
-        }
-    }
-}
+mod tests;

@@ -2,19 +2,53 @@
 
 use std::sync::Arc;
 
-use missing_physics::model::{Derived, Quantity, Spec};
+use missing_physics::model::{Derived, ParameterRef, Quantity, Spec, SpecBuilder, UNBOUNDED};
 
-use super::model::{Axes, Role, Setup};
-use crate::builder::{ANY, At, Builder};
+use super::setup::{Axes, Setup};
+
+/// The flight's parameters by meaning; each knows where it stands among the shared parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Quadratic,
+    Linear,
+    Buoyancy,
+    LiftX,
+    LiftY,
+    LiftZ,
+    LiftCoefficient,
+    WindX,
+    WindY,
+    CameraScale,
+    TiltX,
+    TiltY,
+    ClockRate,
+    Cubic,
+    PushX,
+    PushY,
+    StiffX,
+    StiffY,
+    StiffZ,
+}
+
+impl Role {
+    /// Whether a flight with it on still has a closed form.
+    pub(super) fn keeps_closed_form(self) -> bool {
+        use Role::{Cubic, LiftCoefficient, LiftX, LiftY, LiftZ, Quadratic, StiffX, StiffY, StiffZ};
+        !matches!(
+            self,
+            Quadratic | Cubic | LiftX | LiftY | LiftZ | LiftCoefficient | StiffX | StiffY | StiffZ
+        )
+    }
+}
 
 /// A specification in the making, with the meaning of each shared parameter, in order.
 struct Flying {
-    b: Builder,
+    b: SpecBuilder,
     roles: Vec<Role>,
 }
 
 impl Flying {
-    fn shared(&mut self, role: Role, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> At {
+    fn shared(&mut self, role: Role, name: &str, unit: &str, bounds: [f64; 2], scale: f64) -> ParameterRef {
         self.roles.push(role);
         self.b.shared(name, unit, 0.0, bounds, scale)
     }
@@ -40,15 +74,29 @@ impl Flying {
 
 /// The specification of a set-up and the meaning of each shared parameter, in order.
 pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
-    let mut flying = Flying { b: Builder::default(), roles: Vec::new() };
+    let mut flying = Flying { b: SpecBuilder::default(), roles: Vec::new() };
     let b = &mut flying;
-    let (space, felt) = (setup.axes == Axes::Space, setup.axes == Axes::Accelerometer);
-    let sized = setup.mass_kg.is_some() && setup.diameter_m.is_some();
+    let felt = setup.axes == Axes::Accelerometer;
     b.b.baseline(if felt {
         "free fall: an accelerometer on board reads its offset and nothing else"
     } else {
         "ballistic flight under gravity alone, seen by a true camera; every run has its own start"
     });
+    let drag = drags(b, setup, drag_unit);
+    if !felt {
+        camera_and_gravity(b);
+    }
+    if setup.axes == Axes::Space {
+        in_space(b, setup.spin, drag);
+    }
+    terms(b, setup.axes);
+    start(b, setup.axes);
+    (flying.b.build_unchecked(), flying.roles)
+}
+
+/// Drags of the air; the parameter of the quadratic one, whose unit is that of a drag coefficient where the ball's size is known.
+fn drags(b: &mut Flying, setup: &Setup, drag_unit: f64) -> ParameterRef {
+    let sized = setup.mass_kg.is_some() && setup.diameter_m.is_some();
     let drag = if sized {
         b.shared(Role::Quadratic, "drag_coefficient", "", [0.0, 10.0], 0.5)
     } else {
@@ -77,14 +125,13 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
         "Stokes 1851; de Silva et al. 2020, doi:10.3389/frai.2020.00025",
     ];
     b.b.mechanism("linear-drag", &[rate], text, &["quadratic-drag", "buoyancy", "camera-scale"]);
-    if !felt {
-        camera_and_gravity(b);
-    }
-    if space {
-        in_space(b, setup.spin, drag);
-    }
+    drag
+}
+
+/// Candidate terms of an unknown law.
+fn terms(b: &mut Flying, axes: Axes) {
     b.term(Role::Cubic, ("cubic_drag_s_per_m2", "s/m^2"), 0.0, 1e-3, "-|v|^2 v", &["v"]);
-    if !felt {
+    if axes != Axes::Accelerometer {
         b.term(
             Role::StiffZ,
             ("stiffness_z_per_s2", "1/s^2"),
@@ -94,7 +141,7 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
             &["z_m"],
         );
     }
-    if space {
+    if axes == Axes::Space {
         b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_x", &[]);
         b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_y", &[]);
         b.term(
@@ -114,25 +161,28 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
             &["y_m"],
         );
     }
-    match setup.axes {
+}
+
+/// Where and how fast each run begins.
+fn start(b: &mut Flying, axes: Axes) {
+    match axes {
         Axes::Height => {
-            b.b.nuisance("z0_m", "m", ANY, 1.0);
-            b.b.nuisance("vz0_m_s", "m/s", ANY, 1.0);
+            b.b.nuisance("z0_m", "m", UNBOUNDED, 1.0);
+            b.b.nuisance("vz0_m_s", "m/s", UNBOUNDED, 1.0);
         }
         Axes::Space => {
             for name in ["x0_m", "y0_m", "z0_m"] {
-                b.b.nuisance(name, "m", ANY, 1.0);
+                b.b.nuisance(name, "m", UNBOUNDED, 1.0);
             }
             for name in ["vx0_m_s", "vy0_m_s", "vz0_m_s"] {
-                b.b.nuisance(name, "m/s", ANY, 1.0);
+                b.b.nuisance(name, "m/s", UNBOUNDED, 1.0);
             }
         }
         Axes::Accelerometer => {
-            b.b.nuisance("offset_m_s2", "m/s^2", ANY, 1.0);
+            b.b.nuisance("offset_m_s2", "m/s^2", UNBOUNDED, 1.0);
             b.b.nuisance("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
         }
     }
-    (flying.b.build_unchecked(), flying.roles)
 }
 
 /// Effects that a height alone shows.
@@ -166,7 +216,7 @@ fn camera_and_gravity(b: &mut Flying) {
 }
 
 /// Effects that need all three coordinates.
-fn in_space(b: &mut Flying, spin: bool, drag: At) {
+fn in_space(b: &mut Flying, spin: bool, drag: ParameterRef) {
     let (parameters, equation) = if spin {
         let c = b.shared(Role::LiftCoefficient, "lift_coefficient", "", [-20.0, 20.0], 0.01);
         (vec![c], "a = c spin x v")

@@ -23,7 +23,7 @@ fn case(name: &str) -> Option<(Vec<Run>, TrajectoryModel, Value)> {
         axes: Axes::Space,
         mass_kg: rig("mass_kg"),
         diameter_m: rig("diameter_m"),
-        gravity_m_s2: rig("gravity_m_s2").unwrap_or(crate::GRAVITY_M_S2),
+        gravity_m_s2: rig("gravity_m_s2").unwrap_or(crate::reading::GRAVITY_M_S2),
         air_density_kg_m3: 1.2,
         spin: false,
     });

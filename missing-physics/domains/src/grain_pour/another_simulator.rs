@@ -9,12 +9,13 @@ use granular_infer::camera::Camera;
 use granular_infer::campaign::{Conditions, Grains, Ranges, Rig};
 use granular_infer::dem::Pour;
 use granular_infer::seeing::HeightMap;
-use granular_infer::statistics::{COUNT, STATISTICS, statistics};
+use granular_infer::statistics::{COUNT, STATISTICS, Symmetry, statistics};
 use rayon::prelude::*;
 
 use super::campaign::{BUNDLED_RIG, Campaign};
+use super::law::statistics_of;
 use super::model::PourModel;
-use super::read::read;
+use super::read::{Picture, Read, read};
 use crate::recording::Header;
 
 /// A recording's statistics less the emulator's, in sigmas, picture by picture: at the truth, and at the likeliest baseline.
@@ -70,16 +71,46 @@ fn distance(folder: &Path) -> Result<Distance, Box<dyn std::error::Error>> {
     let key: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("key.json"))?)?;
     let read = read(&Header::read(folder)?)?;
     let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m).collect();
-    let range = [heights.iter().copied().fold(1.0, f64::min), heights.iter().copied().fold(0.0, f64::max)];
-    let campaign = Campaign::of(&read.rig, range)?;
+    let campaign = Campaign::of(&read.rig, read.heights_m())?;
     let model = PourModel::new(&campaign, &read)?;
-    let aside = model.aside(&read);
+    let aside = aside(&read);
     let (conditions, blur_px2) = truth(&key, &campaign, aside).ok_or("a key without a truth")?;
-    let at_truth = model.distances(&read, &conditions, blur_px2);
+    let at_truth = distances(&model, &read, &conditions, blur_px2);
     let best = Conditions { height_m: 0.0, ..model.nearest_baseline(&read, &campaign) };
-    let at_best = model.distances(&read, &best, 0.0);
+    let at_best = distances(&model, &read, &best, 0.0);
     println!("{} truth {conditions:?}\n   best {best:?}", folder.display());
     Ok(Distance { heights_m: heights, at_truth, at_best })
+}
+
+/// Each picture's statistics less their mean, in sigmas from pour to pour, what turns with the scene along and across the tilt; the
+/// height of the conditions is added to the pictures'.
+fn distances(model: &PourModel, read: &Read, conditions: &Conditions, blur_px2: f64) -> Vec<[f64; COUNT]> {
+    let left = |picture: &Picture| {
+        let height_m = picture.height_m / model.scale.length + conditions.height_m;
+        let at = Conditions { height_m, ..*conditions };
+        let (mean, sigma) = (model.law.emulator.mean(&at, blur_px2), model.law.emulator.sigma(&at, blur_px2));
+        let seen = statistics_of(picture, read);
+        let left: [f64; COUNT] = std::array::from_fn(|k| (seen[k] - mean[k]) / sigma[k]);
+        // Along and across the tilt.
+        let azimuth = conditions.tilt_rad[1].atan2(conditions.tilt_rad[0]);
+        std::array::from_fn(|k| match STATISTICS[k].1 {
+            Symmetry::Scalar => left[k],
+            Symmetry::Vector => azimuth.cos() * left[k] + azimuth.sin() * left[k + 1],
+            Symmetry::Tensor => (2.0 * azimuth).cos() * left[k] + (2.0 * azimuth).sin() * left[k + 1],
+            Symmetry::Second if STATISTICS[k - 1].1 == Symmetry::Vector => {
+                azimuth.cos() * left[k] - azimuth.sin() * left[k - 1]
+            }
+            Symmetry::Second => (2.0 * azimuth).cos() * left[k] - (2.0 * azimuth).sin() * left[k - 1],
+        })
+    };
+    read.pictures.iter().map(left).collect()
+}
+
+/// Where the pictures' centroids lie.
+fn aside(read: &Read) -> [f64; 2] {
+    let at = |name| STATISTICS.iter().position(|s| s.0 == name).unwrap_or(0);
+    let mean = |k: usize| read.pictures.iter().map(|p| statistics_of(p, read)[k]).sum::<f64>();
+    [mean(at("centroid_x")), mean(at("centroid_y"))]
 }
 
 #[test]

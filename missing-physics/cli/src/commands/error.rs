@@ -1,0 +1,63 @@
+//! Why a command failed.
+
+use std::path::PathBuf;
+
+/// Why a command failed; its text is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Read(#[from] missing_physics_domains::recording::ReadError),
+    /// No such domain.
+    #[error(transparent)]
+    UnknownDomain(#[from] missing_physics_domains::UnknownDomain),
+    /// The recording cannot be diagnosed.
+    #[error(transparent)]
+    Diagnose(#[from] missing_physics::engine::DiagnoseError),
+    /// The repaired model cannot be read, or does not fit the recording.
+    #[error(transparent)]
+    Repair(#[from] missing_physics_domains::repair::RepairError),
+    /// The proof cannot go on.
+    #[error(transparent)]
+    Prove(#[from] missing_physics_prove::ProveError),
+    /// The folder of a file that is to be written is not there.
+    #[error("{}: no such folder to write to", .folder.display())]
+    NoFolder {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A folder stands where a file is to be written.
+    #[error("{}: a folder, expected the name of a file", .path.display())]
+    NotAFile {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The folder of a new recording holds something.
+    #[error("{}: exists, expected a new or empty folder", .folder.display())]
+    NotEmpty {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A file or folder cannot be read or written.
+    #[error("{}: {error}", .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// The threads that were asked for cannot be started.
+    #[error("{threads} threads cannot be had: {error}")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the thread pool says.
+        error: rayon::ThreadPoolBuildError,
+    },
+}
+
+/// Writes a file whole or not at all.
+pub(super) fn write_whole(path: &std::path::Path, contents: impl AsRef<[u8]>) -> Result<(), CommandError> {
+    missing_physics_report::write_whole(path, contents)
+        .map_err(|error| CommandError::Io { path: path.into(), error })
+}

@@ -1,0 +1,161 @@
+//! What a domain is, and what it makes of a recording.
+
+use missing_physics::data::{Recording, Run};
+use missing_physics::model::{Experiment, Model, Quantity, Spec};
+
+use crate::recording::{Header, ReadError};
+
+/// The thesis whose rigs the domains follow, in full; mechanisms cite it by the key with which this begins.
+pub const THESIS: &str = "[Matl 2021] Carolyn Chen Matl, Interactive Perception for Robotic Manipulation of Liquids, Grains, and \
+     Doughs, dissertation (Doctor of Philosophy), University of California, Berkeley, 2021";
+
+/// One domain: its files, its physics.
+pub trait Domain: Sync {
+    /// Identifier (`trajectory`).
+    fn id(&self) -> &'static str;
+    /// What it is, in one sentence.
+    fn summary(&self) -> &'static str;
+    /// The files, columns and keys that it reads, a line each.
+    fn reads(&self) -> &'static [(&'static str, &'static str)];
+    /// The fullest model of the domain, for `domains`.
+    fn spec(&self) -> Spec;
+    /// A recording to begin from.
+    fn template(&self) -> Template;
+    /// Whether its channels are what is measured, so that a model of them can predict a run; false where the engine is shown
+    /// errors that the domain has whitened.
+    fn predicts(&self) -> bool {
+        true
+    }
+    /// Reads and validates the recording that a header describes: nothing is learned, drawn or simulated for it.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError>;
+}
+
+/// A template for a new recording.
+#[derive(Debug, Clone, Copy)]
+pub struct Template {
+    /// Contents of `recording.toml`.
+    pub header: &'static str,
+    /// Name and contents of the data file.
+    pub data: (&'static str, &'static str),
+}
+
+/// A recording that was read and found sound, and what is still to be learned, drawn or simulated for it.
+pub struct CheckedRecording {
+    /// What the recording holds.
+    pub contents: Contents,
+    prepare: Box<dyn FnOnce() -> Result<Loaded, ReadError> + Send>,
+}
+
+impl CheckedRecording {
+    /// A recording whose model takes some work, done by `prepare`.
+    pub fn new(
+        contents: Contents,
+        prepare: impl FnOnce() -> Result<Loaded, ReadError> + Send + 'static,
+    ) -> Self {
+        Self { contents, prepare: Box::new(prepare) }
+    }
+
+    /// Does that work: learns and simulates what the recording's model needs.
+    ///
+    /// # Errors
+    /// [`ReadError::Unfit`] where that cannot be done with this recording, or what is wrong with its rows.
+    pub fn prepare(self) -> Result<Loaded, ReadError> {
+        (self.prepare)()
+    }
+}
+
+impl From<Loaded> for CheckedRecording {
+    /// A recording whose model is a formula: nothing is left to do.
+    fn from(loaded: Loaded) -> Self {
+        let recording = &loaded.recording;
+        let contents = Contents {
+            channels: recording.channels.clone(),
+            calibration: recording.calibration.clone(),
+            variable: recording.variables.first().cloned().unwrap_or_else(|| Quantity::new("row", "")),
+            runs: recording.runs.iter().map(RunContents::of).collect(),
+            spec: loaded.model.spec().clone(),
+        };
+        Self::new(contents, || Ok(loaded))
+    }
+}
+
+impl std::fmt::Debug for CheckedRecording {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CheckedRecording").field("contents", &self.contents).finish_non_exhaustive()
+    }
+}
+
+/// What a recording holds.
+#[derive(Debug, Clone)]
+pub struct Contents {
+    /// What is measured.
+    pub channels: Vec<Quantity>,
+    /// The calibrated sigma of each channel, where there is one.
+    pub calibration: Vec<Option<f64>>,
+    /// The first of the variables that are known.
+    pub variable: Quantity,
+    /// The runs in the order of the file.
+    pub runs: Vec<RunContents>,
+    /// Parameters and mechanisms of its model; where these begin may yet change.
+    pub spec: Spec,
+}
+
+/// What a run holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunContents {
+    /// Its label.
+    pub label: String,
+    /// Number of its rows.
+    pub rows: usize,
+    /// The first variable in its first and its last row.
+    pub from_to: [f64; 2],
+}
+
+impl RunContents {
+    /// The contents of a run with some values of the first variable.
+    pub fn new(label: &str, variable: &[f64]) -> Self {
+        let end = |value: Option<&f64>| value.copied().unwrap_or(0.0);
+        let from_to = [end(variable.first()), end(variable.last())];
+        Self { label: label.to_owned(), rows: variable.len(), from_to }
+    }
+
+    fn of(run: &Run) -> Self {
+        Self::new(&run.label, run.inputs.first().map_or(&[], Vec::as_slice))
+    }
+}
+
+/// A recording with the model of its set-up.
+pub struct Loaded {
+    /// The data.
+    pub recording: Recording,
+    /// The full model.
+    pub model: Box<dyn Model + Send>,
+    /// What the rig could do next.
+    pub experiments: Vec<Experiment>,
+    /// What such data cannot determine, one sentence each.
+    pub undetermined: Vec<String>,
+    /// What the domain adds to the answer (impacts that were heard in sound), by the key it has there.
+    pub additions: serde_json::Map<String, serde_json::Value>,
+}
+
+impl Loaded {
+    /// A recording with its model, to whose answer the domain adds nothing.
+    pub fn new(
+        recording: Recording,
+        model: impl Model + Send + 'static,
+        experiments: Vec<Experiment>,
+        undetermined: Vec<String>,
+    ) -> Self {
+        let additions = serde_json::Map::new();
+        Self { recording, model: Box::new(model), experiments, undetermined, additions }
+    }
+}
+
+impl std::fmt::Debug for Loaded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Loaded").field("recording", &self.recording).finish_non_exhaustive()
+    }
+}

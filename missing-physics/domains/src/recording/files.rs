@@ -1,0 +1,63 @@
+//! Files of limited size, within a recording's folder.
+
+use std::path::{Path, PathBuf};
+
+use super::error::{LARGEST_FILE, ReadError};
+use super::words::{one_line, quoted};
+
+/// Reads a file of limited size.
+///
+/// # Errors
+/// [`ReadError::Open`], [`ReadError::TooLarge`].
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let file = one_line(&path.display().to_string());
+    let open = |e: std::io::Error| ReadError::Open { file: file.clone(), why: plain(&e) };
+    let metadata = std::fs::metadata(path).map_err(open)?;
+    if !metadata.is_file() {
+        return Err(ReadError::Open { file, why: "not a file".into() });
+    }
+    if metadata.len() > LARGEST_FILE {
+        return Err(ReadError::TooLarge { file, bytes: metadata.len() });
+    }
+    std::fs::read(path).map_err(open)
+}
+
+/// Reads a text file of limited size.
+///
+/// # Errors
+/// [`ReadError::Open`], [`ReadError::TooLarge`], [`ReadError::NotText`].
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
+    let file = one_line(&path.display().to_string());
+    let text = String::from_utf8(read_bytes(path)?)
+        .map_err(|e| ReadError::NotText { file: file.clone(), at: e.utf8_error().valid_up_to() })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// What the system says of a failure, in words that are the same everywhere.
+fn plain(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "no such file".into(),
+        std::io::ErrorKind::PermissionDenied => "may not be read".into(),
+        _ => one_line(&error.to_string()),
+    }
+}
+
+/// The file that a recording names: it must lie in the recording's own folder.
+///
+/// # Errors
+/// [`ReadError::Value`] for a path that is absolute or leads out of the folder.
+pub fn inside(folder: &Path, file: &str, key: &str, name: &str) -> Result<PathBuf, ReadError> {
+    use std::path::Component;
+    let path = Path::new(name);
+    let within =
+        !name.is_empty() && path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    if !within {
+        return Err(ReadError::Value {
+            file: file.into(),
+            key: key.into(),
+            got: quoted(name),
+            expected: "a file in the recording's folder".into(),
+        });
+    }
+    Ok(folder.join(path))
+}

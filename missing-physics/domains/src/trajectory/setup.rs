@@ -1,0 +1,32 @@
+//! What is known of a flight that is recorded.
+
+/// What was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axes {
+    /// Height alone.
+    Height,
+    /// All three coordinates.
+    Space,
+    /// The specific force along z, by an accelerometer on board.
+    Accelerometer,
+}
+
+/// What is known of the set-up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup {
+    /// What was measured.
+    pub axes: Axes,
+    /// Mass in kg.
+    pub mass_kg: Option<f64>,
+    /// Diameter in m.
+    pub diameter_m: Option<f64>,
+    /// Gravity in m/s^2.
+    pub gravity_m_s2: f64,
+    /// Density of the air in kg/m^3.
+    pub air_density_kg_m3: f64,
+    /// Whether the spin is known (inputs 1 to 3).
+    pub spin: bool,
+}
+
+/// A run of this kind films a rod of known length: the z channel reads its ends.
+pub const ROD: u32 = 1;

@@ -1,0 +1,152 @@
+//! The proof as a whole: worlds drawn and sealed, diagnosed, opened and scored.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use missing_physics::observer::{Observer, Progress};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use worlds::concealed::{Maker, makers};
+
+use crate::error::ProveError;
+use crate::files::{make_folder, write_json, write_whole};
+use crate::score::Score;
+use crate::world::World;
+use crate::{key, page, table};
+
+/// What `prove` is asked for.
+#[derive(Debug, Clone)]
+pub struct ProveArguments {
+    /// One domain; all that can be proven without it.
+    pub domain: Option<String>,
+    /// Worlds of each domain.
+    pub worlds: usize,
+    /// Seed of the worlds.
+    pub seed: u64,
+    /// The folder of the proof.
+    pub folder: PathBuf,
+    /// Number of threads; 0 for all cores.
+    pub threads: usize,
+}
+
+/// What is being proven.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Plan {
+    format: u32,
+    version: String,
+    domains: Vec<String>,
+    worlds: usize,
+    seed: u64,
+    /// SHA-256 of the answers, before any diagnosis.
+    seal: String,
+}
+
+/// The domains of which worlds can be drawn.
+pub fn provable() -> Vec<&'static str> {
+    makers().iter().map(|m| m.name()).collect()
+}
+
+/// Draws the worlds, seals their answers, diagnoses each from its files, opens the seal and scores; goes on where a proof of the same
+/// arguments was stopped. Returns the score as text; JSON and a page lie in the folder.
+///
+/// # Errors
+/// [`ProveError`]: an unknown domain, another proof in the folder, a file that cannot be written, or a stop.
+pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<String, ProveError> {
+    let chosen: Vec<&'static dyn Maker> = makers()
+        .iter()
+        .copied()
+        .filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name()))
+        .collect();
+    if chosen.is_empty() {
+        let domain = arguments.domain.clone().unwrap_or_default();
+        return Err(ProveError::UnknownDomain { domain, known: provable() });
+    }
+    if arguments.worlds == 0 {
+        return Err(ProveError::NoWorlds);
+    }
+    let threads = arguments.threads;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| ProveError::Threads { threads, error })?;
+    let worlds: Vec<World> = chosen
+        .iter()
+        .flat_map(|&maker| (0..arguments.worlds).map(move |number| (maker, number)))
+        .map(|(maker, number)| World::new(maker, number, arguments.seed, &arguments.folder))
+        .collect();
+    report(observer, "drawing the worlds", 0.0)?;
+    let keys: Vec<String> =
+        pool.install(|| worlds.par_iter().map(|w| key::to_json(w.name(), &w.draw().key)).collect());
+    let plan = Plan {
+        format: 1,
+        version: env!("CARGO_PKG_VERSION").into(),
+        domains: chosen.iter().map(|m| m.name().to_owned()).collect(),
+        worlds: arguments.worlds,
+        seed: arguments.seed,
+        seal: seal(&keys),
+    };
+    begin(&arguments.folder, &plan)?;
+    each(&pool, &worlds, "diagnosing", observer, World::diagnose)?;
+    // Only now are the answers opened.
+    write_whole(&arguments.folder.join("keys.jsonl"), keys.concat())?;
+    each(&pool, &worlds, "fitting the truth", observer, World::fit_oracle)?;
+    let judged = worlds.iter().map(World::judged).collect::<Result<Vec<_>, _>>()?;
+    let score = Score::of(&plan.domains, &judged);
+    let folder = &arguments.folder;
+    write_whole(&folder.join("score.json"), score.to_json(&plan.seal, plan.seed, plan.worlds))?;
+    write_whole(&folder.join("score.html"), page::page(&score, &judged, &plan.seal, plan.seed))?;
+    Ok(format!(
+        "{} worlds of each domain, seed {}; answers sealed as {}\n\n{}\n{}: ten worlds with their reports, the matrix and the power curves\n",
+        plan.worlds,
+        plan.seed,
+        &plan.seal[..16],
+        table::table(&score),
+        folder.join("score.html").display()
+    ))
+}
+
+fn seal(keys: &[String]) -> String {
+    let mut hash = Sha256::new();
+    keys.iter().for_each(|key| hash.update(key));
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Writes the plan, or finds that this very proof has begun before.
+fn begin(folder: &Path, plan: &Plan) -> Result<(), ProveError> {
+    make_folder(folder)?;
+    let path = folder.join("plan.json");
+    if !path.exists() {
+        return write_json(&path, plan);
+    }
+    let text = missing_physics_domains::recording::read_text(&path)?;
+    match serde_json::from_str::<Plan>(&text) {
+        Ok(before) if before == *plan => Ok(()),
+        _ => Err(ProveError::OtherProof { folder: folder.into() }),
+    }
+}
+
+/// Does a piece of work on every world, in parallel; each world keeps what it has done.
+fn each(
+    pool: &rayon::ThreadPool,
+    worlds: &[World],
+    stage: &str,
+    observer: &dyn Observer,
+    work: impl Fn(&World) -> Result<(), ProveError> + Sync,
+) -> Result<(), ProveError> {
+    let done = AtomicUsize::new(0);
+    pool.install(|| {
+        worlds.par_iter().try_for_each(|world| {
+            work(world)?;
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let text = format!("{stage}: {done} of {}", worlds.len());
+            report(observer, &text, done as f64 / worlds.len() as f64)
+        })
+    })
+}
+
+/// Tells the observer how far the proof is, unless it asks for a stop.
+fn report(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), ProveError> {
+    if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(ProveError::Stopped) }
+}

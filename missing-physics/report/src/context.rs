@@ -1,0 +1,16 @@
+//! What a report says beside the diagnosis.
+
+/// What a report says of the recording beside the diagnosis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReportContext {
+    /// Identifier of the domain.
+    pub domain: String,
+    /// The folder, as it was given.
+    pub recording: String,
+    /// Title of the page.
+    pub title: String,
+    /// Sources that references cite by a key, in full: each begins with its key, `[Author year]`.
+    pub citations: Vec<String>,
+    /// What the domain adds to the answer, by the key it has there.
+    pub additions: serde_json::Map<String, serde_json::Value>,
+}
