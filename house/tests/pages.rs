@@ -116,6 +116,8 @@ fn the_book_is_whole() {
         pages[&summary].links.iter().filter_map(|l| Some(target(&summary, l)?.0)).collect();
     for (path, page) in pages.iter().filter(|(path, _)| path.starts_with(book)) {
         assert!(listed.contains(path) || *path == summary, "{} is not in SUMMARY.md", path.display());
+        // The book makes `index.html` of such a page, and its links to the page lead nowhere.
+        assert!(!path.ends_with("README.md"), "{}: call it index.md", path.display());
         for link in &page.links {
             let inside = target(path, link).is_none_or(|(to, _)| to.starts_with(book));
             assert!(inside, "{}: {link} leads out of the book", path.display());
