@@ -1,4 +1,4 @@
-//! Random shooting with refinement: the cross-entropy method (thesis, section 7.4; Botev et al. 2013,
+//! Random shooting with refinement: the cross-entropy method ([Matl 2021], section 7.4; Botev et al. 2013,
 //! doi:10.1016/B978-0-444-53859-8.00003-5).
 
 use rand::Rng;
@@ -7,12 +7,12 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::objective::{Planner, Task};
 use crate::predictor::PlanError;
 
-/// Settings; the defaults are the thesis's.
+/// Settings; the defaults are [Matl 2021]'s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CemSettings {
     /// Plans that are drawn each time: K.
     pub samples: usize,
-    /// Of these, the best ones that make the next distribution: N. The thesis does not give it.
+    /// Of these, the best ones that make the next distribution: N. [Matl 2021] does not give it.
     pub elite: usize,
     /// Times that the distribution is refined: M.
     pub rounds: usize,
@@ -107,7 +107,7 @@ impl Planner for Cem {
             self.order.select_nth_unstable_by(elite - 1, |a, b| a.0.total_cmp(&b.0));
             self.refine();
         }
-        // The thesis takes the last mean; should it be worse than what there was, that stays.
+        // [Matl 2021] takes the last mean; should it be worse than what there was, that stays.
         let cost = task.cost(&self.mean);
         if cost <= best {
             plan.copy_from_slice(&self.mean);
