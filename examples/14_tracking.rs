@@ -90,6 +90,24 @@ struct Bar {
     energy: f64,
 }
 
+impl Bar {
+    /// Shares in per cent and the mean energy of the throws that came within reach.
+    fn of(ball: &'static str, algorithm: usize, outcomes: &[&Outcome]) -> Self {
+        let within: Vec<&&Outcome> = outcomes.iter().filter(|o| o.verdict != Verdict::Out).collect();
+        let n = within.len().max(1) as f64;
+        let share = |f: &dyn Fn(&Outcome) -> bool| 100.0 * within.iter().filter(|o| f(o)).count() as f64 / n;
+        let missed = |o: &Outcome| o.verdict != Verdict::Touched;
+        Self {
+            ball,
+            algorithm,
+            touched: share(&|o| !missed(o)),
+            outliers: share(&|o| missed(o) && o.outlier),
+            missed: share(&|o| missed(o) && !o.outlier),
+            energy: 1e4 * within.iter().map(|o| o.energy).sum::<f64>() / n,
+        }
+    }
+}
+
 fn main() -> Result<(), Failure> {
     let small = examples::small();
     let throws = if small { 4 } else { 30 };
@@ -147,19 +165,7 @@ fn compare(
             ["1, straight on", "2, with chance", "2, no farther than needed"].into_iter().enumerate()
         {
             let all: Vec<&Outcome> = outcomes.iter().map(|o| &o[algorithm]).collect();
-            let within: Vec<&&Outcome> = all.iter().filter(|o| o.verdict != Verdict::Out).collect();
-            let n = within.len().max(1) as f64;
-            let share =
-                |f: &dyn Fn(&Outcome) -> bool| 100.0 * within.iter().filter(|o| f(o)).count() as f64 / n;
-            let missed = |o: &Outcome| o.verdict != Verdict::Touched;
-            let bar = Bar {
-                ball: ball.name,
-                algorithm,
-                touched: share(&|o| !missed(o)),
-                outliers: share(&|o| missed(o) && o.outlier),
-                missed: share(&|o| missed(o) && !o.outlier),
-                energy: 1e4 * within.iter().map(|o| o.energy).sum::<f64>() / n,
-            };
+            let bar = Bar::of(ball.name, algorithm, &all);
             let slowest = 1e3 * all.iter().map(|o| o.slowest_s).fold(0.0, f64::max);
             println!(
                 "{:10} {title:28} {:>6.0} % {:>16.0} % {:>6.0} % {:>5} {:>16.1} {slowest:>12.2}",
@@ -167,7 +173,7 @@ fn compare(
                 bar.touched,
                 bar.outliers,
                 bar.missed,
-                all.len() - within.len(),
+                all.iter().filter(|o| o.verdict == Verdict::Out).count(),
                 bar.energy
             );
             bars.push(bar);
