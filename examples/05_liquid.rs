@@ -1,4 +1,4 @@
-//! The thesis's chapter 2 again, on the simulated wrist: mass, volume, which liquid, pours, and its mishaps as diagnoses.
+//! [Matl 2021], chapter 2, again, on the simulated wrist: mass, volume, which liquid, pours, and its mishaps as diagnoses.
 //!
 //! `cargo run --release -p examples --example 05_liquid` (13 fill levels of 5 sweeps, 20 pours; `--small`: 5 levels of 1, 4 pours)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
@@ -17,7 +17,9 @@ use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::fake::{AXIA80, Box3, Cavity, FakeWrist, Load, Round};
 use liquid_haptics::pour::{Bead, Mouth, Pour};
 use liquid_haptics::viscosity::{Bottle, Verdict, ViscosityFit};
-use liquid_haptics::volume::{ForceGain, Liquid, MassFit, Pose, Ties, VolumeFit, fit_mass};
+use liquid_haptics::volume::{
+    ErrorCorrelation, ForceGain, Liquid, MassFit, SettledPose, VolumeFit, fit_mass,
+};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench, world_from_body};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
@@ -31,7 +33,7 @@ type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 const GRAVITY: f64 = 9.80665;
 const WATER: f64 = 997.0;
-/// The thesis's small bottle: outer radius and length as measured with a caliper; the wall is what it later suspected.
+/// The small bottle of [Matl 2021]: outer radius and length as measured with a caliper; the wall is what it later suspected.
 const RADIUS_M: f64 = 0.035;
 const LENGTH_M: f64 = 0.172;
 const WALL_M: f64 = 0.001;
@@ -48,13 +50,13 @@ const GRASP: Grasp = Grasp {
 fn main() -> Outcome<()> {
     let small = examples::small();
     let (levels, sweeps) = if small { (5, 1) } else { (13, 5) };
-    println!("{:44} {:>20} {:>20}", "", "here", "thesis");
+    println!("{:44} {:>20} {:>20}", "", "here", "[Matl 2021]");
     let calibration = calibrate()?;
-    let ties = calibration.ties;
+    let correlation = calibration.correlation;
     sweeps_of_the_bottle(&calibration, levels, sweeps)?;
-    carton(sweeps, ties)?;
+    carton(sweeps, correlation)?;
     which_liquid(if small { 2 } else { 5 })?;
-    pours(if small { 1 } else { 5 }, ties)?;
+    pours(if small { 1 } else { 5 }, correlation)?;
     mishaps()
 }
 
@@ -66,8 +68,8 @@ fn shown(errors: &[f64], unit: f64, name: &str) -> String {
     format!("{:+.2} +- {:.2} {name}", mean * unit, 1.96 * deviation / n.sqrt() * unit)
 }
 
-fn line(what: &str, here: &str, thesis: &str) {
-    println!("{what:44} {here:>20} {thesis:>20}");
+fn line(what: &str, here: &str, published: &str) {
+    println!("{what:44} {here:>20} {published:>20}");
 }
 
 fn bottle_load(liquid_mass_kg: f64, density: f64, viscosity_m2_s: f64) -> Load {
@@ -89,7 +91,7 @@ fn bottle_load(liquid_mass_kg: f64, density: f64, viscosity_m2_s: f64) -> Load {
 }
 
 /// The slow turn: 19 poses, half a second of readings at each.
-fn sweep(load: Load, seed: u64) -> Outcome<Vec<Pose>> {
+fn sweep(load: Load, seed: u64) -> Outcome<Vec<SettledPose>> {
     let mut wrist = FakeWrist::new(load, AXIA80, seed).map_err(|e| e.to_string())?;
     let programme = TiltProgramme {
         angles_rad: (0..19).map(|k| f64::from(10 * k).to_radians()).collect(),
@@ -99,7 +101,7 @@ fn sweep(load: Load, seed: u64) -> Outcome<Vec<Pose>> {
         readings: 4000,
     };
     let felt = run(&mut wrist, &programme)?;
-    let pose = |p: &hw_traits::programme::FeltPose| Pose {
+    let pose = |p: &hw_traits::programme::FeltPose| SettledPose {
         tilt_rad: p.angle_rad,
         wrench: PlanarWrench::from(&world_from_body(&p.wrench, p.angle_rad)),
     };
@@ -118,9 +120,9 @@ struct Felt {
 fn volume(
     container: &dyn Container,
     grasp: Grasp,
-    poses: &[Pose],
+    poses: &[SettledPose],
     liquid: Liquid,
-    ties: Ties,
+    correlation: ErrorCorrelation,
 ) -> Outcome<[f64; 3]> {
     let fit = VolumeFit {
         container,
@@ -128,46 +130,49 @@ fn volume(
         departures: Departures::default(),
         liquid,
         sigma_nm: None,
-        ties,
+        error_correlation: correlation,
         widest_share: 0.5,
     };
     let estimate = fit.estimate(poses)?;
     Ok([estimate.volume_m3, estimate.interval_m3[0], estimate.interval_m3[1]])
 }
 
-fn mass(poses: &[Pose], empty: Option<&[Pose]>) -> Outcome<liquid_haptics::volume::MassEstimate> {
+fn mass(
+    poses: &[SettledPose],
+    empty: Option<&[SettledPose]>,
+) -> Outcome<liquid_haptics::volume::MassEstimate> {
     let gain = empty.map_or(ForceGain::Known(0.0), ForceGain::FromEmpty);
     Ok(fit_mass(&GRASP, poses, &MassFit { gain, offsets: false, sigma_n: None })?)
 }
 
 /// What ten turns of the empty bottle tell of the sensor, once for all.
 struct Calibration {
-    empty: Vec<Pose>,
+    empty: Vec<SettledPose>,
     /// Variance of the mass from turn to turn, kg^2: turns differ by more than the scatter of one turn's poses shows.
     mass_variance: f64,
     /// How the torque's errors go on from pose to pose.
-    ties: Ties,
+    correlation: ErrorCorrelation,
 }
 
 fn calibrate() -> Outcome<Calibration> {
     let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
-    let turns: Outcome<Vec<Vec<Pose>>> =
+    let turns: Outcome<Vec<Vec<SettledPose>>> =
         (0..10_u64).into_par_iter().map(|k| sweep(bottle_load(0.0, WATER, 1e-6), 900 + k)).collect();
     let turns = turns?;
     let zeros = turns.iter().map(|poses| Ok(mass(poses, None)?.mass_kg)).collect::<Outcome<Vec<f64>>>()?;
     let middle = zeros.iter().sum::<f64>() / zeros.len() as f64;
     let mass_variance = zeros.iter().map(|z| (z - middle).powi(2)).sum::<f64>() / (zeros.len() - 1) as f64;
-    let error = |pose: &Pose| {
+    let error = |pose: &SettledPose| {
         let stated = GRASP.wrench(&inner, pose.tilt_rad, 0.0, 0.0, &Departures::default())?;
         Ok(pose.wrench.tau_z_nm - stated.tau_z_nm)
     };
     let errors: Outcome<Vec<Vec<f64>>> = turns.iter().map(|turn| turn.iter().map(error).collect()).collect();
-    let (ties, _) = Ties::of_sweeps(&errors?)?;
-    Ok(Calibration { empty: turns.concat(), mass_variance, ties })
+    let (correlation, _) = ErrorCorrelation::of_sweeps(&errors?)?;
+    Ok(Calibration { empty: turns.concat(), mass_variance, correlation })
 }
 
 fn sweeps_of_the_bottle(calibration: &Calibration, levels: u32, sweeps: u32) -> Outcome<()> {
-    let Calibration { empty, mass_variance, ties } = calibration;
+    let Calibration { empty, mass_variance, correlation } = calibration;
     let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
     let outer = Cylinder::new(RADIUS_M, LENGTH_M, 0.0)?;
     let felt: Outcome<Vec<Felt>> = (0..levels * sweeps)
@@ -181,12 +186,12 @@ fn sweeps_of_the_bottle(calibration: &Calibration, levels: u32, sweeps: u32) -> 
                 mass_kg: found.mass_kg.max(0.0),
                 error_kg: (found.error_kg.powi(2) + mass_variance).sqrt(),
             };
-            let [volume_m3, low, high] = volume(&inner, GRASP, &poses, liquid, *ties)?;
+            let [volume_m3, low, high] = volume(&inner, GRASP, &poses, liquid, *correlation)?;
             Ok(Felt {
                 raw_mass: raw.mass_kg - WATER * truth,
                 mass: found.mass_kg - WATER * truth,
                 volume: volume_m3 - truth,
-                outer: volume(&outer, GRASP, &poses, liquid, *ties)?[0] - truth,
+                outer: volume(&outer, GRASP, &poses, liquid, *correlation)?[0] - truth,
                 inside: low <= truth && truth <= high,
             })
         })
@@ -205,7 +210,7 @@ fn sweeps_of_the_bottle(calibration: &Calibration, levels: u32, sweeps: u32) -> 
 }
 
 /// A half-gallon carton as a mesh: a box with a gable.
-fn carton(sweeps: u32, ties: Ties) -> Outcome<()> {
+fn carton(sweeps: u32, correlation: ErrorCorrelation) -> Outcome<()> {
     let (width, walls, gable) = (0.095, 0.19, 0.04);
     let half = 0.5 * width;
     let corner = |k: usize| [(-half, -half), (half, -half), (half, half), (-half, half)][k];
@@ -253,7 +258,7 @@ fn carton(sweeps: u32, ties: Ties) -> Outcome<()> {
             let poses = sweep(load, 100 + u64::from(k))?;
             let fit = MassFit { gain: ForceGain::Known(0.0), offsets: false, sigma_n: None };
             let found = fit_mass(&grasp, &poses, &fit)?;
-            Ok(volume(&mesh, grasp, &poses, Liquid::from(&found), ties)?[0] - truth)
+            Ok(volume(&mesh, grasp, &poses, Liquid::from(&found), correlation)?[0] - truth)
         })
         .collect();
     line("volume, milk carton as a mesh", &shown(&errors?, 1e6, "mL"), "1.69 +- 24.69 mL");
@@ -350,7 +355,7 @@ fn which_liquid(each: u64) -> Outcome<()> {
 }
 
 /// 100 mL from what was felt to be inside: the bottle has a lip, water a bead, and neither is quite as stated.
-fn pours(each: u64, ties: Ties) -> Outcome<()> {
+fn pours(each: u64, correlation: ErrorCorrelation) -> Outcome<()> {
     let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
     let (lip, rim, bead) = (0.027, LENGTH_M - WALL_M, 0.0048);
     let tries: Vec<(f64, u64)> =
@@ -361,7 +366,8 @@ fn pours(each: u64, ties: Ties) -> Outcome<()> {
             let seed = 8000 + i + (1e7 * truth) as u64;
             let load = Load { force_gain: 0.0, ..bottle_load(WATER * truth, WATER, 1e-6) };
             let poses = sweep(load, seed)?;
-            let [inside, ..] = volume(&inner, GRASP, &poses, Liquid::from(&mass(&poses, None)?), ties)?;
+            let [inside, ..] =
+                volume(&inner, GRASP, &poses, Liquid::from(&mass(&poses, None)?), correlation)?;
             let mouth = Mouth::new(lip, rim)?;
             let pour = Pour::new(&inner, mouth, Bead::measured(bead, bead)?, PI)?;
             let tilt = pour.tilt_rad(inside, 100e-6)?;
@@ -381,7 +387,7 @@ fn pours(each: u64, ties: Ties) -> Outcome<()> {
     Ok(())
 }
 
-/// Recordings as the thesis first had them, before the tool.
+/// Recordings as [Matl 2021] first had them, before the tool.
 fn mishaps() -> Outcome<()> {
     for (name, gain, stated) in
         [("outer size taken for inner", 0.0, WALL_M), ("forces 2 % too large", 0.02, 0.0)]

@@ -74,7 +74,7 @@ fn main() -> Result<(), Failure> {
         "figure 4.5: {train} simulations, {tests} tests; mean error of the marginals' peaks, and the mean log density at the truth (nats; what"
     );
     println!(
-        "is missing to the exact posterior's is the mean Kullback-Leibler divergence). The thesis's numbers are in a picture; its text says:"
+        "is missing to the exact posterior's is the mean Kullback-Leibler divergence). The numbers of [Matl 2021] are in a picture; its text says:"
     );
     println!("times tell more of e, positions more of kappa, both together most.\n");
     println!(
@@ -86,7 +86,7 @@ fn main() -> Result<(), Failure> {
     for (name, observed, scale) in [
         ("times", Observed::Time, Scale::Metres),
         ("positions", Observed::Position, Scale::Metres),
-        ("both (the thesis's X)", Observed::Both, Scale::Metres),
+        ("both (X of [Matl 2021])", Observed::Both, Scale::Metres),
         ("positions, logarithms", Observed::Position, Scale::Logarithms),
         ("both, logarithms", Observed::Both, Scale::Logarithms),
     ] {

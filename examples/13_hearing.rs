@@ -1,4 +1,4 @@
-//! Where impacts are heard: 200 places on a table in a room that echoes, offline and streamed, beside the thesis's 6.7 and 7.9 mm.
+//! Where impacts are heard: 200 places on a table in a room that echoes, offline and streamed, beside the 6.7 and 7.9 mm of [Matl 2021].
 //!
 //! ```text
 //! cargo run --release -p examples --example 13_hearing -- --small              20 places
@@ -22,7 +22,7 @@ const OUTLIER_M: f64 = 0.03;
 /// Silence before each impact, s.
 const LEAD_S: f64 = 0.12;
 
-/// The thesis's microphones, m.
+/// The microphones of [Matl 2021], m.
 const MICROPHONES: [[f64; 3]; 3] = [[0.0, 0.0, 0.0762], [0.55, 0.0, 0.0762], [0.275, 0.55, 0.0762]];
 /// The table's origin in a room of 4 x 5 x 2.7 m: amidst it, and 30 cm from two walls, m.
 const MIDDLE: [f64; 3] = [1.7, 2.2, 0.75];
@@ -48,16 +48,7 @@ fn main() -> Result<(), Failure> {
     );
     println!(
         "{:10} {:38} {:>7} {:>7} {:>7} {:>7} {:>9} {:>7} {:>9} {:>11}",
-        "RT60, s",
-        "heard",
-        "median",
-        "mean",
-        "95 %",
-        "worst",
-        "over 30mm",
-        "missed",
-        "invented",
-        "thesis mean"
+        "RT60, s", "heard", "median", "mean", "95 %", "worst", "over 30mm", "missed", "invented", "Matl 2021"
     );
     let all =
         [("none", 0.0, MIDDLE), ("0.3", 0.3, MIDDLE), ("0.5", 0.5, MIDDLE), ("0.5 corner", 0.5, CORNER)];
@@ -65,7 +56,7 @@ fn main() -> Result<(), Failure> {
     let mut drawn = Vec::new();
     for &(room, rt60_s, table_m) in rooms {
         let taps = taps(rt60_s, table_m, count)?;
-        for (k, (name, thesis)) in LISTENERS.iter().enumerate() {
+        for (k, (name, published)) in LISTENERS.iter().enumerate() {
             let mut off: Vec<f64> = taps.iter().filter_map(|t| Some(error_m(t.place, t.heard[k]?))).collect();
             off.sort_by(f64::total_cmp);
             let missed = taps.len() - off.len();
@@ -76,7 +67,7 @@ fn main() -> Result<(), Failure> {
             let quantile =
                 |q: f64| off.get(((n - 1) as f64 * q).round() as usize).map_or(f64::NAN, |e| 1e3 * e);
             println!(
-                "{room:<10} {name:38} {:>7.2} {:>7.2} {:>7.2} {:>7.1} {outliers:>9} {missed:>7} {invented:>9} {thesis:>11}",
+                "{room:<10} {name:38} {:>7.2} {:>7.2} {:>7.2} {:>7.1} {outliers:>9} {missed:>7} {invented:>9} {published:>11}",
                 quantile(0.5),
                 1e3 * mean,
                 quantile(0.95),
@@ -86,7 +77,7 @@ fn main() -> Result<(), Failure> {
         drawn.push((room, taps));
     }
     println!(
-        "\nThe mean leaves the outliers out, as the thesis's figure does. Its room was a real one; ours are image sources."
+        "\nThe mean leaves the outliers out, as the figure of [Matl 2021] does. Its room was a real one; ours are image sources."
     );
     if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
         std::fs::write(&file, picture(&drawn)?)?;

@@ -114,9 +114,9 @@ fn main() -> Result<(), Failure> {
     let harsh = std::env::args().any(|a| a == "--harsh");
     let place = if harsh { &CORNER } else { &LIVING_ROOM };
     let listeners: &[(&str, Delays)] = if small || harsh {
-        &[("peak times, as in the thesis", Delays::Peaks)]
+        &[("peak times, as in [Matl 2021]", Delays::Peaks)]
     } else {
-        &[("peak times, as in the thesis", Delays::Peaks), ("phase correlation", Delays::Phase)]
+        &[("peak times, as in [Matl 2021]", Delays::Peaks), ("phase correlation", Delays::Phase)]
     };
     let mut bars = Vec::new();
     for &listener in listeners {
@@ -195,7 +195,7 @@ fn compare(
             100.0 * more(&|b| b.energy) / mean(0, &|b| b.energy)
         );
     }
-    println!("thesis, 2 over 1: touched +24 points, missed by outliers -29 points, energy -46 %");
+    println!("[Matl 2021], 2 over 1: touched +24 points, missed by outliers -29 points, energy -46 %");
     Ok(bars)
 }
 

@@ -28,8 +28,8 @@ const HEARING: Hearing = Hearing { time_sigma_s: 20e-6, position_sigma_m: 0.7e-3
 struct Real {
     name: &'static str,
     ball: FakeBall,
-    /// The thesis's successes of 100, real and simulated.
-    thesis: &'static str,
+    /// Successes of 100 in [Matl 2021], on its robot.
+    published: &'static str,
 }
 
 /// How much of it is done.
@@ -57,23 +57,23 @@ fn main() -> Result<(), Failure> {
     // Asperities are in none of the models; nor is drag, or restitution that falls with speed, which the first ball is spared.
     let plain = FakeBall { slope_s_m: 0.0, drag_per_m: 0.0, ..FakeBall::new(0.87, 6e3) };
     let reals = [
-        Real { name: "without drag", ball: plain, thesis: "-" },
+        Real { name: "without drag", ball: plain, published: "-" },
         Real {
             name: "ping-pong",
             ball: FakeBall { drag_per_m: 0.1, ..FakeBall::new(0.88, 6e3) },
-            thesis: "75",
+            published: "75",
         },
         Real {
             name: "moon",
             ball: FakeBall { drag_per_m: 0.02, ..FakeBall::new(0.85, 200.0) },
-            thesis: "35",
+            published: "35",
         },
     ];
     let simulator = DropSimulator { hearing: HEARING, scale: Scale::Logarithms, ..DropSimulator::new() };
     let density = learn(&simulator, &size)?;
     println!(
         "{:12} {:>20} {:>20} {:>16} {:>24} {:>22} {:>12}",
-        "ball", "e", "log10 kappa", "drop at x, m", "foretold, of 100", "fell in, of 1000", "thesis real"
+        "ball", "e", "log10 kappa", "drop at x, m", "foretold, of 100", "fell in, of 1000", "Matl 2021"
     );
     let releases = releases(&size);
     let mut maps = Vec::new();
@@ -94,12 +94,12 @@ fn main() -> Result<(), Failure> {
             releases[best].position_m[0],
             format!("{foretold:.1} +- {spread:.1}"),
             format!("{fell} ({:.1} %)", 0.1 * fell as f64),
-            real.thesis
+            real.published
         );
         maps.push(Mapped { name: real.name, shares, best });
     }
     println!(
-        "\nThe thesis dropped where its gripper was; here the ball is dropped where the map is highest, so the shares are not the same numbers."
+        "\n[Matl 2021] dropped where its gripper was; here the ball is dropped where the map is highest, so the shares are not the same numbers."
     );
     if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
         let scene = Scene::thesis(Ball::new(0.8, 1e3)?, 0.02)?;
@@ -163,7 +163,7 @@ fn infer(
     Ok(projected_product(&posteriors)?)
 }
 
-/// Successes of 100 for balls drawn from the posterior: mean and standard deviation, as in the thesis.
+/// Successes of 100 for balls drawn from the posterior: mean and standard deviation, as in [Matl 2021].
 fn foretell(
     posterior: &Posterior,
     radius_m: f64,

@@ -9,7 +9,7 @@ pub enum Family {
     Rbf,
     /// Matern with nu = 3/2, `(1 + sqrt(3) r) exp(-sqrt(3) r)`.
     Matern32,
-    /// Matern with nu = 5/2, `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`: chapter 3's.
+    /// Matern with nu = 5/2, `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`: that of [Matl 2021], chapter 3.
     Matern52,
 }
 

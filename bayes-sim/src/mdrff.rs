@@ -17,7 +17,7 @@ use crate::training::{TrainingReport, TrainingSettings};
 /// Settings of [`Mdrff::train`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MdrffSettings {
-    /// How fast the kernel falls; chapter 3 uses Matern 5/2.
+    /// How fast the kernel falls; [Matl 2021], chapter 3, uses Matern 5/2.
     pub family: Family,
     /// How dimensions are put together.
     pub form: Form,

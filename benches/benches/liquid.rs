@@ -14,7 +14,7 @@ use liquid_haptics::fake::{Cavity, Round};
 use liquid_haptics::pour::{Bead, Mouth, Pour};
 use liquid_haptics::slosh::UprightCylinder;
 use liquid_haptics::viscosity::{Bottle, Drain, Verdict, ViscosityFit};
-use liquid_haptics::volume::{Liquid, Pose, Ties, VolumeFit};
+use liquid_haptics::volume::{ErrorCorrelation, Liquid, SettledPose, VolumeFit};
 use liquid_haptics::wrench::{Departures, Grasp};
 use nalgebra::Point3;
 
@@ -121,7 +121,7 @@ fn volume(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
         let tilt_rad = f64::from(10 * k).to_radians();
         let mut wrench = grasp.wrench(&bottle, tilt_rad, 0.3, truth, &none)?;
         wrench.tau_z_nm += 2e-4 * f64::from((k * 7) % 5 - 2);
-        poses.push(Pose { tilt_rad, wrench });
+        poses.push(SettledPose { tilt_rad, wrench });
     }
     let liquid = Liquid::Mass { mass_kg: 0.3, error_kg: 2e-4 };
     let fit = VolumeFit {
@@ -130,7 +130,7 @@ fn volume(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
         departures: none,
         liquid,
         sigma_nm: None,
-        ties: Ties::NONE,
+        error_correlation: ErrorCorrelation::NONE,
         widest_share: 0.5,
     };
     let estimate = fit.estimate(&poses)?;

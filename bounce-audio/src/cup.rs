@@ -1,4 +1,4 @@
-//! A ball that is dropped on a tilted table and is to bounce into a cup: how often it does (section 4.4, figure 4.6).
+//! A ball that is dropped on a tilted table and is to bounce into a cup: how often it does ([Matl 2021], section 4.4, figure 4.6).
 //!
 //! The ball is in the cup when its centre comes down through the rim's circle, the ball's radius within it. What it does on the rim or
 //! against the cup's side is left out: a ball that touches either has missed.
@@ -47,8 +47,8 @@ impl Scene {
             "more than the ball's",
             opening > ball_radius_m && opening.is_finite(),
         )?;
-        let places = [cup.centre_m[0], cup.centre_m[1], cup.rim_z_m];
-        for v in places {
+        let coordinates = [cup.centre_m[0], cup.centre_m[1], cup.rim_z_m];
+        for v in coordinates {
             value("the cup's place", v, "a finite number", v.is_finite())?;
         }
         let n = *model.table().normal();
@@ -58,7 +58,7 @@ impl Scene {
         Ok(Self { model, half_m, cup, ball_radius_m, downhill, across: [-side, ahead, 0.0] })
     }
 
-    /// The thesis's: a table of 0.55 m that falls by 10.72 degrees towards x, a cup 8.6 inches from its lower edge, which is on the
+    /// That of [Matl 2021], section 4.4: a table of 0.55 m that falls by 10.72 degrees towards x, a cup 8.6 inches from its lower edge, which is on the
     /// floor. The cup's own size is not given there: 12 cm high, 9 cm wide.
     ///
     /// # Errors
@@ -127,7 +127,7 @@ impl Scene {
         each(count, seed, |_, rng| usize::from(self.falls_in(&release.draw(rng), rng))).into_iter().sum()
     }
 
-    /// The share of `count` balls that falls in, for each of many releases: the map of figure 4.6.
+    /// The share of `count` balls that falls in, for each of many releases: the map of [Matl 2021], figure 4.6.
     pub fn map(&self, releases: &[Release], count: usize, seed: u64) -> Vec<f64> {
         let one = |i: usize, rng: &mut _| {
             releases.get(i / count.max(1)).is_some_and(|release| self.falls_in(&release.draw(rng), rng))

@@ -1,4 +1,4 @@
-//! The exact likelihood of a drop's features under the thesis's model, and the posterior that follows: what a learned one is measured by.
+//! The exact likelihood of a drop's features under the model of [Matl 2021], chapter 4, and the posterior that follows: what a learned one is measured by.
 //!
 //! A ball falls from rest but for a Gaussian velocity of sigma in each component, from a height h on a level table; restitution takes
 //! its part of the whole velocity, directions scatter. With `q` the length of the velocity that it was let go with, the speed at the first

@@ -1,4 +1,4 @@
-//! The features of a drop that its posterior is made from: `X = [t2/t1, d1, d2, alpha]` of the first three impacts (appendix B.1).
+//! The features of a drop that its posterior is made from: `X = [t2/t1, d1, d2, alpha]` of the first three impacts ([Matl 2021], appendix B.1).
 
 use crate::drop::Bounce;
 use thiserror::Error;
@@ -45,7 +45,7 @@ pub struct Features {
     pub alpha_rad: f64,
 }
 
-/// Which of the features are looked at (figure 4.5).
+/// Which of the features are looked at ([Matl 2021], figure 4.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Observed {
     /// `t2/t1` alone.
@@ -59,7 +59,7 @@ pub enum Observed {
 /// How distances are put to a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
-    /// In metres, as in the thesis.
+    /// In metres, as in [Matl 2021].
     Metres,
     /// As natural logarithms (of 10 um at least), with alpha's magnitude as one too: concentrations over four decades move
     /// distances over two, and in metres the small ones are all alike.

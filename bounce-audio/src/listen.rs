@@ -9,7 +9,7 @@ use crate::onset::{OnsetStream, Started};
 pub enum Delays {
     /// Phase correlation, as offline.
     Phase,
-    /// Peak times, as the thesis does in real time: when each channel is loudest. Echoes that add up make outliers of several
+    /// Peak times, as [Matl 2021] does in real time: when each channel is loudest. Echoes that add up make outliers of several
     /// centimetres.
     Peaks,
 }

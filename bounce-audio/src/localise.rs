@@ -10,105 +10,26 @@
 
 mod array;
 mod correlate;
+mod error;
+mod location;
 mod peak;
 mod rival;
 mod space;
 mod survey;
 
 pub use array::{Array, ArrayError};
+pub use error::LocaliseError;
+pub use location::Location;
 pub use rival::speed_of_sound_m_s;
 pub use space::{SpaceLocation, locate_in_space};
 pub use survey::{Survey, SurveyError, SurveyPrior, Tap, survey};
 
 use correlate::Correlator;
-use thiserror::Error;
 
 /// The band that is listened to, Hz, cut at 0.49 of the sample rate.
 pub const BAND_HZ: (f64, f64) = (1_000.0, 15_000.0);
 /// How far beyond the distance of two microphones a lag may lie (their positions and the speed of sound may be off).
 const LAG_MARGIN: f64 = 1.1;
-
-/// Why an impact cannot be localised.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum LocaliseError {
-    /// The microphones do not determine a place.
-    #[error(transparent)]
-    Array(#[from] ArrayError),
-    /// The sample rate is not one that holds the band.
-    #[error("sample rate {got} Hz, expected more than {expected} Hz")]
-    Rate {
-        /// Least rate, Hz.
-        expected: f64,
-        /// Rate stated, Hz.
-        got: f64,
-    },
-    /// The band is empty or holds too few frequencies of the buffer.
-    #[error("a band of {bins} frequencies, expected at least {expected}")]
-    Band {
-        /// Least number of frequencies.
-        expected: usize,
-        /// Number in the band.
-        bins: usize,
-    },
-    /// The buffer is too short for the sound to reach all microphones, or absurdly long.
-    #[error("a buffer of {got} samples, expected {least} to {most}")]
-    Buffer {
-        /// Least length, samples.
-        least: usize,
-        /// Greatest length, samples.
-        most: usize,
-        /// Length asked for, samples.
-        got: usize,
-    },
-    /// Not one channel a microphone.
-    #[error("{got} channels, expected {expected}")]
-    Channels {
-        /// Number of microphones.
-        expected: usize,
-        /// Number of channels.
-        got: usize,
-    },
-    /// A channel is not as long as the buffer.
-    #[error("channel {channel} has {got} samples, expected {expected}")]
-    Length {
-        /// Channel, from 0.
-        channel: usize,
-        /// The buffer's length, samples.
-        expected: usize,
-        /// The channel's length, samples.
-        got: usize,
-    },
-    /// A channel holds no sound, or a sample that is no number.
-    #[error("channel {channel} has energy {got} in the band, expected a finite value above 0")]
-    Energy {
-        /// Channel, from 0.
-        channel: usize,
-        /// Energy found.
-        got: f64,
-    },
-}
-
-/// A place on the table, from one impact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Location {
-    /// Place, m.
-    pub x_m: f64,
-    /// Place, m.
-    pub y_m: f64,
-    /// Covariance of (x, y), m^2, from the scatter of the phases in the band.
-    pub covariance_m2: [[f64; 2]; 2],
-    /// Standard deviation of one microphone's arrival, s.
-    pub arrival_sigma_s: f64,
-    /// What is left of the arrivals after the place was fitted, root of the sum of squares over the degrees of freedom
-    /// (microphones less 3), s; `None` with three microphones, which leave nothing.
-    pub residual_s: Option<f64>,
-    /// How far the time differences are from adding up around triangles, root mean square over the pairs, s.
-    pub closure_s: f64,
-    /// How well the phases of the channels agree with delays of one sound, in the pair that agrees least: 1 for one source without noise
-    /// or echoes, near 0.3 for sounds that have nothing to do with each other.
-    pub coherence: f64,
-}
 
 /// Localises impacts from buffers of one length: planned once, then run without allocation.
 pub struct Localiser {

@@ -10,14 +10,14 @@ use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// Bounds of (e, log10 kappa) in chapter 4.
+/// Bounds of (e, log10 kappa) in [Matl 2021], chapter 4.
 pub const BOUNDS: [[f64; 2]; 2] = [[0.55, 0.95], [1.0, 5.0]];
-/// The height of the thesis's drops, m.
+/// The height of the drops in [Matl 2021], m.
 pub const DROP_HEIGHT_M: f64 = 0.26;
 /// Points at which a marginal is looked at for its peak.
 const LATTICE: usize = 801;
 
-/// The flat prior of chapter 4 over (e, log10 kappa).
+/// The flat prior of [Matl 2021], chapter 4, over (e, log10 kappa).
 ///
 /// # Errors
 /// None in practice: the bounds are valid.
@@ -62,7 +62,7 @@ pub struct DropSimulator {
 }
 
 impl DropSimulator {
-    /// The thesis's: from 0.26 m, measured without noise, all features.
+    /// That of [Matl 2021]: from 0.26 m, measured without noise, all features.
     pub fn new() -> Self {
         Self {
             release: Release::at(DROP_HEIGHT_M),
@@ -114,7 +114,7 @@ impl Simulator for DropSimulator {
     }
 }
 
-/// The peak of one parameter's marginal within the prior (what the thesis compares with the truth), to 1/800 of the prior's width.
+/// The peak of one parameter's marginal within the prior (what [Matl 2021] compares with the truth), to 1/800 of the prior's width.
 ///
 /// # Errors
 /// [`Error::Length`] for a parameter that is not there.
@@ -132,7 +132,7 @@ pub fn marginal_peak(posterior: &Posterior, parameter: usize) -> Result<f64, Err
     Ok(best.1)
 }
 
-/// The joint posterior as the thesis makes it: each mixture taken for one Gaussian, their product, nothing divided out (a flat prior).
+/// The joint posterior as [Matl 2021] makes it: each mixture taken for one Gaussian, their product, nothing divided out (a flat prior).
 ///
 /// # Errors
 /// [`Error`] for none, or for posteriors over different priors.

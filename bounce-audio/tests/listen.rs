@@ -97,7 +97,7 @@ fn buffers_of_any_length_give_the_same() {
     }
 }
 
-/// Peak times, as in the thesis: they work where nothing echoes.
+/// Peak times, as in [Matl 2021]: they work where nothing echoes.
 #[test]
 fn peak_times_are_right_without_echoes() {
     let (room, sound) = struck(0.0, &IMPACTS, 1e-3);

@@ -1,4 +1,8 @@
 //! A root between two ends of opposite signs.
+//!
+//! argmin's `BrentRoot` finds the same roots to rounding. What it costs around each evaluation shows where the function takes some
+//! 50 ns: a tilt to pour at takes 4.4 us with it and 3.1 us with this, the plan of a drain 0.54 and 0.43 ms. It also evaluates both
+//! ends again, which of a mesh are plans, and loses the type of the function's error.
 
 /// Most evaluations: bisection alone halves any interval of doubles down to rounding in fewer.
 const MOST: usize = 200;

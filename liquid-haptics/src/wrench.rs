@@ -1,7 +1,7 @@
 //! What a wrist feels of a tilted container: forces and torque in the world's frame.
 //!
 //! World: origin at the grasp, y up, `theta` the clockwise tilt from upright. Forces are those of the load on the sensor, so
-//! weight gives `f_y < 0`, and `tau_z = x_com f_y` (thesis eq. 2.1, sign corrected).
+//! weight gives `f_y < 0`, and `tau_z = x_com f_y` ([Matl 2021], eq. 2.1, sign corrected).
 
 use hw_traits::force_torque::Wrench;
 

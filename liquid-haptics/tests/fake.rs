@@ -17,7 +17,9 @@ use hw_traits::rotary::Rotary;
 use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::fake::{AXIA80, FakeWrist, Load, Round};
 use liquid_haptics::viscosity::{Bottle, Regime, Verdict, ViscosityFit};
-use liquid_haptics::volume::{ForceGain, Liquid, MassFit, Pose, Ties, VolumeFit, fit_mass};
+use liquid_haptics::volume::{
+    ErrorCorrelation, ForceGain, Liquid, MassFit, SettledPose, VolumeFit, fit_mass,
+};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench, world_from_body};
 
 const GRASP: Grasp = Grasp {
@@ -55,8 +57,8 @@ fn programme(readings: usize) -> TiltProgramme {
     }
 }
 
-fn poses(felt: &[FeltPose]) -> Vec<Pose> {
-    let pose = |p: &FeltPose| Pose {
+fn poses(felt: &[FeltPose]) -> Vec<SettledPose> {
+    let pose = |p: &FeltPose| SettledPose {
         tilt_rad: p.angle_rad,
         wrench: PlanarWrench::from(&world_from_body(&p.wrench, p.angle_rad)),
     };
@@ -80,7 +82,7 @@ fn a_sweep_gives_mass_and_volume_back() {
             departures: Departures::default(),
             liquid: Liquid::from(&felt),
             sigma_nm: None,
-            ties: Ties::NONE,
+            error_correlation: ErrorCorrelation::NONE,
             widest_share: 0.5,
         };
         let estimate = fit.estimate(&poses).unwrap();

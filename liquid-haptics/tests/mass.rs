@@ -9,7 +9,7 @@ mod common;
 #[path = "common/poses.rs"]
 mod poses;
 
-use liquid_haptics::volume::{ForceGain, MassFit, Pose, VolumeError, fit_mass};
+use liquid_haptics::volume::{ForceGain, MassFit, SettledPose, VolumeError, fit_mass};
 use liquid_haptics::wrench::Grasp;
 use poses::{GRASP, SIGMA_N, noisy, sweep, tilts};
 use rand::SeedableRng;
@@ -23,9 +23,9 @@ fn masses_are_within_their_errors() {
     let clean = sweep(&tilts(), mass, 0.5);
     let nothing = sweep(&tilts(), 0.0, 0.0);
     let offset = [0.5, -0.3];
-    let change = |poses: &[Pose], gain: f64, offset: [f64; 2]| -> Vec<Pose> {
+    let change = |poses: &[SettledPose], gain: f64, offset: [f64; 2]| -> Vec<SettledPose> {
         let mut out = poses.to_vec();
-        for Pose { tilt_rad, wrench } in &mut out {
+        for SettledPose { tilt_rad, wrench } in &mut out {
             let (sin, cos) = tilt_rad.sin_cos();
             wrench.fy_n = wrench.fy_n * (1.0 + gain) - sin * offset[0] + cos * offset[1];
             wrench.fx_n += cos * offset[0] + sin * offset[1];

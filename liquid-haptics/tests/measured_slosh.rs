@@ -1,4 +1,4 @@
-//! The decay of a wave of water after a robot's stop, as a wrist measured it: which physics is in it, by plain least squares.
+//! The decay of a wave of water after a robot's stop, as a wrist measured it: which physics is in it, by ordinary least squares.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,

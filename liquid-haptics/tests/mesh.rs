@@ -1,4 +1,5 @@
 //! Meshes against closed forms, against clipping triangle by triangle, and what is no mesh.
+#![cfg(feature = "mesh")]
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

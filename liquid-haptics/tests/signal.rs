@@ -1,4 +1,4 @@
-//! The pre-processing: streaming against batch, filters against a plain reference and known signals, clocks.
+//! The pre-processing: streaming against batch, filters against a direct reference and known signals, clocks.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
 use std::f64::consts::{PI, TAU};

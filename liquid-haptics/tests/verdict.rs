@@ -9,14 +9,14 @@ use std::f64::consts::PI;
 
 use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::volume::{
-    Candidate, Cause, ForceGain, Liquid, MassFit, Pose, Verdict, VolumeError, VolumeFit, fit_mass,
+    Candidate, Cause, ForceGain, Liquid, MassFit, SettledPose, Verdict, VolumeError, VolumeFit, fit_mass,
 };
 use liquid_haptics::wrench::{Departures, Grasp};
 use poses::{CAVITY, GRASP, NONE, SIGMA_NM, bottle, exact, fit, holds, noisy, sweep, sweep_at, tilts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The thesis's trap: no liquid weighs nothing wherever it lies, so that every volume explains the torque; it is empty.
+/// The trap of [Matl 2021]: no liquid weighs nothing wherever it lies, so that every volume explains the torque; it is empty.
 #[test]
 fn nothing_inside_is_empty() {
     let bottle = bottle();
@@ -146,9 +146,9 @@ fn a_grasp_in_the_middle_has_a_twin_that_the_mass_tells() {
     // No tilt tells them apart, and it is said.
     assert!(middle.next_tilt(&poses, &estimate, 36).unwrap().separation.unwrap() < 0.1);
     let both = |mass_kg| Liquid::MassAndDensity { mass_kg, error_kg: 0.002, density_kg_m3: 1000.0 };
-    let told = VolumeFit { liquid: both(1000.0 * truth), ..middle }.estimate(&poses).unwrap();
-    assert_eq!(told.verdict, Verdict::Determined);
-    approx::assert_relative_eq!(told.volume_m3, truth, max_relative = 1e-3);
+    let determined = VolumeFit { liquid: both(1000.0 * truth), ..middle }.estimate(&poses).unwrap();
+    assert_eq!(determined.verdict, Verdict::Determined);
+    approx::assert_relative_eq!(determined.volume_m3, truth, max_relative = 1e-3);
     // A mass that neither volume has contradicts the torques.
     let neither = VolumeFit { liquid: both(1200.0 * truth), ..middle }.estimate(&poses).unwrap();
     assert_eq!(neither.verdict, Verdict::Misfit);
@@ -178,7 +178,7 @@ fn no_volume_that_explains_the_poses_is_left_out() {
         let mut poses = Vec::new();
         for _ in 0..rng.random_range(2..6) {
             let tilt_rad = rng.random_range(0.0..PI);
-            poses.push(Pose { tilt_rad, wrench: torque(tilt_rad, truth) });
+            poses.push(SettledPose { tilt_rad, wrench: torque(tilt_rad, truth) });
         }
         let sigma = 10f64.powf(rng.random_range(-4.5..-3.0));
         let liquid = if density { Liquid::Density(1000.0) } else { exact(1000.0 * truth) };

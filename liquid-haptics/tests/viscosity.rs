@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 const GRAVITY: f64 = 9.80665;
-/// The sensor's rate (Hz, thesis section 2.5), how many of its readings are averaged into one, and the resolution of its torque
+/// The sensor's rate (Hz, [Matl 2021], section 2.5), how many of its readings are averaged into one, and the resolution of its torque
 /// (N m), taken as the noise of a raw reading.
 const RATE: f64 = 7812.0;
 const AVERAGED: usize = 78;
@@ -210,7 +210,7 @@ fn fit(bottle: Bottle, turn_s: f64) -> ViscosityFit {
     ViscosityFit { bottle, mass_error_share: 0.0, head_start_s: 2.0 / PI * turn_s, widest_factor: 4.0 }
 }
 
-fn told(verdict: Verdict) -> ViscosityEstimate {
+fn viscosity_of(verdict: Verdict) -> ViscosityEstimate {
     match verdict {
         Verdict::Viscosity(estimate) => estimate,
         Verdict::Refused(why) => panic!("{why:?}"),
@@ -229,7 +229,7 @@ fn a_slosh_gives_the_viscosity_back() {
             let signal = slosh(&bottle, viscosity, 0.015, 30.0);
             for _ in 0..4 {
                 let (t, y) = sensed(&signal, 30.0, &mut rng);
-                let estimate = told(fit(bottle, 0.0).estimate(&t, &y).unwrap());
+                let estimate = viscosity_of(fit(bottle, 0.0).estimate(&t, &y).unwrap());
                 assert!(matches!(estimate.regime, Regime::Oscillating(_)), "{viscosity} {estimate:?}");
                 let error = estimate.kinematic_m2_s / viscosity - 1.0;
                 let [low, high] = estimate.interval_m2_s;

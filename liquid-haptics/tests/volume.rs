@@ -12,12 +12,11 @@ mod poses;
 
 use std::f64::consts::PI;
 
-use liquid_haptics::container::mesh::{MeshContainer, PlannedMesh};
 use liquid_haptics::volume::{
-    Cause, ForceGain, Liquid, MassFit, Pose, Ties, Verdict, VolumeError, VolumeFit, fit_mass,
+    Cause, ErrorCorrelation, ForceGain, Liquid, MassFit, SettledPose, Verdict, VolumeError, VolumeFit,
+    fit_mass,
 };
 
-use nalgebra::Point3;
 use poses::{CAVITY, GRASP, SIGMA_N, SIGMA_NM, bottle, exact, fit, holds, noisy, sweep, tilts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -82,15 +81,15 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!(errors[errors.len() / 2] < 2e-6, "{}", errors[errors.len() / 2]);
 }
 
-/// A torque that wanders from pose to pose: ties that ten sweeps of the empty bottle show make intervals that hold as often as they
+/// A torque that wanders from pose to pose: the correlation that ten sweeps of the empty bottle show makes intervals that hold as often as they
 /// say, and without them they do not.
 #[test]
 fn intervals_hold_where_the_sensor_wanders() {
     const SWEEPS: usize = 300;
-    let (share, keep) = (0.6f64, 0.5f64);
+    let (share, lag_one) = (0.6f64, 0.5f64);
     let bottle = bottle();
     let mut rng = ChaCha8Rng::seed_from_u64(29);
-    let mut wandering = |poses: &[Pose]| -> Vec<Pose> {
+    let mut wandering = |poses: &[SettledPose]| -> Vec<SettledPose> {
         let mut draw = |variance: f64| -> f64 {
             SIGMA_NM * variance.sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng)
         };
@@ -98,7 +97,7 @@ fn intervals_hold_where_the_sensor_wanders() {
         let mut felt = poses.to_vec();
         for pose in &mut felt {
             pose.wrench.tau_z_nm += wander + draw(1.0 - share);
-            wander = keep * wander + draw(share * (1.0 - keep * keep));
+            wander = lag_one * wander + draw(share * (1.0 - lag_one * lag_one));
         }
         felt
     };
@@ -109,19 +108,19 @@ fn intervals_hold_where_the_sensor_wanders() {
             pairs.map(|(felt, clean)| felt.wrench.tau_z_nm - clean.wrench.tau_z_nm).collect()
         })
         .collect();
-    let (ties, _) = Ties::of_sweeps(&errors).unwrap();
+    let (learned, _) = ErrorCorrelation::of_sweeps(&errors).unwrap();
     let shares = [0.15, 0.3, 0.45, 0.6, 0.75, 0.88];
     let clean: Vec<_> = shares.map(|s| sweep(&tilts(), 1000.0 * s * CAVITY.capacity(), s)).to_vec();
     let mut held = [0; 2];
     for k in 0..SWEEPS {
         let truth = shares[k % 6] * CAVITY.capacity();
         let poses = wandering(&clean[k % 6]);
-        for (held, ties) in held.iter_mut().zip([ties, Ties::NONE]) {
-            let fit = VolumeFit { ties, ..fit(&bottle, exact(1000.0 * truth), None) };
+        for (held, error_correlation) in held.iter_mut().zip([learned, ErrorCorrelation::NONE]) {
+            let fit = VolumeFit { error_correlation, ..fit(&bottle, exact(1000.0 * truth), None) };
             *held += usize::from(holds(&fit.estimate(&poses).unwrap(), truth));
         }
     }
-    println!("{ties:?}: held {} of {SWEEPS}; without, {}", held[0], held[1]);
+    println!("{learned:?}: held {} of {SWEEPS}; without, {}", held[0], held[1]);
     // 93 to 97 %.
     assert!((279..=291).contains(&held[0]), "{}", held[0]);
     assert!(held[1] < 265, "{}", held[1]);
@@ -195,8 +194,12 @@ fn the_next_tilt_is_the_one_that_narrows_most() {
 }
 
 /// A prism of 256 sides is the cylinder to 1e-4: its volume comes out alike.
+#[cfg(feature = "mesh")]
 #[test]
 fn a_mesh_gives_the_volume_too() {
+    use liquid_haptics::container::mesh::{MeshContainer, PlannedMesh};
+    use nalgebra::Point3;
+
     const SIDES: u32 = 256;
     let mut vertices = vec![Point3::new(0.0, 0.0, 0.001), Point3::new(0.0, 0.0, 0.159)];
     for k in 0..SIDES {

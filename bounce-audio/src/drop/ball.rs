@@ -7,7 +7,7 @@ use rand::Rng;
 /// What happens along the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Grip {
-    /// The thesis's: restitution takes its part of the whole velocity (appendix B.3), and a further part `lost`, in [0, 1], of the
+    /// As in [Matl 2021], appendix B.3: restitution takes its part of the whole velocity, and a further part `lost`, in [0, 1], of the
     /// speed along the table goes. Spin neither matters nor changes.
     Whole {
         /// Part of the speed along the table that is lost beyond restitution.
@@ -42,7 +42,7 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// The thesis's ball: constant restitution of the whole velocity and von Mises-Fisher scatter (theta of section 4.3).
+    /// The ball of [Matl 2021], section 4.3: constant restitution of the whole velocity and von Mises-Fisher scatter.
     ///
     /// # Errors
     /// [`DropError::Value`].

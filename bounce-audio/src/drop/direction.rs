@@ -4,7 +4,7 @@ use super::{DropError, Vector, positive_or_zero};
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;
 
-/// Scatter of a direction about its mean, density `kappa / (2 pi (e^kappa - e^-kappa)) e^(kappa mu.x)` a steradian (section 4.3;
+/// Scatter of a direction about its mean, density `kappa / (2 pi (e^kappa - e^-kappa)) e^(kappa mu.x)` a steradian ([Matl 2021], section 4.3;
 /// Fisher 1953, doi:10.1098/rspa.1953.0064), in a form that does not overflow at any concentration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scatter {

@@ -1,4 +1,4 @@
-//! Drops: a ball that falls on a table, level or tilted, and bounces with chance in its directions (section 4.3).
+//! Drops: a ball that falls on a table, level or tilted, and bounces with chance in its directions ([Matl 2021], section 4.3).
 //!
 //! Between impacts the ball flies free of drag, so that every flight is a parabola in closed form. Position is the ball's centre less its
 //! radius along the table's normal: where it touches, and a plane through the origin is the table.
@@ -100,7 +100,7 @@ pub struct Release {
 }
 
 impl Release {
-    /// From rest at a height above the origin, let go with a little chance: 0.02 m/s and 1 rad/s (the thesis gives no numbers).
+    /// From rest at a height above the origin, let go with a little chance: 0.02 m/s and 1 rad/s ([Matl 2021] gives no numbers).
     pub fn at(height_m: f64) -> Self {
         Self {
             position_m: [0.0, 0.0, height_m],

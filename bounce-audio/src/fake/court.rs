@@ -40,7 +40,7 @@ pub struct CourtSettings {
 }
 
 impl Default for CourtSettings {
-    /// The thesis's table of 0.55 m, paddle of 4.5 inches, and an arm with an industrial one's limits.
+    /// The table of 0.55 m and the paddle of 4.5 inches of [Matl 2021], and an arm with an industrial one's limits.
     fn default() -> Self {
         let reach_m = [[0.5, 0.6], [-0.05, 0.6], [0.02, 0.5]];
         Self {
@@ -134,7 +134,7 @@ impl Court {
         }
     }
 
-    /// A living room of 4 x 5 x 2.7 m with the thesis's table and three microphones 3 inches above it.
+    /// A living room of 4 x 5 x 2.7 m with the table of [Matl 2021] and three microphones 3 inches above it.
     ///
     /// # Errors
     /// [`RoomError`] for a reverberation time out of range, s.

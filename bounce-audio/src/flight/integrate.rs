@@ -2,7 +2,8 @@
 
 use num_dual::DualNum;
 
-use super::{Flight, FlightError, State};
+use super::error::FlightError;
+use super::forces::{Flight, State};
 
 /// Error allowed in a step, in metres and metres per second, relative to the state's size.
 const TOLERANCE: f64 = 1e-11;

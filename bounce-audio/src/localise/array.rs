@@ -1,6 +1,6 @@
 //! Microphones around a table, and the place on it that fits times of arrival.
 
-use super::Location;
+use super::location::Location;
 use thiserror::Error;
 
 /// Points of the lattice of first guesses along each edge.

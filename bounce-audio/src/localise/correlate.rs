@@ -1,6 +1,6 @@
 //! Time differences of arrival between channels, by the phase transform.
 
-use super::LocaliseError;
+use super::error::LocaliseError;
 use super::peak::{OVERSAMPLING, Peak, candidates};
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
@@ -155,12 +155,12 @@ impl Correlator {
                     }
                 }
                 if let Some(best) = best {
-                    // Zero padding and the window tie neighbouring frequencies together.
-                    let tied = self.packed.len() as f64 / self.window_power;
+                    // Zero padding and the window correlate neighbouring frequencies.
+                    let correlated = self.packed.len() as f64 / self.window_power;
                     let most = cross.iter().map(|g| g.norm_sqr().sqrt()).sum::<f64>() + f64::MIN_POSITIVE;
                     self.pairs[p].coherence = best.height / most;
                     self.pairs[p].lag_s = best.lag_s;
-                    self.pairs[p].variance_s2 = tied * best.scatter / (best.curvature * best.curvature);
+                    self.pairs[p].variance_s2 = correlated * best.scatter / (best.curvature * best.curvature);
                 }
             }
         }

@@ -3,7 +3,7 @@
 use super::{FIRST_S, Flight, Goal, Seen, Tracker, Workspace};
 use rand::Rng;
 
-/// The baseline of appendix B.3 (equations B.11 to B.16), without chance.
+/// The baseline of [Matl 2021], appendix B.3 (equations B.11 to B.16), without chance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deterministic {
     restitution: f64,

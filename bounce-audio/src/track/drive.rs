@@ -44,7 +44,7 @@ pub struct Played {
     pub refused: usize,
     /// The longest that a decision took: the buffer with its impact in, to the goal, on the computer's clock, s.
     pub slowest_s: f64,
-    /// Kinetic energy of the paddle over its mass, integrated over time (figure 4.7), from its poses, m^2/s.
+    /// Kinetic energy of the paddle over its mass, integrated over time ([Matl 2021], figure 4.7), from its poses, m^2/s.
     pub energy_m2_s: f64,
 }
 
@@ -67,7 +67,7 @@ pub struct Player<'a, T> {
 ///
 /// # Errors
 /// [`PlayError`].
-pub fn play<R: Microphones + Arm, T: Tracker>(
+pub fn play<R: Microphones + Arm + ?Sized, T: Tracker>(
     rig: &mut R,
     player: &mut Player<'_, T>,
     mut over: impl FnMut(&R) -> bool,
@@ -114,7 +114,7 @@ pub fn play<R: Microphones + Arm, T: Tracker>(
 }
 
 /// Asks for a pose by a deadline, or as soon after it as the arm can.
-fn reach<A: Arm>(arm: &mut A, to: Pose, deadline_s: f64) -> Result<bool, A::Error> {
+fn reach<A: Arm + ?Sized>(arm: &mut A, to: Pose, deadline_s: f64) -> Result<bool, A::Error> {
     let mut deadline = deadline_s.max(LEAST_DEADLINE_S);
     for _ in 0..PATIENCE.1 {
         match arm.move_to(to, deadline) {

@@ -1,4 +1,4 @@
-//! Meeting a ball that is only heard: where the paddle should be, and when (section 4.3, appendices B.3 and B.4).
+//! Meeting a ball that is only heard: where the paddle should be, and when ([Matl 2021], section 4.3, appendices B.3 and B.4).
 //!
 //! The ball comes towards a plane x = const in which a paddle moves; each impact on the table is heard with its place. A [`Tracker`] turns
 //! impacts into goals, [`play`] puts microphones, tracker and arm together on any rig.

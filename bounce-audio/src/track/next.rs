@@ -1,7 +1,7 @@
-//! The next impact from the last flight: a density learned from simulated impacts (section 4.3, "a second BayesSim model").
+//! The next impact from the last flight: a density learned from simulated impacts ([Matl 2021], section 4.3, "a second BayesSim model").
 //!
 //! Without drag the physics has no scale of its own: with the last flight's duration T as unit of time and `g T^2 / 2` as unit of length,
-//! all that matters is `tan phi = 2 d / (g T^2)`, the slope at which the ball came down. And what the thesis learns as (duration,
+//! all that matters is `tan phi = 2 d / (g T^2)`, the slope at which the ball came down. And what [Matl 2021] learns as (duration,
 //! distance, angle) is learned here as the ratio of the speeds after and before, and the two angles by which the ball leaves its mirror
 //! image: close to Gaussian at any slope. So the density is of three numbers over one, and is written down once on a lattice of slopes: a
 //! draw then costs a table's look-up and three Gaussians. Between lattice points one of the two neighbours is taken by chance, which

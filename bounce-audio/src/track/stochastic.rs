@@ -14,14 +14,14 @@ const TIMELY: (f64, f64) = (0.6, 1.5);
 /// How the tracker behaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StochasticSettings {
-    /// Draws at each impact that is looked ahead to: n = 10 in the thesis.
+    /// Draws at each impact that is looked ahead to: n = 10 in [Matl 2021].
     pub samples: usize,
     /// Impacts to look ahead, k: 2 for a ball of much chance, 4 for one of little.
     pub ahead: usize,
     /// The paddle goes all the way where the crossing is known to this (standard deviation, m), and the less the less it is known.
     pub sure_m: f64,
     /// How far from the paddle's middle a ball is still touched, m: the paddle goes no farther than to have the crossing within this, less
-    /// two standard deviations. 0 for the thesis's rule, which goes to the mean.
+    /// two standard deviations. 0 for the rule of [Matl 2021], which goes to the mean.
     pub touch_m: f64,
     /// Probability that an honest place is taken for an outlier.
     pub false_outliers: f64,
@@ -35,7 +35,7 @@ impl Default for StochasticSettings {
     }
 }
 
-/// Algorithm 2 of appendix B.4.
+/// Algorithm 2 of [Matl 2021], appendix B.4.
 ///
 /// Beyond it: a sound much too early is no impact, and one much too late follows an impact that was not heard, in whose place its mean
 /// is taken. The first two impacts are believed whatever they are.

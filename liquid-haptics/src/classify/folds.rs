@@ -4,7 +4,7 @@ use rand::seq::SliceRandom;
 use super::svm::check;
 use super::{Classifier, ClassifyError};
 
-/// What was said of what, over all rows, each by a machine that had not seen it.
+/// Predicted against true classes over all rows, each predicted by a machine that was not trained on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confusion {
     /// The classes, in order.
@@ -23,7 +23,7 @@ impl Confusion {
         right as f64 / all.max(1) as f64
     }
 
-    /// Standard deviation of the folds' accuracies; twice it is what the thesis writes after its plus-minus.
+    /// Standard deviation of the folds' accuracies; [Matl 2021] writes twice this after its plus-minus.
     pub fn fold_deviation(&self) -> f64 {
         let n = self.fold_accuracy.len() as f64;
         let mean = self.fold_accuracy.iter().sum::<f64>() / n;
@@ -55,12 +55,12 @@ pub fn cross_validate(
     let mut fold_of = vec![0; rows.len()];
     let mut next = 0;
     for class in &classes {
-        let mut own: Vec<usize> = (0..rows.len()).filter(|&i| labels[i] == *class).collect();
-        if own.len() < folds {
-            return Err(ClassifyError::TooFew { what: "rows of a class", got: own.len(), least: folds });
+        let mut members: Vec<usize> = (0..rows.len()).filter(|&i| labels[i] == *class).collect();
+        if members.len() < folds {
+            return Err(ClassifyError::TooFew { what: "rows of a class", got: members.len(), least: folds });
         }
-        own.shuffle(rng);
-        for i in own {
+        members.shuffle(rng);
+        for i in members {
             fold_of[i] = next % folds;
             next += 1;
         }

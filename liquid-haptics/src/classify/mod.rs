@@ -1,6 +1,6 @@
-//! Which liquid it is: a linear support vector machine on features of the viscosity (thesis section 2.6).
+//! Which liquid it is: a linear support vector machine on features of the viscosity ([Matl 2021], section 2.6).
 //!
-//! One machine for each pair of liquids (smartcore's solver, LASVM), features standardised, votes counted; a tie goes to the larger
+//! One machine for each pair of liquids (smartcore's solver, LASVM), features standardised, votes counted; equal votes go to the larger
 //! margin. [`cross_validate`] says how well it does on liquids that it has not seen.
 
 mod folds;

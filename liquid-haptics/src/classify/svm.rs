@@ -6,7 +6,7 @@ use super::ClassifyError;
 
 /// Passes over the data: LASVM comes near the optimum in two, and stays there.
 const EPOCHS: usize = 20;
-/// To which it keeps the conditions of the optimum, as libsvm does.
+/// Tolerance of the optimum's conditions, as in libsvm.
 const TOLERANCE: f64 = 1e-3;
 /// The solver shuffles; the same data give the same machine.
 const SEED: u64 = 0;
@@ -102,15 +102,15 @@ fn pair(
     penalty: f64,
 ) -> Result<Pair, ClassifyError> {
     let failed = |error: smartcore::error::Failed| ClassifyError::Solver(error.to_string());
-    let (mut own, mut sides) = (Vec::new(), Vec::new());
+    let (mut members, mut sides) = (Vec::new(), Vec::new());
     for (row, label) in rows.iter().zip(labels) {
         if *label == classes[first] || *label == classes[second] {
-            own.push(row.clone());
+            members.push(row.clone());
             sides.push(if *label == classes[second] { 1 } else { -1 });
         }
     }
     let columns = rows[0].len();
-    let x = DenseMatrix::from_2d_vec(&own).map_err(failed)?;
+    let x = DenseMatrix::from_2d_vec(&members).map_err(failed)?;
     let settings = SVCParameters::default()
         .with_c(penalty)
         .with_kernel(Kernels::linear())

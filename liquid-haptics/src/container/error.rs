@@ -1,5 +1,8 @@
 /// Why a container cannot be, or cannot hold what is asked.
+///
+/// Not exhaustive: the feature `mesh` adds a variant.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ContainerError {
     /// A dimension is outside its range.
     #[error("{name} is {got}, expected {expected}")]
@@ -20,6 +23,7 @@ pub enum ContainerError {
         capacity_m3: f64,
     },
     /// The mesh is no container.
+    #[cfg(feature = "mesh")]
     #[error(transparent)]
     Mesh(#[from] super::mesh::MeshError),
 }

@@ -5,7 +5,9 @@
 
 mod cylinder;
 mod error;
+#[cfg(feature = "mesh")]
 pub mod mesh;
+mod segment;
 mod wedge;
 
 pub use cylinder::Cylinder;

@@ -1,4 +1,4 @@
-//! A simulated wrist that holds a container with liquid: turns, feels and keeps time like the rig of the thesis's chapter 2.
+//! A simulated wrist that holds a container with liquid: turns, feels and keeps time like the rig of [Matl 2021], chapter 2.
 //!
 //! It shares no formula with the estimators: the liquid's centre of mass comes from columns summed one by one ([`Cavity`]), the
 //! slosh is a pendulum that is integrated in time with the wrist's motion as its input, a thick liquid's film is finite volumes on

@@ -23,7 +23,7 @@ pub struct Sensor {
     pub wander_s: f64,
 }
 
-/// The ATI Axia80 of the thesis (section 2.5: 7812 Hz), range 500 N and 20 N m, resolution 0.1 N and 0.005 N m.
+/// The ATI Axia80 of [Matl 2021], section 2.5 (7812 Hz), range 500 N and 20 N m, resolution 0.1 N and 0.005 N m.
 ///
 /// The resolution is the data sheet's class, taken here as step *and* as noise of a raw reading (the maker's manuals give no noise
 /// density); the wander is an assumption: a fiftieth of a step over half a minute, which no averaging over one pose removes.
@@ -50,8 +50,8 @@ impl Noise {
 
     /// What is read of a wrench; `None` where an axis is beyond its range.
     pub(super) fn read(&mut self, sensor: &Sensor, truth: &Wrench, rng: &mut ChaCha8Rng) -> Option<Wrench> {
-        let keep = (-1.0 / (sensor.rate_hz * sensor.wander_s)).exp();
-        let kick = sensor.wander_steps * (1.0 - keep * keep).sqrt();
+        let lag_one = (-1.0 / (sensor.rate_hz * sensor.wander_s)).exp();
+        let kick = sensor.wander_steps * (1.0 - lag_one * lag_one).sqrt();
         let mut values = truth.components();
         for (axis, (value, wander)) in values.iter_mut().zip(&mut self.wander).enumerate() {
             let (step, range) = if axis < 3 {
@@ -60,7 +60,7 @@ impl Noise {
                 (sensor.torque_step_nm, sensor.torque_range_nm)
             };
             let mut draw = || Distribution::<f64>::sample(&StandardNormal, rng);
-            *wander = keep * *wander + kick * draw();
+            *wander = lag_one * *wander + kick * draw();
             let noisy = *value + step * (draw() + *wander);
             if noisy.abs() > range {
                 return None;

@@ -22,7 +22,7 @@ impl Slosh {
     pub(super) fn new(radius: f64, level: f64, mass: f64, viscosity: f64, gravity: f64) -> Self {
         let depth = level / radius;
         let (k, x) = (1.8412 * depth, 1.84 * depth);
-        // Mikishev and Dorozhkin's damping, as the thesis's eq. 2.4 should read.
+        // Mikishev and Dorozhkin's damping, as [Matl 2021], eq. 2.4, should read.
         #[allow(clippy::approx_constant, reason = "the law's fitted coefficient, not 1/pi")]
         let shallow = 0.318 / x.sinh() * (1.0 + (1.0 - depth) / x.cosh());
         let deep = 0.79 * (viscosity / (radius * (radius * gravity).sqrt())).sqrt();

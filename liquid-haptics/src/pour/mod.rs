@@ -1,6 +1,6 @@
 //! Pouring a wanted volume: how far to tilt, when liquid begins to leave, and how fast to turn.
 //!
-//! Thesis eq. 2.7: an open container at a tilt keeps what lies below the lowest point of its rim. Surface tension holds the level a
+//! [Matl 2021], eq. 2.7: in an open container at a tilt stays what lies below the lowest point of its rim. Surface tension holds the level a
 //! little higher, by the thickness of a puddle, `2 l_c sin(angle / 2)` with the capillary length `l_c = sqrt(sigma / (rho g))`
 //! (de Gennes, Brochard-Wyart and Quere 2004, Capillarity and Wetting Phenomena, section 2.2,
 //! doi:10.1007/978-0-387-21656-0): a level at rest at the lip must rise to the bead of the advancing contact angle before it
@@ -177,7 +177,7 @@ impl<'a> Pour<'a> {
         Ok(Pourable { start_tilt_rad, least_m3, most_m3: inside_m3 - lowest })
     }
 
-    /// The tilt (rad) at which `wanted_m3` of the `inside_m3` have left (thesis eq. 2.7), to rounding.
+    /// The tilt (rad) at which `wanted_m3` of the `inside_m3` have left ([Matl 2021], eq. 2.7), to rounding.
     ///
     /// # Errors
     /// [`PourError::NotPourable`] for more than there is or less than the bead lets out, with what can be poured; else as

@@ -86,7 +86,7 @@ pub struct Smoother {
 }
 
 impl Smoother {
-    /// Smooths with a standard deviation in readings (0: not at all; the thesis: 5).
+    /// Smooths with a standard deviation in readings (0: not at all; [Matl 2021]: 5).
     ///
     /// # Errors
     /// [`SignalError::Range`] for one that is negative, no number, or above 10,000.

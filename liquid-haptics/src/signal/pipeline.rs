@@ -17,7 +17,7 @@ pub struct PipelineSettings {
     pub factor: usize,
     /// What the sensor reads of no load, in its own frame.
     pub offset: Wrench,
-    /// Standard deviation of the smoothing in readings that are left (0: none; the thesis: 5).
+    /// Standard deviation of the smoothing in readings that are left (0: none; [Matl 2021]: 5).
     pub smoothing: f64,
 }
 

@@ -1,5 +1,7 @@
 //! The free decay of a mode as a sensor reads it, with what real walls, surfaces and sensors add.
 
+use super::linear::{EVEN, Propagator};
+
 /// Effects beyond a linear, viscously damped mode; all zero is off.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effects {
@@ -45,12 +47,8 @@ pub enum DecayError {
     },
 }
 
-/// Steps of the integrator per radian of the mode.
-const STEPS_PER_RADIAN: f64 = 4.0;
-/// Spacings of rows that differ by less, relatively, are the same but for rounding.
-const EVEN: f64 = 1e-11;
 /// The fifth power of the spring, over the square of the third.
-const QUINTIC: f64 = 21.0 / 80.0;
+pub(super) const QUINTIC: f64 = 21.0 / 80.0;
 
 impl Decay {
     /// Readings at the rising times `t_s` (s, from 0 on), from the start `x(0) = a`, `x'(0) = -gamma omega a + omega_d b`: without
@@ -68,7 +66,7 @@ impl Decay {
         let damped = self.omega_rad_s * (1.0 - self.damping_ratio * self.damping_ratio).sqrt();
         let start = [a, -self.damping_ratio * self.omega_rad_s * a + damped * b];
         if linear {
-            self.carry(t_s, start, out);
+            self.propagate(t_s, start, out);
             return Ok(());
         }
         self.integrate(t_s, start, out)
@@ -93,7 +91,7 @@ impl Decay {
     /// The cubic part of the spring, relative to the linear one, in 1/reading^2: the first harmonic of one of relative strength
     /// s A^2 has the frequency 1 + 3/8 s A^2 - 21/256 s^2 A^4 (Nayfeh and Mook 1979, doi:10.1002/9783527617586, section 2.3); a
     /// fifth power of 21/80 s^2 takes the last term away.
-    fn stiffening(&self) -> f64 {
+    pub(super) fn stiffening(&self) -> f64 {
         let largest = self.effects.largest_amplitude;
         if largest == 0.0 { 0.0 } else { 8.0 / 3.0 * self.effects.frequency_change / (largest * largest) }
     }
@@ -113,187 +111,18 @@ impl Decay {
     }
 
     /// The linear motion, from row to row; rows that are evenly spaced share their sines.
-    fn carry(&self, t_s: &[f64], [mut x, mut v]: [f64; 2], out: &mut [f64]) {
+    fn propagate(&self, t_s: &[f64], [mut x, mut v]: [f64; 2], out: &mut [f64]) {
         let mut now = 0.0;
-        let (mut span, mut carry) = (0.0, Carry::new(self, 0.0));
+        let (mut span, mut over_span) = (0.0, Propagator::new(self.omega_rad_s, self.damping_ratio, 0.0));
         for (reading, &t) in out.iter_mut().zip(t_s) {
             let h = t - now;
             if !(f64::abs(h - span) <= EVEN * h.abs()) {
-                (span, carry) = (h, Carry::new(self, h));
+                (span, over_span) = (h, Propagator::new(self.omega_rad_s, self.damping_ratio, h));
             }
-            (x, v) = carry.carry(x, v);
+            (x, v) = over_span.apply(x, v);
             *reading = x;
             now = t;
         }
-    }
-
-    /// What the effects add to the acceleration.
-    fn push(&self, x: f64, v: f64, stiffening: f64, force: f64) -> f64 {
-        let w = self.omega_rad_s;
-        let cubic = stiffening * x * x;
-        -w * w * x * cubic * (1.0 + QUINTIC * cubic)
-            - self.effects.quadratic_per_reading * v.abs() * v
-            - force
-    }
-
-    fn integrate(&self, t_s: &[f64], start: [f64; 2], out: &mut [f64]) -> Result<(), DecayError> {
-        let (w, friction) = (self.omega_rad_s, self.effects.friction);
-        let stiffening = self.stiffening();
-        let bound = 1e3 * (start[0].abs() + start[1].abs() / w + friction);
-        let mut state = Motion { x: start[0], v: start[1], direction: 0.0 };
-        state.set_off(w, friction);
-        let mut now = 0.0;
-        let mut stride = Stride::new(self, 0.0);
-        for (reading, &t) in out.iter_mut().zip(t_s) {
-            let span = t - now;
-            if span > 0.0 && !state.stuck() {
-                let steps = (span * w * STEPS_PER_RADIAN).ceil().max(1.0);
-                let h = span / steps;
-                if (h - stride.h).abs() > EVEN * h {
-                    stride = Stride::new(self, h);
-                }
-                for _ in 0..steps as usize {
-                    self.step(&mut state, &stride, stiffening);
-                    if state.stuck() {
-                        break;
-                    }
-                }
-                now = t;
-            }
-            if !(state.x.abs() <= bound) {
-                return Err(DecayError::Diverges { t_s: t });
-            }
-            *reading = state.x;
-        }
-        Ok(())
-    }
-
-    /// One step, with the turning points inside it.
-    fn step(&self, state: &mut Motion, stride: &Stride, stiffening: f64) {
-        let friction = self.effects.friction * self.omega_rad_s * self.omega_rad_s;
-        let mut part = *stride;
-        for _ in 0..8 {
-            let force = friction * state.direction;
-            let (x, v) = self.runge_kutta(state, &part, stiffening, force);
-            if friction == 0.0 || v * state.direction > 0.0 {
-                (state.x, state.v) = (x, v);
-                return;
-            }
-            let turn = self.turning_point(state, part.h, stiffening, force);
-            let (x, _) = self.runge_kutta(state, &turn, stiffening, force);
-            (state.x, state.v) = (x, 0.0);
-            state.set_off(self.omega_rad_s, self.effects.friction);
-            let left = part.h - turn.h;
-            if state.stuck() || left <= 1e-12 * stride.h {
-                return;
-            }
-            part = Stride::new(self, left);
-        }
-    }
-
-    /// The stride after which the motion turns, somewhere within `h` (the speed is monotone there): Newton's method
-    /// between brackets.
-    fn turning_point(&self, state: &Motion, h: f64, stiffening: f64, force: f64) -> Stride {
-        let (mut low, mut high) = (0.0, h);
-        let mut guess = 0.5 * h;
-        for _ in 0..60 {
-            let (x, v) = self.runge_kutta(state, &Stride::new(self, guess), stiffening, force);
-            if v * state.direction > 0.0 {
-                low = guess;
-            } else {
-                high = guess;
-            }
-            let w = self.omega_rad_s;
-            let pull = -w * w * x - 2.0 * self.damping_ratio * w * v + self.push(x, v, stiffening, force);
-            let newton = guess - v / pull;
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            let still = (next - guess).abs() <= 1e-13 * h;
-            guess = next;
-            if still {
-                break;
-            }
-        }
-        Stride::new(self, guess)
-    }
-
-    /// Fourth-order Runge-Kutta on what the effects add, the linear motion being exact (Lawson 1967,
-    /// doi:10.1137/0704033): with no effect there is no error, whatever the step.
-    fn runge_kutta(&self, s: &Motion, stride: &Stride, stiffening: f64, force: f64) -> (f64, f64) {
-        let (h, half, whole) = (stride.h, &stride.half, &stride.whole);
-        let push = |(x, v): (f64, f64)| self.push(x, v, stiffening, force);
-        let k1 = push((s.x, s.v));
-        let k2 = push(half.carry(s.x, s.v + 0.5 * h * k1));
-        let (x3, v3) = half.carry(s.x, s.v);
-        let k3 = push((x3, v3 + 0.5 * h * k2));
-        let (x4, v4) = whole.carry(s.x, s.v);
-        let (dx, dv) = half.carry(0.0, h * k3);
-        let k4 = push((x4 + dx, v4 + dv));
-        let (x, v) = whole.carry(s.x, s.v + h / 6.0 * k1);
-        let (dx, dv) = half.carry(0.0, h / 3.0 * (k2 + k3));
-        (x + dx, v + dv + h / 6.0 * k4)
-    }
-}
-
-/// The linear motion over a time and over half of it.
-#[derive(Debug, Clone, Copy)]
-struct Stride {
-    h: f64,
-    half: Carry,
-    whole: Carry,
-}
-
-impl Stride {
-    fn new(decay: &Decay, h: f64) -> Self {
-        Self { h, half: Carry::new(decay, 0.5 * h), whole: Carry::new(decay, h) }
-    }
-}
-
-/// The linear motion over a time: position and speed after it from those before.
-#[derive(Debug, Clone, Copy)]
-struct Carry([f64; 4]);
-
-impl Carry {
-    fn new(decay: &Decay, h: f64) -> Self {
-        let (w, ratio) = (decay.omega_rad_s, decay.damping_ratio);
-        let damped = w * (1.0 - ratio * ratio).sqrt();
-        let (sin, cos) = (damped * h).sin_cos();
-        let (fade, tilt) = ((-ratio * w * h).exp(), ratio * w / damped);
-        Self([
-            fade * (cos + tilt * sin),
-            fade * sin / damped,
-            -fade * w * w / damped * sin,
-            fade * (cos - tilt * sin),
-        ])
-    }
-
-    fn carry(&self, x: f64, v: f64) -> (f64, f64) {
-        let m = &self.0;
-        (m[0] * x + m[1] * v, m[2] * x + m[3] * v)
-    }
-}
-
-/// Position and speed, and which way dry friction points (0: at rest).
-struct Motion {
-    x: f64,
-    v: f64,
-    direction: f64,
-}
-
-impl Motion {
-    /// The direction of motion from here: that of the speed, or, at a turning point, that of the pull where it beats
-    /// friction.
-    fn set_off(&mut self, omega: f64, friction: f64) {
-        self.direction = if self.v != 0.0 {
-            self.v.signum()
-        } else if self.x.abs() > friction && omega > 0.0 {
-            -self.x.signum()
-        } else {
-            0.0
-        };
-    }
-
-    fn stuck(&self) -> bool {
-        self.direction == 0.0 && self.v == 0.0
     }
 }
 

@@ -6,6 +6,8 @@
 //! `omega^2 = (g k + sigma k^3 / rho) tanh(k h)`.
 
 mod decay;
+mod integrator;
+mod linear;
 
 pub use decay::{Decay, DecayError, Effects};
 
@@ -59,7 +61,7 @@ impl UprightCylinder {
 
     /// Angular frequency of a mode without damping, in rad/s.
     ///
-    /// `tension_over_density` is the surface tension over the density in m^3/s^2 (0: gravity waves alone, thesis eq. 2.3
+    /// `tension_over_density` is the surface tension over the density in m^3/s^2 (0: gravity waves alone, [Matl 2021], eq. 2.3
     /// corrected; water 7.3e-5).
     pub fn angular_frequency_rad_s(&self, mode: usize, tension_over_density: f64) -> f64 {
         let k = self.wave_number_per_m(mode);
@@ -78,7 +80,7 @@ impl UprightCylinder {
         0.79 / (self.radius_m.powf(1.5) * self.gravity_m_s2.sqrt()).sqrt() * (1.0 + shallow)
     }
 
-    /// Damping ratio of the first mode in a liquid of the given kinematic viscosity (m^2/s), thesis eq. 2.4 corrected.
+    /// Damping ratio of the first mode in a liquid of the given kinematic viscosity (m^2/s), [Matl 2021], eq. 2.4 corrected.
     ///
     /// An empirical law for damping ratios well below 1 (Mikishev and Dorozhkin 1961, in Abramson 1966, NASA SP-106,
     /// ch. 4): boundary layers at wall and bottom.
@@ -98,7 +100,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
     use super::*;
 
-    /// J1' by its power series, an own way to the roots.
+    /// J1' by its power series, another way to the roots.
     fn bessel_derivative(x: f64) -> f64 {
         let mut sum = 0.0;
         let mut term = 0.5;

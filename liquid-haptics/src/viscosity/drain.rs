@@ -1,13 +1,13 @@
 //! A thick liquid that drains down the wall of a container that has been set upright.
 //!
 //! On its side the liquid lies in the cylinder as a prism, a segment of the circle deep. Set upright, each strip of it is a film on a
-//! vertical wall with the flux per width `g h^3 / (3 nu)` (Nusselt 1916; thesis eq. 2.6 corrected), which obeys
+//! vertical wall with the flux per width `g h^3 / (3 nu)` (Nusselt 1916; [Matl 2021], eq. 2.6 corrected), which obeys
 //! `h_t + g h^2 / nu h_s = 0`: from the upper end, where nothing follows, spreads the fan `h = sqrt(nu s / (g t))` (Jeffreys 1930,
 //! doi:10.1017/S0305004100015681), s down from there. What arrives below is a level pool. The torque of the film falls as
 //! `-rho g` times its moment about the axis.
 //!
 //! Where it holds: strips do not drag on each other (a segment much wider than deep; a half-full cylinder's carry twice what a duct
-//! of that shape does), and the film has developed: for times above some `3 sqrt(L / g)` whatever the viscosity, as the fan's own
+//! of that shape does), and the film has developed: for times above some `3 sqrt(L / g)` whatever the viscosity, as the fan's
 //! diffusion time `h^2 / nu` is `s / (g t)`.
 
 use std::f64::consts::PI;
@@ -153,10 +153,10 @@ pub fn rise_time_s(t_s: &[f64], reading: &[f64]) -> Result<f64, ViscosityError> 
     }
 }
 
-/// The thesis's own estimate of the dynamic viscosity (Pa s) from the rise time (s) of a drain: eq. 2.6 and appendix A.3 as printed.
+/// The dynamic viscosity (Pa s) from the rise time (s) of a drain as [Matl 2021] prints it, eq. 2.6 and appendix A.3.
 ///
-/// Off in its dimensions and its constant (the result is in `Pa s` times a length of 1 m): kept so that the thesis's numbers can be
-/// reproduced. Use [`super::ViscosityFit`].
+/// The formula is off in its dimensions and its constant (the result is in `Pa s` times a length of 1 m); it stands here so that the numbers
+/// of [Matl 2021] can be reproduced. Use [`super::ViscosityFit`].
 pub fn thesis_drain_viscosity(bottle: &Bottle, rise_time_s: f64) -> f64 {
     let (radius, volume) = (bottle.radius_m, bottle.volume_m3);
     let area = volume / bottle.length_m;

@@ -1,4 +1,4 @@
-/// Why there is no viscosity to be told.
+/// Why no viscosity can be estimated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ViscosityError {
     /// A quantity is outside its range.

@@ -1,11 +1,8 @@
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector};
-
-use super::drain::Drain;
-use super::least_squares::{Fit, covariance, least_squares};
+use super::drain_fit::DrainFit;
 use super::mode::{ModeFit, fit_mode};
-use super::{Bottle, ViscosityError, checked, normal_quantile};
+use super::{Bottle, ViscosityError, checked};
 use crate::slosh::UprightCylinder;
 
 /// The first mode's frequency lies within these shares of the theory's (surface tension, a bottom that is not flat, a fill that is
@@ -15,8 +12,6 @@ const BAND: [f64; 2] = [0.8, 1.25];
 const FELT: f64 = 5.0;
 /// A film has developed after this many times the root of the wall's length above the pool over gravity.
 const DEVELOPED: f64 = 3.0;
-/// Kinematic viscosities that the search for a drain starts from, m^2/s.
-const DRAIN_STARTS: [f64; 9] = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0];
 /// Fewest readings.
 const LEAST: usize = 20;
 /// A shallower layer than this share of the radius has no mode and no film to speak of.
@@ -68,7 +63,7 @@ pub enum Refusal {
         /// How long they should, s.
         least_s: f64,
     },
-    /// No motion can be told from the noise.
+    /// No motion stands out of the noise.
     NothingMoves {
         /// Standard deviation of the readings, in their unit.
         spread: f64,
@@ -138,7 +133,8 @@ impl ViscosityFit {
             return Ok(Verdict::Refused(Refusal::TooShort { got_s, least_s }));
         }
         let mode = fit_mode(t_s, tau_z_nm, BAND.map(|share| share * omega)).ok();
-        let drain = DrainFit::new(self, &t_s[from..], &tau_z_nm[from..]);
+        let drain =
+            DrainFit::new(bottle, self.head_start_s, self.mass_error_share, &t_s[from..], &tau_z_nm[from..]);
         Ok(self.judge(&cylinder, mode, drain, t_s, tau_z_nm, from))
     }
 
@@ -181,7 +177,7 @@ impl ViscosityFit {
         let swings =
             mode.filter(|m| m.amplitude() > FELT * m.amplitude_error && m.damping_ratio < MOST_DAMPING);
         let drains = drain.filter(|d| d.fall > FELT * d.fall_error);
-        // Both are judged on the rows where the film has developed. Squares of noise differ by a few of their own deviations.
+        // Both are judged on the rows where the film has developed. Sums of squares of noise differ by a few of their standard deviations.
         let slack = 1.0 + 1.5 * (2.0 / (reading.len() - from) as f64).sqrt();
         match (swings, drains) {
             (Some(mode), drain) => {
@@ -192,13 +188,18 @@ impl ViscosityFit {
                     _ => {
                         let interval = mode.damping_interval().map(|g| cylinder.kinematic_viscosity_m2_s(g));
                         let viscosity = cylinder.kinematic_viscosity_m2_s(mode.damping_ratio);
-                        self.answer(viscosity, interval, tie(&residuals, rows), Regime::Oscillating(mode))
+                        self.answer(
+                            viscosity,
+                            interval,
+                            autocorrelation(&residuals, rows),
+                            Regime::Oscillating(mode),
+                        )
                     }
                 }
             }
             (None, Some(drain)) => self.drained(&drain, rows),
             (None, None) => {
-                let correlation = tie(reading, rows);
+                let correlation = autocorrelation(reading, rows);
                 let spread = spread(reading);
                 Verdict::Refused(if correlation > NEITHER {
                     Refusal::NeitherLaw { correlation }
@@ -211,7 +212,12 @@ impl ViscosityFit {
 
     fn drained(&self, drain: &DrainFit, rows: usize) -> Verdict {
         let regime = Regime::Draining { offset: drain.fit.params[1], sigma: drain.fit.sigma() };
-        self.answer(drain.viscosity(), drain.interval(), tie(drain.fit.residuals.as_slice(), rows), regime)
+        self.answer(
+            drain.viscosity(),
+            drain.interval(),
+            autocorrelation(drain.fit.residuals.as_slice(), rows),
+            regime,
+        )
     }
 
     fn answer(&self, kinematic: f64, interval: [f64; 2], correlation: f64, regime: Regime) -> Verdict {
@@ -241,78 +247,11 @@ fn spread(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Correlation of values that many rows apart, about their mean; 0 of values that are all alike.
-fn tie(values: &[f64], rows: usize) -> f64 {
+/// Autocorrelation of values at a lag of that many rows; 0 of values that are all alike.
+fn autocorrelation(values: &[f64], lag: usize) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let whole: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    let pairs = values.iter().zip(&values[rows.min(values.len())..]);
+    let pairs = values.iter().zip(&values[lag.min(values.len())..]);
     let along: f64 = pairs.map(|(a, b)| (a - mean) * (b - mean)).sum();
     if whole > 0.0 { along / whole } else { 0.0 }
-}
-
-/// A drain fitted to readings: logarithm of the viscosity, and offset; the scale is the liquid's weight.
-struct DrainFit {
-    fit: Fit,
-    /// Standard error of the viscosity's logarithm.
-    ln_error: f64,
-    /// How far the torque falls over the readings, and the standard error of that.
-    fall: f64,
-    fall_error: f64,
-}
-
-impl DrainFit {
-    fn new(rig: &ViscosityFit, t_s: &[f64], reading: &[f64]) -> Option<Self> {
-        let plan = Drain::new(&rig.bottle);
-        let scale = -rig.bottle.density_kg_m3() * rig.bottle.gravity_m_s2;
-        let t: Vec<f64> = t_s.iter().map(|t| t + rig.head_start_s).collect();
-        let best = Self::search(&plan, scale, &t, reading, &DRAIN_STARTS)?;
-        let at = |fit: &Fit, t: f64| scale * plan.moment_m4(fit.params[0].exp(), t);
-        let fall = (at(&best, t[0]) - at(&best, t[t.len() - 1])).abs();
-        let noise = covariance(&best)?[(0, 0)].max(0.0);
-        // An error of the weight, carried through by fitting with another weight.
-        let share = rig.mass_error_share;
-        let mut by_weight = 0.0;
-        if share > 0.0 {
-            let start = [best.params[0].exp()];
-            let heavier = Self::search(&plan, scale * (1.0 + share), &t, reading, &start)?;
-            let lighter = Self::search(&plan, scale * (1.0 - share), &t, reading, &start)?;
-            by_weight = 0.5 * (heavier.params[0] - lighter.params[0]);
-        }
-        // The fall is what the readings' own noise leaves of an amplitude that is free.
-        let shape = |i: usize| (at(&best, t[i]) - at(&best, t[t.len() - 1])) / fall.max(f64::MIN_POSITIVE);
-        let free = Fit {
-            params: DVector::from_vec(vec![fall, 0.0]),
-            residuals: best.residuals.clone(),
-            jacobian: DMatrix::from_fn(t.len(), 2, |i, j| if j == 0 { shape(i) } else { 1.0 }),
-        };
-        let fall_error = covariance(&free)?[(0, 0)].max(0.0).sqrt();
-        Some(Self { fit: best, ln_error: (noise + by_weight * by_weight).sqrt(), fall, fall_error })
-    }
-
-    fn search(plan: &Drain, scale: f64, t: &[f64], reading: &[f64], starts: &[f64]) -> Option<Fit> {
-        let model = |p: &DVector<f64>, values: &mut DVector<f64>, jacobian: &mut DMatrix<f64>| {
-            const HALF_STEP: f64 = 1e-4;
-            let at = |shift: f64, t: f64| scale * plan.moment_m4((p[0] + shift).exp(), t);
-            for (i, t) in t.iter().enumerate() {
-                values[i] = p[1] + at(0.0, *t);
-                jacobian[(i, 0)] = (at(HALF_STEP, *t) - at(-HALF_STEP, *t)) / (2.0 * HALF_STEP);
-                jacobian[(i, 1)] = 1.0;
-            }
-        };
-        let last = reading[reading.len() - 1];
-        let fits = starts.iter().filter_map(|viscosity| {
-            let offset = last - scale * plan.moment_m4(*viscosity, t[t.len() - 1]);
-            least_squares(reading, DVector::from_vec(vec![viscosity.ln(), offset]), model)
-        });
-        fits.min_by(|a, b| a.squares().total_cmp(&b.squares()))
-    }
-
-    fn viscosity(&self) -> f64 {
-        self.fit.params[0].exp()
-    }
-
-    fn interval(&self) -> [f64; 2] {
-        let reach = (normal_quantile() * self.ln_error).exp();
-        [self.viscosity() / reach, self.viscosity() * reach]
-    }
 }

@@ -1,4 +1,7 @@
 //! Levenberg and Marquardt's method for a handful of parameters, and errors that hold where the noise is coloured.
+//!
+//! argmin 0.11 has Gauss and Newton's method, undamped; the crate `levenberg-marquardt` (0.15) is on nalgebra 0.34, which the tree would
+//! then hold beside 0.35.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -80,7 +83,7 @@ pub(super) fn least_squares(
     Some(best)
 }
 
-/// Covariance of the parameters where neighbouring residuals may be tied: Newey and West's (1987, doi:10.2307/1913610) with
+/// Covariance of the parameters where neighbouring residuals may be correlated: Newey and West's (1987, doi:10.2307/1913610) with
 /// Bartlett's window, as wide as Andrews's rule has it for a first-order process (1991, doi:10.2307/2938229, eqs 6.2, 6.4).
 ///
 /// `None` where the readings do not determine the parameters.
@@ -93,8 +96,8 @@ pub(super) fn covariance(fit: &Fit) -> Option<DMatrix<f64>> {
         along += pair[0] * pair[1];
         whole += pair[0] * pair[0];
     }
-    let tie = if whole > 0.0 { (along / whole).clamp(-0.97, 0.97) } else { 0.0 };
-    let alpha = 4.0 * tie * tie / ((1.0 - tie) * (1.0 + tie)).powi(2);
+    let rho = if whole > 0.0 { (along / whole).clamp(-0.97, 0.97) } else { 0.0 };
+    let alpha = 4.0 * rho * rho / ((1.0 - rho) * (1.0 + rho)).powi(2);
     let width = (1.1447 * (alpha * rows as f64).cbrt()).floor().min(rows as f64 / 4.0) as usize;
     let scores = DMatrix::from_fn(rows, columns, |i, j| fit.jacobian[(i, j)] * fit.residuals[i]);
     let mut middle = scores.tr_mul(&scores);

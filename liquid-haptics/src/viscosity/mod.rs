@@ -1,10 +1,11 @@
-//! How thick a liquid is, from what the wrist feels after its bottle has been swung upright (thesis section 2.4, A.3).
+//! How thick a liquid is, from what the wrist feels after its bottle has been swung upright ([Matl 2021], section 2.4 and appendix A.3).
 //!
 //! A thin liquid sloshes: the damping of its first mode, fitted to all readings at once, gives the kinematic viscosity by
-//! eq. 2.4. A thick one drains down the wall: the torque of the film gives it by [`Drain`]. [`ViscosityFit`] tells from the
+//! [Matl 2021], eq. 2.4. A thick one drains down the wall: the torque of the film gives it by [`Drain`]. [`ViscosityFit`] tells from the
 //! readings which of the two it is, and says so where they do not tell.
 
 mod drain;
+mod drain_fit;
 mod error;
 mod estimate;
 mod least_squares;

@@ -40,7 +40,7 @@ pub struct ModeFit {
 }
 
 impl ModeFit {
-    /// Logarithmic decrement: the logarithm of a peak over the one a cycle later (thesis eq. 2.3 corrected).
+    /// Logarithmic decrement: the logarithm of a peak over the one a cycle later ([Matl 2021], eq. 2.3 corrected).
     pub fn logarithmic_decrement(&self) -> f64 {
         TAU * self.damping_ratio / (1.0 - self.damping_ratio * self.damping_ratio).sqrt()
     }

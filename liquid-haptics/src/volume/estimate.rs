@@ -2,7 +2,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 use super::profile::{Mass, Profile};
 use super::valleys::{Grid, Valley};
-use super::{Candidate, Cause, Liquid, Pose, Ties, Verdict, VolumeError, VolumeEstimate, checked};
+use super::{
+    Candidate, Cause, ErrorCorrelation, Liquid, SettledPose, Verdict, VolumeError, VolumeEstimate, checked,
+};
 use crate::container::Container;
 use crate::wrench::{Departures, Grasp};
 
@@ -15,7 +17,7 @@ const ALIKE_RAD: f64 = 0.01;
 /// Rounds in which the noise and the weight of the mass's prior settle.
 const NOISE_ROUNDS: usize = 3;
 
-/// Volume by bounded least squares on the torques of all poses at once (thesis eqs 2.1 and 2.2).
+/// Volume by bounded least squares on the torques of all poses at once ([Matl 2021], eqs 2.1 and 2.2).
 ///
 /// The interval holds the volumes whose profile likelihood is within the 95 % level: chi-square with one degree of freedom where
 /// the noise is given (Wilks 1938, doi:10.1214/aoms/1177732360), Student's t squared where it is estimated.
@@ -31,8 +33,8 @@ pub struct VolumeFit<'a> {
     pub liquid: Liquid,
     /// The torque's noise, N m; estimated from the residuals where it is absent.
     pub sigma_nm: Option<f64>,
-    /// How the torque's errors at successive poses are tied; the poses are then to be in the order in which they were felt.
-    pub ties: Ties,
+    /// How the torque's errors are correlated from pose to pose; the poses are then in the order in which they were measured.
+    pub error_correlation: ErrorCorrelation,
     /// An interval wider than this share of the capacity leaves the volume open (0 to 1; a half is usual).
     pub widest_share: f64,
 }
@@ -43,9 +45,10 @@ impl VolumeFit<'_> {
     /// # Errors
     /// [`VolumeError::Range`] for settings outside their range, [`VolumeError::TooFew`] and [`VolumeError::Pose`],
     /// [`VolumeError::NegativeMass`], [`VolumeError::Search`], and the container's.
-    pub fn estimate(&self, poses: &[Pose]) -> Result<VolumeEstimate, VolumeError> {
+    pub fn estimate(&self, poses: &[SettledPose]) -> Result<VolumeEstimate, VolumeError> {
         self.check(poses)?;
-        let profile = Profile::new(self.container, &self.grasp, &self.departures, self.ties, poses)?;
+        let profile =
+            Profile::new(self.container, &self.grasp, &self.departures, self.error_correlation, poses)?;
         let grid = Grid::new(&profile)?;
         let (sigma_nm, freedom) = match self.sigma_nm {
             Some(sigma) => (sigma, None),
@@ -85,7 +88,7 @@ impl VolumeFit<'_> {
         Mass::of(&self.liquid, profile.capacity_m3(), sigma_nm)
     }
 
-    pub(super) fn check(&self, poses: &[Pose]) -> Result<(), VolumeError> {
+    pub(super) fn check(&self, poses: &[SettledPose]) -> Result<(), VolumeError> {
         checked(poses)?;
         let range = |name, got, expected| Err(VolumeError::Range { name, got, expected });
         match self.liquid {
@@ -153,7 +156,7 @@ impl VolumeFit<'_> {
         Ok((sigma, freedom))
     }
 
-    fn verdict(&self, poses: &[Pose], valleys: &[Valley]) -> Verdict {
+    fn verdict(&self, poses: &[SettledPose], valleys: &[Valley]) -> Verdict {
         let capacity = self.container.capacity_m3();
         let open = |cause| Verdict::Undetermined {
             cause,

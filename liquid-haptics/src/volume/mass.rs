@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Pose, VolumeError, checked};
+use super::{SettledPose, VolumeError, checked};
 use crate::wrench::Grasp;
 
 /// Where the relative error of the forces comes from.
@@ -11,7 +11,7 @@ pub enum ForceGain<'a> {
     /// It is known; 0 for forces that are right.
     Known(f64),
     /// It is fitted, from poses of the same load with the container empty.
-    FromEmpty(&'a [Pose]),
+    FromEmpty(&'a [SettledPose]),
 }
 
 /// What is fitted to the forces besides the liquid's mass.
@@ -51,7 +51,7 @@ struct Rows {
 
 impl Rows {
     /// Poses of a load of `load[0]` times the gain and `load[1]` times the liquid's mass times the gain.
-    fn add(&mut self, poses: &[Pose], load: [f64; 2], offsets: bool) {
+    fn add(&mut self, poses: &[SettledPose], load: [f64; 2], offsets: bool) {
         for pose in poses {
             let (sin, cos) = pose.tilt_rad.sin_cos();
             self.factors.push([-load[0], -load[1], -sin, cos]);
@@ -64,13 +64,17 @@ impl Rows {
     }
 }
 
-/// The liquid's mass from poses with it inside, by least squares: `f_y = -(1 + gain) g (m_c + m_g + m_l)` (thesis section 2.4),
+/// The liquid's mass from poses with it inside, by least squares: `f_y = -(1 + gain) g (m_c + m_g + m_l)` ([Matl 2021], section 2.4),
 /// linear in the gain and its product with the mass.
 ///
 /// # Errors
 /// [`VolumeError::Range`] for a gain of -1 or less or a noise that is not above 0, [`VolumeError::Pose`], [`VolumeError::TooFew`]
 /// where the noise cannot be estimated, [`VolumeError::NotDetermined`] where the poses do not tell mass, gain and offsets apart.
-pub fn fit_mass(grasp: &Grasp, poses: &[Pose], fit: &MassFit<'_>) -> Result<MassEstimate, VolumeError> {
+pub fn fit_mass(
+    grasp: &Grasp,
+    poses: &[SettledPose],
+    fit: &MassFit<'_>,
+) -> Result<MassEstimate, VolumeError> {
     checked(poses)?;
     let gravity = grasp.gravity_m_s2;
     let empty = (grasp.container_mass_kg + grasp.gripper_mass_kg) * gravity;

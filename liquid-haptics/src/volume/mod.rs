@@ -1,38 +1,38 @@
-//! Mass and volume of a liquid from the wrenches of settled poses (thesis section 2.4).
+//! Mass and volume of a liquid from the wrenches of settled poses ([Matl 2021], section 2.4).
 //!
 //! The mass comes from the forces by linear regression ([`fit_mass`]), the volume from the torques of all poses at once by bounded
 //! least squares ([`VolumeFit`]). The torque cannot tell an empty container from a full one, and its misfit may have more than one
 //! valley: an estimate carries a [`Verdict`] that says what the poses leave open.
 
+mod correlation;
 mod error;
 mod estimate;
 mod mass;
 mod next;
 mod profile;
-mod ties;
 mod valleys;
 
+pub use correlation::ErrorCorrelation;
 pub use error::VolumeError;
 pub use estimate::VolumeFit;
 pub use mass::{ForceGain, MassEstimate, MassFit, fit_mass};
 pub use next::NextTilt;
-pub use ties::Ties;
 
 use crate::wrench::PlanarWrench;
 
 /// One settled pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pose {
+pub struct SettledPose {
     /// Clockwise tilt from upright, rad.
     pub tilt_rad: f64,
     /// What the sensor reads.
     pub wrench: PlanarWrench,
 }
 
-/// What ties the torque to the volume.
+/// What is known of the liquid besides the torques, which depend on its mass and its volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Liquid {
-    /// Its mass is known from elsewhere, such as the forces.
+    /// Its mass is known, for instance from the forces.
     Mass {
         /// The mass, kg.
         mass_kg: f64,
@@ -86,9 +86,9 @@ pub enum Cause {
 pub enum Verdict {
     /// The volume is as estimated, within its interval.
     Determined,
-    /// The liquid's mass cannot be told from zero.
+    /// The liquid's mass cannot be distinguished from zero.
     Empty,
-    /// The volume cannot be told from the container's capacity.
+    /// The volume cannot be distinguished from the container's capacity.
     Full,
     /// The volume is open.
     Undetermined {
@@ -120,7 +120,7 @@ pub struct VolumeEstimate {
 }
 
 /// Poses that hold numbers only, at least one.
-fn checked(poses: &[Pose]) -> Result<(), VolumeError> {
+fn checked(poses: &[SettledPose]) -> Result<(), VolumeError> {
     if poses.is_empty() {
         return Err(VolumeError::TooFew { what: "poses", got: 0, least: 1 });
     }

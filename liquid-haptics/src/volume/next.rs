@@ -1,5 +1,5 @@
 use super::profile::{Mass, Profile};
-use super::{Cause, Liquid, Pose, Verdict, VolumeError, VolumeEstimate, VolumeFit};
+use super::{Cause, Liquid, SettledPose, Verdict, VolumeError, VolumeEstimate, VolumeFit};
 use crate::container::ContainerError;
 
 /// Volumes of the interval over which a tilt's worth is averaged.
@@ -52,13 +52,13 @@ impl VolumeFit<'_> {
     /// estimate's interval; where separate volumes explain the poses, the one among those that tell them apart, or else
     /// the one at which their torques differ most.
     ///
-    /// Ties between poses are left out here.
+    /// Correlation of errors between poses is left out here.
     ///
     /// # Errors
     /// [`VolumeError::NothingToLearn`] where no torque depends on the volume, and as [`VolumeFit::estimate`].
     pub fn next_tilt(
         &self,
-        poses: &[Pose],
+        poses: &[SettledPose],
         estimate: &VolumeEstimate,
         steps: usize,
     ) -> Result<NextTilt, VolumeError> {
@@ -66,7 +66,8 @@ impl VolumeFit<'_> {
         if steps == 0 {
             return Err(VolumeError::TooFew { what: "steps", got: 0, least: 1 });
         }
-        let profile = Profile::new(self.container, &self.grasp, &self.departures, self.ties, poses)?;
+        let profile =
+            Profile::new(self.container, &self.grasp, &self.departures, self.error_correlation, poses)?;
         let capacity = profile.capacity_m3();
         let [low, high] = estimate.interval_m3.map(|v| v / capacity);
         let mut shares: Vec<f64> =
@@ -112,7 +113,7 @@ impl VolumeFit<'_> {
     fn information(
         &self,
         profile: &Profile<'_>,
-        poses: &[Pose],
+        poses: &[SettledPose],
         estimate: &VolumeEstimate,
         share: f64,
     ) -> Result<Information, ContainerError> {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Liquid, Pose, Ties};
+use super::{ErrorCorrelation, Liquid, SettledPose};
 use crate::container::{Container, ContainerError};
 use crate::wrench::{Departures, Grasp};
 
@@ -44,9 +44,10 @@ pub(super) struct Profile<'a> {
     tilts: Vec<f64>,
     /// Torque of everything but the liquid, N m.
     shell: Vec<f64>,
-    /// Measured torque less that, N m; made independent where errors are tied.
+    /// Measured torque less that, N m; whitened where the errors are correlated.
     excess: Vec<f64>,
-    triangle: Option<DMatrix<f64>>,
+    /// The Cholesky factor of the errors' correlation; none where they are independent.
+    factor: Option<DMatrix<f64>>,
 }
 
 impl<'a> Profile<'a> {
@@ -54,8 +55,8 @@ impl<'a> Profile<'a> {
         container: &'a dyn Container,
         grasp: &'a Grasp,
         departures: &'a Departures,
-        ties: Ties,
-        poses: &[Pose],
+        correlation: ErrorCorrelation,
+        poses: &[SettledPose],
     ) -> Result<Self, ContainerError> {
         let tilts: Vec<f64> = poses.iter().map(|p| p.tilt_rad).collect();
         let mut profile = Self {
@@ -65,7 +66,7 @@ impl<'a> Profile<'a> {
             capacity_m3: container.capacity_m3(),
             shell: Vec::with_capacity(tilts.len()),
             excess: Vec::with_capacity(tilts.len()),
-            triangle: ties.triangle(tilts.len()),
+            factor: correlation.factor(tilts.len()),
             tilts,
         };
         for pose in poses {
@@ -74,7 +75,7 @@ impl<'a> Profile<'a> {
             profile.excess.push(pose.wrench.tau_z_nm - shell);
         }
         let mut excess = std::mem::take(&mut profile.excess);
-        profile.free(&mut excess);
+        profile.whiten(&mut excess);
         profile.excess = excess;
         Ok(profile)
     }
@@ -97,21 +98,21 @@ impl<'a> Profile<'a> {
         Ok(self.torque(tilt_rad, 1.0, share)? - self.torque(tilt_rad, 0.0, share)?)
     }
 
-    /// Makes values of all poses whose errors are tied those of poses with errors of their own.
-    fn free(&self, values: &mut [f64]) {
-        let Some(l) = &self.triangle else { return };
+    /// Whitens values of all poses.
+    fn whiten(&self, values: &mut [f64]) {
+        let Some(l) = &self.factor else { return };
         for i in 0..values.len() {
-            let tied: f64 = (0..i).map(|j| l[(i, j)] * values[j]).sum();
-            values[i] = (values[i] - tied) / l[(i, i)];
+            let predicted: f64 = (0..i).map(|j| l[(i, j)] * values[j]).sum();
+            values[i] = (values[i] - predicted) / l[(i, i)];
         }
     }
 
-    /// Torques of a kilogram of the liquid at all poses, N m / kg; made independent as the excess is.
+    /// Torques of a kilogram of the liquid at all poses, N m / kg; whitened as the excess is.
     pub(super) fn levers(&self, share: f64) -> Result<Vec<f64>, ContainerError> {
         let pairs = self.tilts.iter().zip(&self.shell);
         let lever = |(tilt, shell): (&f64, &f64)| Ok(self.torque(*tilt, 1.0, share)? - shell);
         let mut levers = pairs.map(lever).collect::<Result<Vec<f64>, ContainerError>>()?;
-        self.free(&mut levers);
+        self.whiten(&mut levers);
         Ok(levers)
     }
 

@@ -2,7 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "not every test needs all; a test stops where it fails")]
 
 use liquid_haptics::container::Cylinder;
-use liquid_haptics::volume::{Liquid, Pose, Ties, VolumeEstimate, VolumeFit};
+use liquid_haptics::volume::{ErrorCorrelation, Liquid, SettledPose, VolumeEstimate, VolumeFit};
 use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -34,12 +34,12 @@ pub(crate) fn tilts() -> Vec<f64> {
 }
 
 /// Poses without noise: eq. 2.1 written out here, the liquid's centre of mass by quadrature (to some 1e-6 of the radius).
-pub(crate) fn sweep(tilts: &[f64], mass: f64, share: f64) -> Vec<Pose> {
+pub(crate) fn sweep(tilts: &[f64], mass: f64, share: f64) -> Vec<SettledPose> {
     sweep_at(tilts, mass, share, 0.12)
 }
 
 /// The same, gripped at a height (m).
-pub(crate) fn sweep_at(tilts: &[f64], mass: f64, share: f64, grasp: f64) -> Vec<Pose> {
+pub(crate) fn sweep_at(tilts: &[f64], mass: f64, share: f64, grasp: f64) -> Vec<SettledPose> {
     let pose = |&tilt_rad: &f64| {
         let (sin, cos) = tilt_rad.sin_cos();
         let liquid = if mass > 0.0 {
@@ -49,15 +49,15 @@ pub(crate) fn sweep_at(tilts: &[f64], mass: f64, share: f64, grasp: f64) -> Vec<
             0.0
         };
         let tau_z_nm = -9.80665 * (0.1 * (0.08 - grasp) * sin + liquid);
-        Pose { tilt_rad, wrench: PlanarWrench { fx_n: 0.0, fy_n: -9.80665 * (1.0 + mass), tau_z_nm } }
+        SettledPose { tilt_rad, wrench: PlanarWrench { fx_n: 0.0, fy_n: -9.80665 * (1.0 + mass), tau_z_nm } }
     };
     tilts.iter().map(pose).collect()
 }
 
-pub(crate) fn noisy(poses: &[Pose], rng: &mut ChaCha8Rng) -> Vec<Pose> {
+pub(crate) fn noisy(poses: &[SettledPose], rng: &mut ChaCha8Rng) -> Vec<SettledPose> {
     let mut draw = |sigma: f64| sigma * Distribution::<f64>::sample(&StandardNormal, rng);
     let mut out = poses.to_vec();
-    for Pose { wrench, .. } in &mut out {
+    for SettledPose { wrench, .. } in &mut out {
         wrench.fx_n += draw(SIGMA_N);
         wrench.fy_n += draw(SIGMA_N);
         wrench.tau_z_nm += draw(SIGMA_NM);
@@ -76,7 +76,7 @@ pub(crate) fn fit<'a>(container: &'a Cylinder, liquid: Liquid, sigma_nm: Option<
         departures: NONE,
         liquid,
         sigma_nm,
-        ties: Ties::NONE,
+        error_correlation: ErrorCorrelation::NONE,
         widest_share: 0.5,
     }
 }

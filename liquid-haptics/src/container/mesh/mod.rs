@@ -1,4 +1,4 @@
-//! A cavity of any shape, as a closed triangle mesh.
+//! A cavity of any shape, as a closed triangle mesh (feature `mesh`, on by default).
 //!
 //! Several cavities and concave ones are fine. The liquid is where the cavity is below one level: air that would be trapped under
 //! a ledge, and liquid that could not flow from one part of the cavity to another, are not modelled.
@@ -6,9 +6,11 @@
 mod check;
 mod cut;
 mod error;
+mod leaf;
 mod plan;
 mod planned;
 mod read;
+mod sums;
 
 pub use error::MeshError;
 pub use plan::MeshPlan;

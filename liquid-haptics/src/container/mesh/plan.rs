@@ -1,7 +1,7 @@
 //! Volume and first moments below a level, for one direction of up, without clipping the mesh.
 //!
 //! Between two neighbouring vertex heights the area of the level cut is quadratic in the height, its first moments cubic: sums over
-//! the segments in which triangles cross the level ([`Cut`]). The heights are cut into intervals (leaves), and blocks of them. Where
+//! the segments in which triangles cross the level (`cut`). The heights are cut into intervals (leaves), and blocks of them. Where
 //! a triangle begins and ends within a block its segment's polynomial is added and taken away again, to be summed along the block;
 //! the blocks that it crosses get it by the O(log n) nodes of a binary tree that cover them, whose sums are handed down.
 //!
@@ -10,21 +10,13 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use super::cut::{Cut, Edge};
+use super::cut::Edge;
+use super::leaf::Leaf;
+use super::sums::Sums;
 use crate::container::{ContainerError, Fill};
 
-/// Leaves of a block.
-const BLOCK: usize = 256;
 /// A segment may run out of the mesh by this many times its size within a block.
 const FAR: f64 = 8.0;
-
-/// One interval between vertex heights: polynomials in `t` from 0 to 1 over it, and what lies below it.
-#[derive(Debug, Clone, Copy, Default)]
-struct Leaf {
-    cut: Cut,
-    /// Volume, moment along up, and moments across, below the interval; about the reference point.
-    below: [f64; 4],
-}
 
 /// A mesh seen along one direction: answers in O(log n), after O(n log n).
 #[derive(Debug, Clone)]
@@ -170,157 +162,5 @@ impl MeshPlan {
             surface_height_m: low + t * span + origin,
             center_of_mass: self.reference.coords + center,
         })
-    }
-}
-
-/// The leaves' cuts in the making.
-struct Sums<'a> {
-    heights: &'a [f64],
-    leaves: &'a mut [Leaf],
-    /// What begins and, with the other sign, ends with each leaf, over the leaf's block.
-    steps: Vec<Cut>,
-    /// Cuts of whole blocks, a binary tree.
-    tree: Vec<Cut>,
-    blocks: usize,
-    far: f64,
-}
-
-impl<'a> Sums<'a> {
-    fn new(heights: &'a [f64], leaves: &'a mut [Leaf], far: f64) -> Self {
-        let count = leaves.len().div_ceil(BLOCK);
-        let blocks = count.next_power_of_two();
-        let steps = vec![Cut::default(); leaves.len()];
-        Self { heights, leaves, steps, tree: vec![Cut::default(); 2 * blocks], blocks, far }
-    }
-
-    /// Adds the segment between two edges to the leaves from `from` to before `to`.
-    fn add(&mut self, from: usize, to: usize, down: &Edge, up: &Edge) {
-        let (first, last) = (from / BLOCK, (to - 1) / BLOCK);
-        // Blocks that are crossed whole.
-        let (mut l, mut r) = (first + 1, last);
-        if first == last {
-            self.within(from, to, down, up);
-        } else {
-            self.within(from, (first + 1) * BLOCK, down, up);
-            self.within(last * BLOCK, to, down, up);
-        }
-        l += self.blocks;
-        r += self.blocks;
-        while l < r {
-            if l & 1 == 1 {
-                self.cross(l, down, up);
-                l += 1;
-            }
-            if r & 1 == 1 {
-                r -= 1;
-                self.cross(r, down, up);
-            }
-            (l, r) = (l >> 1, r >> 1);
-        }
-    }
-
-    /// Within one block.
-    fn within(&mut self, from: usize, to: usize, down: &Edge, up: &Edge) {
-        let start = from - from % BLOCK;
-        let end = (start + BLOCK).min(self.leaves.len());
-        let at = |leaf: usize| self.heights[leaf];
-        let ends = [down, up].map(|edge| [edge.at(at(start)), edge.at(at(end))]);
-        let reach = ends.iter().flatten().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
-        if reach <= self.far {
-            let cut = Cut::between(ends[0], ends[1]);
-            self.steps[from].add(&cut, 1.0);
-            if to < end {
-                self.steps[to].add(&cut, -1.0);
-            }
-            return;
-        }
-        for leaf in from..to {
-            let ends = [down, up].map(|edge| [edge.clamped(at(leaf)), edge.clamped(at(leaf + 1))]);
-            self.leaves[leaf].cut.add(&Cut::between(ends[0], ends[1]), 1.0);
-        }
-    }
-
-    /// The blocks below a node of the tree, as leaves.
-    fn range(&self, node: usize) -> (usize, usize) {
-        let below = self.blocks.trailing_zeros() - node.ilog2();
-        let first = (node << below) - self.blocks;
-        let end = first + (1 << below);
-        ((first * BLOCK).min(self.leaves.len()), (end * BLOCK).min(self.leaves.len()))
-    }
-
-    fn cross(&mut self, node: usize, down: &Edge, up: &Edge) {
-        let (from, to) = self.range(node);
-        let (low, high) = (self.heights[from], self.heights[to]);
-        let ends = [down, up].map(|edge| [edge.clamped(low), edge.clamped(high)]);
-        self.tree[node].add(&Cut::between(ends[0], ends[1]), 1.0);
-    }
-
-    /// Hands the sums down to the leaves.
-    fn settle(&mut self) {
-        let place = |outer: (usize, usize), inner: (usize, usize)| {
-            let span = self.heights[outer.1] - self.heights[outer.0];
-            let begin = (self.heights[inner.0] - self.heights[outer.0]) / span;
-            (begin, (self.heights[inner.1] - self.heights[inner.0]) / span)
-        };
-        for node in 1..self.blocks {
-            let outer = self.range(node);
-            for child in [2 * node, 2 * node + 1] {
-                let inner = self.range(child);
-                if inner.0 < inner.1 {
-                    let (begin, width) = place(outer, inner);
-                    let part = self.tree[node].part(begin, width);
-                    self.tree[child].add(&part, 1.0);
-                }
-            }
-        }
-        for block in 0..self.leaves.len().div_ceil(BLOCK) {
-            let outer = self.range(self.blocks + block);
-            let mut here = self.tree[self.blocks + block];
-            for leaf in outer.0..outer.1 {
-                here.add(&self.steps[leaf], 1.0);
-                let (begin, width) = place(outer, (leaf, leaf + 1));
-                self.leaves[leaf].cut.add(&here.part(begin, width), 1.0);
-            }
-        }
-    }
-}
-
-impl Leaf {
-    /// Volume and moments below `t` within the interval.
-    fn up_to(&self, t: f64, low: f64, span: f64) -> [f64; 4] {
-        let t = t.clamp(0.0, 1.0);
-        let [a, b, c] = self.cut.area;
-        let volume = span * t * (a + t * (b / 2.0 + t * c / 3.0));
-        let lifted = span * span * t * t * (a / 2.0 + t * (b / 3.0 + t * c / 4.0));
-        let moment = |m: &[f64; 4]| span * t * (m[0] + t * (m[1] / 2.0 + t * (m[2] / 3.0 + t * m[3] / 4.0)));
-        [
-            self.below[0] + volume,
-            self.below[1] + low * volume + lifted,
-            self.below[2] + moment(&self.cut.moments[0]),
-            self.below[3] + moment(&self.cut.moments[1]),
-        ]
-    }
-
-    /// The `t` below which lies a volume, given over the interval's span: Newton's method between brackets.
-    fn height_of(&self, volume: f64) -> f64 {
-        let [a, b, c] = self.cut.area;
-        let (mut low, mut high) = (0.0, 1.0);
-        let mut t = 0.5;
-        for _ in 0..60 {
-            let value = t * (a + t * (b / 2.0 + t * c / 3.0)) - volume;
-            if value < 0.0 {
-                low = t;
-            } else {
-                high = t;
-            }
-            let newton = t - value / (a + t * (b + t * c));
-            let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
-            let still = (next - t).abs() <= 1e-16;
-            t = next;
-            if still || value == 0.0 {
-                break;
-            }
-        }
-        t
     }
 }

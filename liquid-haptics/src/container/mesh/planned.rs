@@ -1,4 +1,4 @@
-//! A mesh that keeps the plans of the tilts it was asked about.
+//! A mesh with a memo of the plans of the tilts that it was asked about.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -7,8 +7,7 @@ use std::f64::consts::PI;
 
 use nalgebra::DMatrix;
 
-use super::upright::lowest;
-use super::{Sums, gauss};
+use super::ritz::{Integrals, gauss, lowest};
 
 /// Harmonic polynomials that the mode is made of.
 const TERMS: usize = 9;
@@ -27,7 +26,7 @@ struct Figure<'a> {
 
 impl Figure<'_> {
     /// The wall goes from the surface's rim (0) to the axis (1), heights from the surface.
-    fn solve(&self, around: &dyn Fn(f64, f64) -> f64) -> Option<Sums> {
+    fn solve(&self, around: &dyn Fn(f64, f64) -> f64) -> Option<Integrals> {
         let rim = (self.wall)(0.0)[0];
         let nodes = gauss(NODES);
         let (mut stiff, mut mass) = (DMatrix::zeros(TERMS, TERMS), DMatrix::zeros(TERMS, TERMS));
@@ -61,7 +60,7 @@ impl Figure<'_> {
             wall += w * length * (self.weight)(x) * (tangent * tangent + around(x, value));
         }
         // The surface's integral is 1, so that the volume's is the wave number.
-        Some(Sums { wave_number, volume: wave_number, wall })
+        Some(Integrals { wave_number, volume: wave_number, wall })
     }
 
     fn sum(&self, shape: &[f64], x: f64, z: f64) -> [f64; 3] {
@@ -83,7 +82,7 @@ impl Figure<'_> {
 }
 
 /// The first mode, once around the axis, of a body of revolution under a level surface.
-pub(super) fn axisymmetric(wall: &dyn Fn(f64) -> [f64; 2]) -> Option<Sums> {
+pub(super) fn axisymmetric(wall: &dyn Fn(f64) -> [f64; 2]) -> Option<Integrals> {
     // rho^n P_n^1 with the factor r written out: phi = r q(r, z) cos(angle); by the recursion of solid harmonics.
     let terms = |r: f64, z: f64| {
         let square = r * r + z * z;
@@ -110,7 +109,7 @@ pub(super) fn axisymmetric(wall: &dyn Fn(f64) -> [f64; 2]) -> Option<Sums> {
 }
 
 /// The first mode across a canal of a length, with its two end walls.
-pub(super) fn canal(wall: &dyn Fn(f64) -> [f64; 2], length: f64) -> Option<Sums> {
+pub(super) fn canal(wall: &dyn Fn(f64) -> [f64; 2], length: f64) -> Option<Integrals> {
     // Im((z + i x)^n): odd across.
     let terms = |x: f64, z: f64| {
         let mut out = [[0.0; 3]; TERMS];
@@ -127,5 +126,5 @@ pub(super) fn canal(wall: &dyn Fn(f64) -> [f64; 2], length: f64) -> Option<Sums>
     let figure = Figure { wall, terms: &terms, weight: &|_| 2.0 };
     let sums = figure.solve(&|_, _| 0.0)?;
     // Each end has the gradient of the whole section: as much as a unit of length of the volume.
-    Some(Sums { wall: sums.wall + 2.0 * sums.volume / length, ..sums })
+    Some(Integrals { wall: sums.wall + 2.0 * sums.volume / length, ..sums })
 }

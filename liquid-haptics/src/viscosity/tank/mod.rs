@@ -14,11 +14,10 @@
 
 mod harmonic;
 mod published;
+mod ritz;
 mod upright;
 
 pub use published::PublishedLaw;
-
-use std::f64::consts::PI;
 
 use super::ViscosityError;
 
@@ -101,7 +100,7 @@ impl TankMode {
     }
 
     /// Kinematic viscosity (m^2/s) of a damping ratio, of which the walls' boundary layers make up `1 / excess`: 1 for clean ones,
-    /// [`MEASURED_OVER_COMPUTED`] for those of the thesis's law.
+    /// [`MEASURED_OVER_COMPUTED`] for those of the law of [Matl 2021], eq. 2.4.
     pub fn kinematic_viscosity_m2_s(&self, damping_ratio: f64, excess: f64, gravity_m_s2: f64) -> f64 {
         (damping_ratio.max(0.0) / (excess * self.c1)).powi(2) * self.unit(gravity_m_s2)
     }
@@ -109,14 +108,6 @@ impl TankMode {
     fn unit(&self, gravity: f64) -> f64 {
         self.length_m.powf(1.5) * gravity.sqrt()
     }
-}
-
-/// Integrals over a mode's potential: its `omega^2 / g`, the squares of its gradient over volume and over wall.
-#[derive(Debug, Clone, Copy)]
-struct Sums {
-    wave_number: f64,
-    volume: f64,
-    wall: f64,
 }
 
 impl Tank {
@@ -142,23 +133,9 @@ impl Tank {
                 let wall = |t: f64| [tangent * depth_m * (1.0 - t), -depth_m * t];
                 (tangent * depth_m, harmonic::axisymmetric(&wall))
             }
-            Self::Sphere { radius_m, depth_m } => {
-                let center = radius_m - depth_m;
-                let rim = (center / radius_m).clamp(-1.0, 1.0).acos();
-                let wall = |t: f64| {
-                    let (sin, cos) = (rim * (1.0 - t)).sin_cos();
-                    [radius_m * sin, center - radius_m * cos]
-                };
-                (radius_m, harmonic::axisymmetric(&wall))
-            }
+            Self::Sphere { radius_m, depth_m } => (radius_m, harmonic::axisymmetric(&arc(radius_m, depth_m))),
             Self::HorizontalCylinder { radius_m, length_m, depth_m } => {
-                let center = radius_m - depth_m;
-                let rim = (center / radius_m).clamp(-1.0, 1.0).acos();
-                let wall = |t: f64| {
-                    let (sin, cos) = (rim * (1.0 - t)).sin_cos();
-                    [radius_m * sin, center - radius_m * cos]
-                };
-                (radius_m, harmonic::canal(&wall, length_m))
+                (radius_m, harmonic::canal(&arc(radius_m, depth_m), length_m))
             }
         };
         let Some(sums) = sums.filter(|s| s.wave_number > 0.0 && s.volume > 0.0) else {
@@ -210,29 +187,22 @@ impl Tank {
     }
 }
 
-/// Gauss-Legendre nodes and weights on [0, 1] of that many points, by Newton's method on the polynomial.
-fn gauss(points: usize) -> Vec<(f64, f64)> {
-    (0..points)
-        .map(|k| {
-            let mut x = (PI * (k as f64 + 0.75) / (points as f64 + 0.5)).cos();
-            let mut slope = 1.0;
-            for _ in 0..20 {
-                let (mut before, mut here) = (1.0, x);
-                for n in 2..=points {
-                    let n = n as f64;
-                    (before, here) = (here, ((2.0 * n - 1.0) * x * here - (n - 1.0) * before) / n);
-                }
-                slope = points as f64 * (x * here - before) / (x * x - 1.0);
-                x -= here / slope;
-            }
-            (0.5 * (1.0 - x), 1.0 / ((1.0 - x * x) * slope * slope))
-        })
-        .collect()
+/// The wetted arc of a circle as the wall's profile: distance from the axis and height above the surface, from the rim (0) to the lowest
+/// point (1).
+fn arc(radius_m: f64, depth_m: f64) -> impl Fn(f64) -> [f64; 2] {
+    let center = radius_m - depth_m;
+    let rim = (center / radius_m).clamp(-1.0, 1.0).acos();
+    move |t| {
+        let (sin, cos) = (rim * (1.0 - t)).sin_cos();
+        [radius_m * sin, center - radius_m * cos]
+    }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use std::f64::consts::PI;
+
     use super::*;
 
     /// The deep cylinder: 1.8412, and C1 = (1 + xi^2) / ((xi^2 - 1) sqrt(8) xi^(1/4)), integrated by hand over Bessel's function.
@@ -246,9 +216,9 @@ mod tests {
         approx::assert_relative_eq!(0.79 / mode.c1, MEASURED_OVER_COMPUTED, max_relative = 1e-3);
     }
 
-    /// The thesis's factor for shallow liquid (eq. 2.4) is an empirical one: near the theory's down to half a radius.
+    /// The factor for shallow liquid of [Matl 2021], eq. 2.4, is empirical: near the theory's down to half a radius.
     #[test]
-    fn the_shallow_cylinder_follows_the_thesis() {
+    fn the_shallow_cylinder_follows_the_published_factor() {
         let deep = Tank::UprightCylinder { radius_m: 1.0, depth_m: 20.0 }.mode().unwrap();
         for depth_m in [0.5, 0.7, 1.0, 1.5] {
             let mode = Tank::UprightCylinder { radius_m: 1.0, depth_m }.mode().unwrap();

@@ -39,7 +39,7 @@ impl PublishedLaw {
 }
 
 impl Tank {
-    /// The measured law for this shape, where one was found: upright cylinder (thesis eq. 2.4), sphere, cone. None for the ring, the box
+    /// The measured law for this shape, where one was found: upright cylinder ([Matl 2021], eq. 2.4), sphere, cone. None for the ring, the box
     /// and the cylinder on its side: theirs is [`Tank::mode`]'s alone.
     ///
     /// # Errors

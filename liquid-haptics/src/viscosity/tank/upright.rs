@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
-use super::{Sums, gauss};
+use super::ritz::{Integrals, gauss, lowest};
 
 /// Powers of the radius that the mode's shape is made of.
 const POWERS: usize = 10;
@@ -18,7 +18,7 @@ fn upward(k: f64, depth: f64) -> [f64; 2] {
 }
 
 /// The box, its mode cos(pi x / length).
-pub(super) fn rectangular(length: f64, width: f64, depth: f64) -> Sums {
+pub(super) fn rectangular(length: f64, width: f64, depth: f64) -> Integrals {
     let k = PI / length;
     let [even, odd] = upward(k, depth);
     let bottom = 1.0 - (k * depth).tanh().powi(2);
@@ -28,11 +28,11 @@ pub(super) fn rectangular(length: f64, width: f64, depth: f64) -> Sums {
     let ends = 2.0 * width * k * k * odd;
     let sides = length * k * k * (even + odd);
     let floor = 0.5 * length * width * k * k * bottom;
-    Sums { wave_number: k * tanh, volume, wall: ends + sides + floor }
+    Integrals { wave_number: k * tanh, volume, wall: ends + sides + floor }
 }
 
 /// The ring (a cylinder where `inner` is 0), its first mode once around: Bessel's equation by Ritz's method in powers of the radius.
-pub(super) fn annulus(outer: f64, inner: f64, depth: f64) -> Option<Sums> {
+pub(super) fn annulus(outer: f64, inner: f64, depth: f64) -> Option<Integrals> {
     // In units of the outer radius; shifted Legendre polynomials times r (times 1 in a ring) keep the matrices well conditioned.
     let low = inner / outer;
     let nodes = gauss(3 * POWERS);
@@ -77,16 +77,5 @@ pub(super) fn annulus(outer: f64, inner: f64, depth: f64) -> Option<Sums> {
             wall += PI * r * outer * value * value * (even / (r * outer).powi(2) + k * k * odd);
         }
     }
-    Some(Sums { wave_number: k * tanh, volume, wall })
-}
-
-/// The lowest eigenvalue of `stiff x = lambda mass x` (the mass may be singular), and its vector of unit mass.
-pub(super) fn lowest(stiff: &DMatrix<f64>, mass: &DMatrix<f64>) -> Option<(f64, Vec<f64>)> {
-    let lower = stiff.clone().cholesky()?.l();
-    let half = lower.solve_lower_triangular(mass)?;
-    let whole = lower.solve_lower_triangular(&half.transpose())?;
-    let eigen = SymmetricEigen::new(0.5 * (&whole + whole.transpose()));
-    let (k, inverse) = eigen.eigenvalues.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let vector = lower.transpose().solve_upper_triangular(&eigen.eigenvectors.column(k).into_owned())?;
-    (inverse > 0.0).then(|| (1.0 / inverse, vector.iter().map(|v| v / inverse.sqrt()).collect()))
+    Some(Integrals { wave_number: k * tanh, volume, wall })
 }

@@ -1,4 +1,4 @@
-//! How the torque's errors of one pose go with those of the next: a sensor that wanders.
+//! Correlation of the torque's errors from pose to pose: a sensor that wanders.
 
 use nalgebra::DMatrix;
 
@@ -9,40 +9,41 @@ const POINTS: usize = 17;
 const ROUNDS: usize = 5;
 /// Neither parameter comes nearer to 1 than this.
 const MOST: f64 = 0.995;
-/// Fewest residuals to estimate the ties from.
+/// Fewest errors to estimate the correlation from.
 const LEAST: usize = 20;
 
-/// Ties between the torque's errors at successive poses: a wander that each pose keeps a part of, beside a noise of its own.
+/// Correlation of the torque's errors at successive poses: a first-order autoregression, the wander, beside white noise.
 ///
-/// Two poses `n` apart have errors of the correlation `share keep^n`. A wander that poses share looks like a torque that another
-/// volume has: intervals that take it for noise are too narrow.
+/// The errors of two poses `n` apart have the correlation `share lag_one^n`. A wander that poses have in common looks like the torque of
+/// another volume: intervals that take it for white noise are too narrow.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ties {
+pub struct ErrorCorrelation {
     /// The wander's share of the errors' variance, 0 to below 1.
     share: f64,
-    /// What is left of the wander from one pose to the next, 0 to below 1: `exp(-time between poses / memory)`.
-    keep: f64,
+    /// Correlation of the wander from one pose to the next, 0 to below 1: `exp(-time between poses / time constant)`.
+    lag_one: f64,
 }
 
-impl Ties {
-    /// Every pose has an error of its own.
-    pub const NONE: Self = Self { share: 0.0, keep: 0.0 };
+impl ErrorCorrelation {
+    /// The errors are independent.
+    pub const NONE: Self = Self { share: 0.0, lag_one: 0.0 };
 
-    /// Ties as a sensor's maker or a calibration states them; both from 0 to below 1.
+    /// The correlation as a sensor's maker or a calibration states it: the wander's share of the variance and its correlation from one pose to
+    /// the next, both from 0 to below 1.
     ///
     /// # Errors
     /// [`VolumeError::Range`].
-    pub fn new(share: f64, keep: f64) -> Result<Self, VolumeError> {
-        for (name, got) in [("share", share), ("keep", keep)] {
+    pub fn new(share: f64, lag_one: f64) -> Result<Self, VolumeError> {
+        for (name, got) in [("share", share), ("lag_one", lag_one)] {
             if !((0.0..1.0).contains(&got)) {
                 return Err(VolumeError::Range { name, got, expected: "0 to below 1" });
             }
         }
-        Ok(Self { share, keep })
+        Ok(Self { share, lag_one })
     }
 
-    /// Ties by maximum likelihood from the torque's errors in sweeps of a load that is known, such as the empty container (measured
-    /// less modelled, in the order of the poses; at least 20 in all), and the errors' standard deviation in the same unit.
+    /// The correlation of greatest likelihood given the torque's errors in sweeps of a load that is known, such as the empty container
+    /// (measured less modelled, in the order of the poses; at least 20 in all), and the errors' standard deviation in the same unit.
     ///
     /// # Errors
     /// [`VolumeError::TooFew`], [`VolumeError::Pose`] for an error that is no number (counted over all sweeps).
@@ -60,48 +61,48 @@ impl Ties {
             let step: [f64; 2] = std::array::from_fn(|k| (high[k] - low[k]) / (POINTS - 1) as f64);
             for i in 0..POINTS * POINTS {
                 let share = low[0] + step[0] * (i / POINTS) as f64;
-                let ties = Self { share, keep: low[1] + step[1] * (i % POINTS) as f64 };
-                let (likelihood, variance) = ties.likelihood(errors);
+                let correlation = Self { share, lag_one: low[1] + step[1] * (i % POINTS) as f64 };
+                let (likelihood, variance) = correlation.likelihood(errors);
                 if likelihood > best.0 {
-                    best = (likelihood, ties, variance);
+                    best = (likelihood, correlation, variance);
                 }
             }
-            let middle = [best.1.share, best.1.keep];
+            let middle = [best.1.share, best.1.lag_one];
             low = std::array::from_fn(|k| (middle[k] - step[k]).max(0.0));
             high = std::array::from_fn(|k| (middle[k] + step[k]).min(MOST));
         }
         Ok((best.1, best.2.sqrt()))
     }
 
-    /// Logarithm of the likelihood, and the variance at which it is greatest, by the Kalman filter of each sweep.
+    /// Log likelihood, and the variance at which it is greatest, by the Kalman filter of each sweep.
     fn likelihood(&self, errors: &[Vec<f64>]) -> (f64, f64) {
         let (mut squares, mut logarithms, mut count) = (0.0, 0.0, 0.0);
         for sweep in errors {
             let (mut wander, mut variance) = (0.0, self.share);
             for error in sweep {
                 let spread = variance + 1.0 - self.share;
-                let surprise = error - wander;
-                squares += surprise * surprise / spread;
+                let innovation = error - wander;
+                squares += innovation * innovation / spread;
                 logarithms += spread.ln();
                 count += 1.0;
                 let gain = variance / spread;
-                wander = self.keep * (wander + gain * surprise);
+                wander = self.lag_one * (wander + gain * innovation);
                 let left = variance * (1.0 - gain);
-                variance = self.share + self.keep * self.keep * (left - self.share);
+                variance = self.share + self.lag_one * self.lag_one * (left - self.share);
             }
         }
         let variance = squares / count;
         (-0.5 * (logarithms + count * variance.max(f64::MIN_POSITIVE).ln()), variance)
     }
 
-    /// The lower triangle that makes independent errors of tied ones, by forward substitution; `None` where they are independent.
-    pub(super) fn triangle(&self, poses: usize) -> Option<DMatrix<f64>> {
-        let tied = |i: usize, j: usize| {
-            let wander = self.share * self.keep.powi(i.abs_diff(j) as i32);
+    /// The correlation matrix's Cholesky factor, by which forward substitution whitens errors; `None` where they are independent.
+    pub(super) fn factor(&self, poses: usize) -> Option<DMatrix<f64>> {
+        let correlation = |i: usize, j: usize| {
+            let wander = self.share * self.lag_one.powi(i.abs_diff(j) as i32);
             if i == j { 1.0 } else { wander }
         };
-        let free = self.share == 0.0 || self.keep == 0.0;
-        (!free).then(|| DMatrix::from_fn(poses, poses, tied).cholesky())?.map(|c| c.l())
+        let independent = self.share == 0.0 || self.lag_one == 0.0;
+        (!independent).then(|| DMatrix::from_fn(poses, poses, correlation).cholesky())?.map(|c| c.l())
     }
 }
 
@@ -118,36 +119,39 @@ mod tests {
     fn what_wanders_is_found() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
         let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
-        for (share, keep) in [(0.0, 0.0), (0.6, 0.5), (0.8, 0.9)] {
+        for (share, lag_one) in [(0.0, 0.0), (0.6, 0.5), (0.8, 0.9)] {
             let errors: Vec<Vec<f64>> = (0..200)
                 .map(|_| {
                     let mut wander = f64::sqrt(share) * draw();
                     (0..19)
                         .map(|_| {
                             let error = 3e-4 * (wander + f64::sqrt(1.0 - share) * draw());
-                            wander = keep * wander + f64::sqrt(share * (1.0 - keep * keep)) * draw();
+                            wander = lag_one * wander + f64::sqrt(share * (1.0 - lag_one * lag_one)) * draw();
                             error
                         })
                         .collect()
                 })
                 .collect();
-            let (ties, sigma) = Ties::of_sweeps(&errors).unwrap();
+            let (found, sigma) = ErrorCorrelation::of_sweeps(&errors).unwrap();
             assert!((sigma / 3e-4 - 1.0).abs() < 0.08, "{sigma}");
-            assert!((ties.share * ties.keep - share * keep).abs() < 0.06, "{ties:?}");
-            assert!(share == 0.0 || (ties.keep - keep).abs() < 0.1, "{ties:?}");
+            assert!((found.share * found.lag_one - share * lag_one).abs() < 0.06, "{found:?}");
+            assert!(share == 0.0 || (found.lag_one - lag_one).abs() < 0.1, "{found:?}");
         }
     }
 
     #[test]
-    fn what_is_no_tie_is_refused() {
+    fn what_is_no_correlation_is_refused() {
         assert!(
-            Ties::new(1.0, 0.5).is_err()
-                && Ties::new(0.5, f64::NAN).is_err()
-                && Ties::new(0.5, -0.1).is_err()
+            ErrorCorrelation::new(1.0, 0.5).is_err()
+                && ErrorCorrelation::new(0.5, f64::NAN).is_err()
+                && ErrorCorrelation::new(0.5, -0.1).is_err()
         );
-        assert!(matches!(Ties::of_sweeps(&[vec![0.0; 5]]), Err(VolumeError::TooFew { got: 5, .. })));
+        assert!(matches!(
+            ErrorCorrelation::of_sweeps(&[vec![0.0; 5]]),
+            Err(VolumeError::TooFew { got: 5, .. })
+        ));
         let mut errors = vec![0.1; 30];
         errors[12] = f64::NAN;
-        assert!(matches!(Ties::of_sweeps(&[errors]), Err(VolumeError::Pose { index: 12, .. })));
+        assert!(matches!(ErrorCorrelation::of_sweeps(&[errors]), Err(VolumeError::Pose { index: 12, .. })));
     }
 }
