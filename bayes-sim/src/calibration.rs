@@ -14,7 +14,7 @@ use crate::scaling::mean_sd;
 use crate::simulations::Simulations;
 
 /// A generator for row `i` alone, so that results do not depend on threads.
-fn dice(seed: u64, i: usize) -> ChaCha8Rng {
+fn generator(seed: u64, i: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(i as u64 + 1);
     rng
@@ -69,7 +69,7 @@ pub fn sbc_ranks(
     Ok(Ranks { ranks, draws })
 }
 
-/// Looks at each test simulation, in parallel, each with dice of its own.
+/// Looks at each test simulation, in parallel, each with a generator of its own.
 fn each<T: Send>(
     tests: &Simulations,
     draws: usize,
@@ -79,7 +79,7 @@ fn each<T: Send>(
     if draws == 0 {
         return Err(Error::Setting { name: "draws", value: 0.0, rule: "at least 1" });
     }
-    let row = |i| look(tests.theta().row(i), tests.x().row(i), &mut dice(seed, i));
+    let row = |i| look(tests.theta().row(i), tests.x().row(i), &mut generator(seed, i));
     (0..tests.len()).into_par_iter().map(row).collect()
 }
 
@@ -198,11 +198,11 @@ pub fn local_c2st(
     let mut rows: Vec<(Vec<f64>, f64)> = Vec::with_capacity(2 * tests.len());
     for i in 0..tests.len() {
         let (theta, x) = (tests.theta().row(i), tests.x().row(i));
-        let drawn = density.sample(x, 1, &mut dice(seed, i))?;
+        let drawn = density.sample(x, 1, &mut generator(seed, i))?;
         rows.push((theta.iter().chain(x).copied().collect(), 0.0));
         rows.push((drawn.row(0).iter().chain(x).copied().collect(), 1.0));
     }
-    let at = density.sample(observation, DRAWS, &mut dice(seed, tests.len()))?;
+    let at = density.sample(observation, DRAWS, &mut generator(seed, tests.len()))?;
     let mut asked: Vec<Vec<f64>> =
         at.rows().map(|t| t.iter().chain(observation).copied().collect()).collect();
     let width = rows[0].0.len();
@@ -218,11 +218,11 @@ pub fn local_c2st(
         let off = asked.iter().map(|a| (1.0 / (1.0 + (-classifier.logit(a)).exp()) - 0.5).powi(2));
         off.sum::<f64>() / DRAWS as f64
     };
-    let seen = statistic(&rows, &mut dice(seed, tests.len() + 1));
+    let seen = statistic(&rows, &mut generator(seed, tests.len() + 1));
     let as_large: usize = (0..null_trials)
         .into_par_iter()
         .map(|trial| {
-            let mut rng = dice(seed, tests.len() + 2 + trial);
+            let mut rng = generator(seed, tests.len() + 2 + trial);
             let mut shuffled = rows.clone();
             // A pair of one observation swaps its labels or does not.
             for pair in shuffled.chunks_exact_mut(2) {
@@ -235,7 +235,7 @@ pub fn local_c2st(
     Ok(LocalC2st { statistic: seen, p_value: (as_large + 1) as f64 / (null_trials + 1) as f64 })
 }
 
-/// Where an observation lies among simulations from its own posterior.
+/// Where an observation lies among simulations from its posterior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictiveCheck {
     /// For each feature, the share of simulations below the observation; near 0 or 1 where the model cannot reach it.
@@ -258,10 +258,10 @@ pub fn predictive_check(
     seed: u64,
 ) -> Result<PredictiveCheck, Error> {
     check_row("observation", observation, density.x_dim())?;
-    let theta = density.sample(observation, draws, &mut dice(seed, 0))?;
+    let theta = density.sample(observation, draws, &mut generator(seed, 0))?;
     let simulated: Vec<Option<Vec<f64>>> = (0..draws)
         .into_par_iter()
-        .map(|i| simulator.simulate(theta.row(i), &mut dice(seed, i + 1)).ok())
+        .map(|i| simulator.simulate(theta.row(i), &mut generator(seed, i + 1)).ok())
         .collect();
     let good: Points = Points::from_rows(observation.len(), simulated.iter().flatten().map(Vec::as_slice))?;
     if good.len() < 20 {
@@ -270,7 +270,7 @@ pub fn predictive_check(
     let n = good.len() as f64;
     let below: Vec<f64> = (0..observation.len())
         .map(|j| {
-            // Ties count half: a feature that is a count has many.
+            // Equal values count half: a feature that is a count has many.
             let at = |s: &[f64]| {
                 if s[j] < observation[j] {
                     1.0

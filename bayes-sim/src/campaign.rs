@@ -54,7 +54,7 @@ impl Shard {
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 }
 
-/// What is simulated. Draw `i` has its own seed, whichever shard, thread or session runs it.
+/// What is simulated. Draw `i` has its own seed, whichever shard or thread runs it, and when.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Campaign {
     /// Where parameters are drawn from.

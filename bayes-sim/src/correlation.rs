@@ -52,7 +52,7 @@ impl Correlation {
     }
 
     /// Correlated standard normals within a window, by rejection; none for a try that is refused. One after another is drawn within its
-    /// interval, and the whole kept in proportion to the mass of its path, against the most mass that intervals so wide can have.
+    /// interval, and the whole accepted in proportion to the mass of its path, against the most mass that intervals so wide can have.
     pub(crate) fn sample_within<R: Rng + ?Sized>(
         &self,
         window: &[[f64; 2]],
@@ -84,19 +84,19 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Draws within a window have the moments of plain draws that happen to fall into it.
+    /// Draws within a window have the moments of direct draws that happen to fall into it.
     #[test]
     fn within_a_window_draws_are_those_that_fall_into_it() {
         let matrix = DMatrix::from_row_slice(3, 3, &[1.0, 0.9, -0.4, 0.9, 1.0, -0.6, -0.4, -0.6, 1.0]);
         let correlation = Correlation::new(&matrix).unwrap();
         let window = [[-0.5, 1.5], [0.2, 2.0], [-3.0, 0.3]];
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let mut plain = Vec::new();
-        while plain.len() < 20_000 {
+        let mut direct = Vec::new();
+        while direct.len() < 20_000 {
             let white: Vec<f64> = (0..3).map(|_| StandardNormal.sample(&mut rng)).collect();
             let z = correlation.colour(&white);
             if z.iter().zip(&window).all(|(z, w)| *z >= w[0] && *z <= w[1]) {
-                plain.push(z);
+                direct.push(z);
             }
         }
         let drawn: Vec<Vec<f64>> =
@@ -105,7 +105,7 @@ mod tests {
         for i in 0..3 {
             for j in 0..=i {
                 let of = |z: &Vec<f64>| z[i] * if i == j { 1.0 } else { z[j] };
-                let [a, b] = [&plain, &drawn].map(|all| mean_sd(&all.iter().map(of).collect::<Vec<f64>>()));
+                let [a, b] = [&direct, &drawn].map(|all| mean_sd(&all.iter().map(of).collect::<Vec<f64>>()));
                 // Five standard errors of the difference.
                 assert!((a.0 - b.0).abs() < 5.0 * a.1 * (2.0 / 20_000.0_f64).sqrt(), "{i} {j}: {a:?} {b:?}");
             }

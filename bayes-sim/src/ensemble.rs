@@ -221,14 +221,14 @@ impl Ensemble {
                 Ok((member, report, ln))
             })
             .collect::<Result<_, Error>>()?;
-        let kept: Vec<_> = trained.into_iter().filter(|t| t.1.validation_loss.is_finite()).collect();
-        if kept.is_empty() {
+        let usable: Vec<_> = trained.into_iter().filter(|t| t.1.validation_loss.is_finite()).collect();
+        if usable.is_empty() {
             return Err(Error::Diverged);
         }
-        let columns: Vec<&[f64]> = kept.iter().map(|t| t.2.as_slice()).collect();
+        let columns: Vec<&[f64]> = usable.iter().map(|t| t.2.as_slice()).collect();
         let weights = stacking(&columns);
         let mut out = Self { members: Vec::new(), weights: Vec::new(), reports: Vec::new() };
-        for ((member, report, _), weight) in kept.into_iter().zip(weights) {
+        for ((member, report, _), weight) in usable.into_iter().zip(weights) {
             out.reports.push(report);
             // A member of no weight would only cost time.
             if weight > 0.01 {

@@ -22,7 +22,7 @@ pub(crate) struct Head {
     pub(crate) cut: Option<[Option<f64>; 2]>,
 }
 
-/// Numbers that one evaluation needs, kept between evaluations.
+/// Numbers that one evaluation needs; the memory serves the next one.
 #[derive(Debug, Default)]
 pub(crate) struct HeadScratch {
     log_terms: Vec<f64>,
@@ -167,7 +167,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     /// The same density written plainly, over dual numbers.
-    fn plain(head: &Head, out: &[Dual64], target: &[f64]) -> Dual64 {
+    fn reference(head: &Head, out: &[Dual64], target: &[f64]) -> Dual64 {
         let (d, stride) = (head.dim, head.stride());
         let mut weights = Dual64::from(0.0);
         let mut sum = Dual64::from(0.0);
@@ -210,7 +210,7 @@ mod tests {
                     let seeded = out.iter().enumerate();
                     let dual: Vec<Dual64> =
                         seeded.map(|(j, &o)| Dual64::new(o, if i == j { 1.0 } else { 0.0 })).collect();
-                    let value = plain(&head, &dual, &target);
+                    let value = reference(&head, &dual, &target);
                     assert!((loss - value.re).abs() < 1e-12 * value.re.abs().max(1.0));
                     let b = value.eps;
                     assert!((a - b).abs() < 1e-10 * b.abs().max(1.0), "{a} {b}");
@@ -269,10 +269,10 @@ mod tests {
                 (0..head.outputs() * batch).map(|i| rows[(i % batch) * head.outputs() + i / batch]).collect();
             let mut s = HeadScratch::default();
             let pairs = rows.chunks(head.outputs()).zip(targets.chunks(dim));
-            let plain: f64 = pairs.map(|(o, t)| head.loss(o, t, &mut s)).sum();
+            let reference: f64 = pairs.map(|(o, t)| head.loss(o, t, &mut s)).sum();
             let (double, exact) = by_hand::<f64>(&head, &columns, &targets);
             let (single, near) = by_hand::<f32>(&head, &columns, &targets);
-            assert!((plain - double).abs() < 1e-10, "{plain} {double}");
+            assert!((reference - double).abs() < 1e-10, "{reference} {double}");
             assert!((single - double).abs() < 1e-4, "{single} {double}");
             let largest = exact.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
             assert!(exact.iter().zip(&near).all(|(a, b)| (a - b).abs() < 1e-5 * largest.max(1.0)));

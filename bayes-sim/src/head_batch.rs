@@ -9,7 +9,7 @@ use crate::real::{LANES, Real, load, store};
 
 type Lanes<T> = [T; LANES];
 
-/// Numbers that one evaluation needs, kept between evaluations.
+/// Numbers that one evaluation needs; the memory serves the next one.
 pub(crate) struct BatchScratch<T> {
     target: Vec<Lanes<T>>,
     residual: Vec<Lanes<T>>,
@@ -102,7 +102,7 @@ impl Head {
         (0..window.count).map(ln).sum()
     }
 
-    /// Adds the log density of component `k` to its term; its own derivative goes into the gradient.
+    /// Adds the log density of component `k` to its term; its derivative goes into the gradient.
     #[inline(always)]
     fn component_lanes<T: Real>(
         &self,
@@ -150,19 +150,19 @@ impl Head {
                 }
                 for j in 0..i {
                     let l = load(&outputs[window.of(at + j)]);
-                    let mut own = [T::ZERO; LANES];
+                    let mut by_factor = [T::ZERO; LANES];
                     for b in 0..LANES {
                         s.mean_gradient[j][b] += scaled[b] * l[b];
-                        own[b] = -scaled[b] * s.residual[j][b];
+                        by_factor[b] = -scaled[b] * s.residual[j][b];
                     }
-                    store(&own, &mut gradient[window.of(at + j)]);
+                    store(&by_factor, &mut gradient[window.of(at + j)]);
                 }
             }
             at += i;
         }
         if let Some(gradient) = gradient {
-            for (i, own) in s.mean_gradient.iter().enumerate() {
-                store(own, &mut gradient[window.of(base + 1 + i)]);
+            for (i, by_mean) in s.mean_gradient.iter().enumerate() {
+                store(by_mean, &mut gradient[window.of(base + 1 + i)]);
             }
         }
         s.terms[k] = ln_density;
@@ -205,11 +205,11 @@ impl Head {
             }
             store(&logit, &mut gradient[window.of(k * stride)]);
             for column in k * stride + 1..(k + 1) * stride {
-                let mut own = load(&gradient[window.of(column)]);
+                let mut derivative = load(&gradient[window.of(column)]);
                 for b in 0..LANES {
-                    own[b] = -own[b] * share[b] * part;
+                    derivative[b] = -derivative[b] * share[b] * part;
                 }
-                store(&own, &mut gradient[window.of(column)]);
+                store(&derivative, &mut gradient[window.of(column)]);
             }
         }
     }

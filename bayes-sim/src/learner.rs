@@ -175,9 +175,9 @@ impl<T: Real> Learner<T> {
             },
         );
         if decay > 0.0 {
-            let keep = T::of(1.0 - rate * decay);
+            let shrink = T::of(1.0 - rate * decay);
             for block in self.hidden.iter().chain([&self.last, &self.linear]) {
-                self.params[block.range()].iter_mut().for_each(|p| *p = *p * keep);
+                self.params[block.range()].iter_mut().for_each(|p| *p = *p * shrink);
             }
         }
     }

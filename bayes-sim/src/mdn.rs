@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
+use crate::component::Component;
 use crate::ensemble::{Ensemble, Plan, networks};
 use crate::error::Error;
-use crate::mixture::{Component, Mixture};
+use crate::mixture::Mixture;
 use crate::network::Scratch;
 use crate::points::{Points, check_row};
 use crate::posterior::{ConditionalDensity, Posterior};

@@ -4,75 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::component::Component;
 use crate::error::Error;
-use crate::normal::{ln_norm, ln_sum_exp};
+use crate::normal::ln_sum_exp;
 use crate::points::{Points, check_length};
-
-/// One Gaussian: `factor (x - mean)` is standard normal, `factor` lower triangular with a positive diagonal.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Component {
-    pub(crate) ln_weight: f64,
-    pub(crate) mean: DVector<f64>,
-    pub(crate) factor: DMatrix<f64>,
-}
-
-impl Component {
-    pub(crate) fn from_covariance(
-        ln_weight: f64,
-        mean: DVector<f64>,
-        covariance: DMatrix<f64>,
-    ) -> Option<Self> {
-        let n = mean.len();
-        let lower = covariance.cholesky()?.unpack();
-        let factor = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
-        factor.iter().all(|f| f.is_finite()).then_some(Self { ln_weight, mean, factor })
-    }
-
-    /// From a precision matrix.
-    pub(crate) fn from_precision(
-        ln_weight: f64,
-        mean: DVector<f64>,
-        precision: DMatrix<f64>,
-    ) -> Option<Self> {
-        let covariance = precision.cholesky()?.inverse();
-        Self::from_covariance(ln_weight, mean, covariance)
-    }
-
-    pub(crate) fn dim(&self) -> usize {
-        self.mean.len()
-    }
-
-    fn ln_determinant(&self) -> f64 {
-        self.factor.diagonal().iter().map(|f| f.ln()).sum()
-    }
-
-    /// Log density, without the weight.
-    pub(crate) fn ln_density(&self, x: &[f64]) -> f64 {
-        let d = self.dim();
-        let mut squares = 0.0;
-        for i in 0..d {
-            let y: f64 = (0..=i).map(|j| self.factor[(i, j)] * (x[j] - self.mean[j])).sum();
-            squares += y * y;
-        }
-        ln_norm(d) + self.ln_determinant() - 0.5 * squares
-    }
-
-    pub(crate) fn precision(&self) -> DMatrix<f64> {
-        self.factor.transpose() * &self.factor
-    }
-
-    /// Lower triangular square root of the covariance.
-    pub(crate) fn spread(&self) -> DMatrix<f64> {
-        let n = self.dim();
-        // The diagonal is positive, so that the system has a solution.
-        self.factor.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap_or_else(|| DMatrix::zeros(n, n))
-    }
-
-    pub(crate) fn covariance(&self) -> DMatrix<f64> {
-        let spread = self.spread();
-        &spread * spread.transpose()
-    }
-}
 
 /// Gaussians with full covariance and weights that add up to one.
 #[derive(Debug, Clone, PartialEq)]
@@ -283,55 +218,6 @@ impl Mixture {
         let (mean, covariance) = self.moments();
         let made = Component::from_covariance(0.0, mean, covariance);
         Ok(Self { components: vec![made.ok_or(Error::NotPositiveDefinite { component: 0 })?] })
-    }
-
-    /// Local maxima, highest first, by fixed-point ascent from every component's mean (Carreira-Perpinan 2000,
-    /// doi:10.1109/34.888716).
-    pub fn modes(&self) -> Vec<Mode> {
-        let precisions: Vec<DMatrix<f64>> = self.components.iter().map(Component::precision).collect();
-        let mut modes: Vec<(Mode, DMatrix<f64>)> = Vec::new();
-        for c in &self.components {
-            let (at, curvature) = self.ascend(c.mean.clone(), &precisions);
-            let ln_density = self.ln_density_unchecked(at.as_slice());
-            // Nearer than a hundredth of the local width: the same.
-            let same = modes.iter_mut().find(|(m, p)| {
-                let away = &at - DVector::from_column_slice(&m.at);
-                (away.transpose() * p * &away)[0] < 1e-4
-            });
-            let mode = Mode { at: at.as_slice().to_vec(), ln_density };
-            match same {
-                Some(found) if found.0.ln_density < ln_density => *found = (mode, curvature),
-                Some(_) => {}
-                None => modes.push((mode, curvature)),
-            }
-        }
-        modes.sort_by(|a, b| b.0.ln_density.total_cmp(&a.0.ln_density));
-        modes.into_iter().map(|m| m.0).collect()
-    }
-
-    fn ascend(&self, mut at: DVector<f64>, precisions: &[DMatrix<f64>]) -> (DVector<f64>, DMatrix<f64>) {
-        let d = self.dim();
-        let mut total = DMatrix::zeros(d, d);
-        for _ in 0..500 {
-            let ln = self.ln_density_unchecked(at.as_slice());
-            total.fill(0.0);
-            let mut right = DVector::zeros(d);
-            for (c, precision) in self.components.iter().zip(precisions) {
-                let share = (c.ln_weight + c.ln_density(at.as_slice()) - ln).exp();
-                if share > 1e-12 {
-                    total += precision * share;
-                    right += precision * &c.mean * share;
-                }
-            }
-            let Some(factor) = total.clone().cholesky() else { break };
-            let next = factor.solve(&right);
-            let step = &next - &at;
-            at = next;
-            if (step.transpose() * &total * &step)[0] < 1e-16 {
-                break;
-            }
-        }
-        (at, total)
     }
 }
 

@@ -95,7 +95,7 @@ pub(crate) struct Network {
     pub(crate) params: Vec<f64>,
 }
 
-/// Activations of one batch, kept between batches.
+/// Activations of one batch; the memory serves the next one.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     layers: Vec<Vec<f64>>,

@@ -11,14 +11,16 @@ use crate::scaling::InputScaling;
 
 /// Neighbours over which distance is taken.
 const NEIGHBOURS: usize = 5;
-/// Most simulations kept, and most distances that say what is usual.
-const KEPT: usize = 2000;
+/// Most reference simulations, and most distances that say what is usual.
+const MOST: usize = 2000;
 
 /// What is usual among simulations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Novelty {
     scaling: InputScaling,
-    kept: Points,
+    /// Simulations that distances are taken to; files have it as `kept`.
+    #[serde(rename = "kept")]
+    reference: Points,
     low: Vec<f64>,
     high: Vec<f64>,
     /// Distances of simulations left out, ascending.
@@ -54,21 +56,21 @@ impl Novelty {
         let scaling = InputScaling::fit(x);
         let mut order: Vec<usize> = (0..x.len()).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-        let half = (x.len() / 2).min(KEPT);
+        let half = (x.len() / 2).min(MOST);
         let scaled = |indices: &[usize]| {
             let mut values = Vec::with_capacity(indices.len() * x.dim());
             indices.iter().for_each(|&i| scaling.apply(x.row(i), &mut values));
             Points::from_values(x.dim(), values)
         };
-        let (kept, left_out) = (scaled(&order[..half])?, scaled(&order[half..2 * half])?);
+        let (reference, left_out) = (scaled(&order[..half])?, scaled(&order[half..2 * half])?);
         let all = scaled(&order)?;
         let extreme = |pick: fn(f64, f64) -> f64, from: f64| -> Vec<f64> {
             (0..x.dim()).map(|j| all.column(j).into_iter().fold(from, pick)).collect()
         };
         let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
-        let mut usual: Vec<f64> = left_out.rows().map(|r| distance(&kept, r)).collect();
+        let mut usual: Vec<f64> = left_out.rows().map(|r| distance(&reference, r)).collect();
         usual.sort_by(f64::total_cmp);
-        Ok(Self { scaling, kept, low, high, usual })
+        Ok(Self { scaling, reference, low, high, usual })
     }
 
     /// Compares an observation with the simulations: its distance to its five nearest, against the same of simulations left out.
@@ -79,7 +81,7 @@ impl Novelty {
         check_row("observation", observation, self.scaling.dim())?;
         let mut z = Vec::with_capacity(observation.len());
         self.scaling.apply(observation, &mut z);
-        let far = distance(&self.kept, &z);
+        let far = distance(&self.reference, &z);
         let as_far = self.usual.len() - self.usual.partition_point(|u| *u < far);
         let beyond = (0..z.len()).filter(|&j| z[j] < self.low[j] || z[j] > self.high[j]).collect();
         Ok(Resemblance { p_value: (as_far + 1) as f64 / (self.usual.len() + 1) as f64, beyond })
@@ -87,9 +89,9 @@ impl Novelty {
 }
 
 /// Root mean square distance to the nearest.
-fn distance(kept: &Points, z: &[f64]) -> f64 {
+fn distance(reference: &Points, z: &[f64]) -> f64 {
     let mut nearest = [f64::INFINITY; NEIGHBOURS];
-    for row in kept.rows() {
+    for row in reference.rows() {
         let mut d: f64 = row.iter().zip(z).map(|(a, b)| (a - b) * (a - b)).sum();
         for n in &mut nearest {
             if d < *n {

@@ -45,7 +45,7 @@ pub trait ConditionalDensity: Sync {
 pub struct Draws {
     /// Parameters in their own units, all within the prior.
     pub theta: Points,
-    /// Share of the mixture's plain draws that fell within the prior's box.
+    /// Share of the mixture's direct draws that fell within the prior's box.
     pub acceptance: f64,
     /// Whether every draw is an exact one. Where hardly any mass is within the box, the rest are resampled from weighted ones.
     pub exact: bool,
@@ -120,7 +120,7 @@ impl Posterior {
     }
 
     /// Draws `count` parameter vectors in bounded time, whatever share of the mixture is outside the box: at most
-    /// `50 count + 1000` plain draws, and after them, for what is still missing, resampling from `20 count` weighted draws that
+    /// `50 count + 1000` direct draws, and after them, for what is still missing, resampling from `20 count` weighted draws that
     /// are inside by construction.
     pub fn sample<R: Rng + ?Sized>(&self, count: usize, rng: &mut R) -> Draws {
         let (d, bounds) = (self.prior.dim(), self.prior.bounds());
@@ -128,26 +128,26 @@ impl Posterior {
         let (spreads, weights) =
             (self.mixture.spreads(), cumulative(components.iter().map(|c| c.ln_weight.exp())));
         let mut values = Vec::with_capacity(count * d);
-        let (mut tries, mut kept) = (0_usize, 0_usize);
-        while kept < count && tries < 50 * count + 1000 {
+        let (mut tries, mut accepted) = (0_usize, 0_usize);
+        while accepted < count && tries < 50 * count + 1000 {
             let k = pick(&weights, rng);
             draw(&components[k].mean, &spreads[k], rng, &mut values);
             tries += 1;
-            if values[kept * d..].iter().zip(&bounds).all(|(u, b)| *u >= b[0] && *u <= b[1]) {
-                kept += 1;
+            if values[accepted * d..].iter().zip(&bounds).all(|(u, b)| *u >= b[0] && *u <= b[1]) {
+                accepted += 1;
             } else {
-                values.truncate(kept * d);
+                values.truncate(accepted * d);
             }
         }
-        if kept < count {
-            self.resample(count - kept, &bounds, rng, &mut values);
+        if accepted < count {
+            self.resample(count - accepted, &bounds, rng, &mut values);
         }
         let mut theta = Points::new(d);
         for u in values.chunks_exact(d) {
             // Lengths agree by construction.
             let _ = theta.push(&self.prior.values(u));
         }
-        Draws { theta, acceptance: kept as f64 / tries.max(1) as f64, exact: kept == count }
+        Draws { theta, acceptance: accepted as f64 / tries.max(1) as f64, exact: accepted == count }
     }
 
     /// Draws inside by construction, weighted by the mass of their path, resampled.

@@ -3,8 +3,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::component::Component;
 use crate::error::Error;
-use crate::mixture::{Component, Mixture};
+use crate::mixture::Mixture;
 use crate::normal::ln_sum_exp;
 use crate::posterior::Posterior;
 use crate::prior::Prior;

@@ -80,7 +80,7 @@ pub struct RoundReport {
     pub failures: usize,
     /// Share of the prior (of the box about the posterior's draws, where that is smaller) that was still drawn from.
     pub acceptance: f64,
-    /// Whether every draw was a plain one; otherwise some were resampled from the posterior by weights.
+    /// Whether every draw was a direct one; otherwise some were resampled from the posterior by weights.
     pub exact: bool,
 }
 
@@ -88,7 +88,7 @@ pub struct RoundReport {
 const CUT_OFF: f64 = 1e-4;
 /// Posterior draws that say where it is.
 const SCOUTS: usize = 5000;
-/// Plain draws for each that is wanted, before resampling.
+/// Direct draws for each that is wanted, before resampling.
 const TRIES: usize = 200;
 
 impl<D> Saved for Rounds<D>

@@ -1,4 +1,4 @@
-//! How wide an ensemble has to be, told by simulations that it was not trained on.
+//! How wide an ensemble has to be, learned from simulations that it was not trained on.
 
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -189,7 +189,7 @@ impl Court {
     fn seen(&mut self, by: f64, bounds: &[[f64; 2]], seed: u64) -> (f64, f64) {
         self.judges.iter_mut().for_each(|j| j.widen(by - self.at));
         self.at = by;
-        // The same dice for every factor, and for any number of threads.
+        // The same random numbers for every factor, and for any number of threads.
         let credibility = |(k, i): (usize, usize)| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(((k as u64) << 32) + i as u64);
@@ -210,7 +210,7 @@ mod tests {
     use super::*;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Targets linear in one input, with correlated noise of standard deviation 0.3, kept where they are below `most`.
+    /// Targets linear in one input, with correlated noise of standard deviation 0.3, accepted where they are below `most`.
     fn pairs(n: usize, target_dim: usize, most: f64, seed: u64) -> Pairs {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut out = Pairs { input_dim: 1, inputs: Vec::new(), target_dim, targets: Vec::new() };
@@ -246,9 +246,9 @@ mod tests {
             for off in [-0.25, 0.0, 0.4] {
                 let mut wrong = right.clone();
                 wrong.widen(off);
-                let told = wanted(vec![Judge::new(&wrong, unseen.select(0..unseen.len()))], &bounds, 5);
+                let found = wanted(vec![Judge::new(&wrong, unseen.select(0..unseen.len()))], &bounds, 5);
                 // The mean of 2000 credibilities is uncertain by 0.0065; it moves by 0.6 (three dimensions) or 0.3 with the logarithm.
-                assert!((told + off).abs() < 0.05, "{dim}: {off} {told}");
+                assert!((found + off).abs() < 0.05, "{dim}: {off} {found}");
             }
         }
     }

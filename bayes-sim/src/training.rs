@@ -292,17 +292,17 @@ mod tests {
             };
             let rows = Rows::<f64>::of(&pairs);
             let mut student = Student::new(&network, &head);
-            let plain = -ln_densities(&network, &head, &pairs).iter().sum::<f64>() / 7.0;
-            assert!((student.mean_loss(&rows) - plain).abs() < 1e-12);
+            let reference = -ln_densities(&network, &head, &pairs).iter().sum::<f64>() / 7.0;
+            assert!((student.mean_loss(&rows) - reference).abs() < 1e-12);
             student.gradient(&rows, &[0, 1, 2, 3, 4, 5, 6]);
             let gradient = student.learner.gradient.clone();
             for (i, g) in gradient.iter().enumerate() {
-                let kept = student.learner.params[i];
-                student.learner.params[i] = kept + 1e-5;
+                let before = student.learner.params[i];
+                student.learner.params[i] = before + 1e-5;
                 let up = student.mean_loss(&rows);
-                student.learner.params[i] = kept - 1e-5;
+                student.learner.params[i] = before - 1e-5;
                 let slope = (up - student.mean_loss(&rows)) / 2e-5;
-                student.learner.params[i] = kept;
+                student.learner.params[i] = before;
                 assert!((slope - g).abs() < 1e-8 + 1e-6 * slope.abs(), "{slope} {g}");
             }
         }

@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt};
 
-use crate::mixture::Component;
+use crate::component::Component;
 use crate::normal::{cdf, mass, pdf, richtmyer, truncated_quantile};
 
 /// A probability, and how far it may be off.

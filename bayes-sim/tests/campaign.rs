@@ -95,13 +95,13 @@ fn wrong_files_are_told() {
     ));
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.replacen("\"version\":1", "\"version\":7", 1)).unwrap();
-    let told = Results::read(&path).unwrap_err().to_string();
-    assert!(told.contains("version 7") && told.contains("version 1"), "{told}");
+    let message = Results::read(&path).unwrap_err().to_string();
+    assert!(message.contains("version 7") && message.contains("version 1"), "{message}");
     std::fs::write(&path, "a,b\n1,2\n").unwrap();
     assert!(matches!(Results::read(&path), Err(Error::Format { .. })));
     std::fs::write(&path, text + "garbage\n").unwrap();
-    let told = Results::read(&path).unwrap_err().to_string();
-    assert!(told.contains("garbage") && told.contains("line 62"), "{told}");
+    let message = Results::read(&path).unwrap_err().to_string();
+    assert!(message.contains("garbage") && message.contains("line 62"), "{message}");
     let shard = Shard { index: 3, count: 3 };
     assert!(matches!(run(&campaign(60), shard, &folder.path().join("new")), Err(Error::Setting { .. })));
 }

@@ -36,13 +36,13 @@ fn features_reproduce_their_kernel_and_not_the_other_form() {
             let kernel = Kernel { family, form, length_scale: 0.8 };
             for draw in [Draw::Random, Draw::QuasiRandom] {
                 let features = RandomFeatures::draw(&kernel, 3, 20_000, draw, &mut rng).unwrap();
-                let own = error(&features, &kernel, &pairs);
+                let matching = error(&features, &kernel, &pairs);
                 // The standard error of a mean of 20,000 cosines is at most 0.005.
-                assert!(own < 0.01, "{kernel:?} {draw:?}: {own}");
+                assert!(matching < 0.01, "{kernel:?} {draw:?}: {matching}");
                 if family != Family::Rbf {
                     let other = if form == Form::Product { Form::Isotropic } else { Form::Product };
                     let wrong = error(&features, &Kernel { form: other, ..kernel }, &pairs);
-                    assert!(wrong > 3.0 * own, "{kernel:?} {draw:?}: {own} {wrong}");
+                    assert!(wrong > 3.0 * matching, "{kernel:?} {draw:?}: {matching} {wrong}");
                 }
             }
         }

@@ -58,8 +58,8 @@ fn flat_and_log_normal_parameters_stand_side_by_side() {
     // Five standard errors of a product of standard normals.
     assert!((product + 0.7).abs() < 5.0 * 1.22 / f64::from(n).sqrt(), "{product}");
 
-    let tied = DMatrix::from_row_slice(3, 3, &[1.0, 0.1, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0]);
-    assert!(matches!(Prior::correlated(marginals.clone(), &tied), Err(Error::Correlation { .. })));
+    let correlated = DMatrix::from_row_slice(3, 3, &[1.0, 0.1, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    assert!(matches!(Prior::correlated(marginals.clone(), &correlated), Err(Error::Correlation { .. })));
     let skew = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.4, 0.0, 1.0]);
     assert!(matches!(Prior::correlated(marginals.clone(), &skew), Err(Error::Correlation { .. })));
     let none = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 1.5, 0.0, 1.0, 0.0, 1.5, 0.0, 1.0]);

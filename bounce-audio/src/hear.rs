@@ -2,6 +2,7 @@
 
 use crate::localise::{Array, ArrayError, LocaliseError, Localiser, Location};
 use crate::onset::{Instant, Listened, Onset, OnsetError, OnsetSettings};
+use crate::quantile::quantile;
 use crate::wav::Sound;
 use thiserror::Error;
 
@@ -11,7 +12,7 @@ const EXCUSED: f64 = 4.0;
 /// How impacts are heard.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HearSettings {
-    /// How impacts are told from the rest of the sound.
+    /// How impacts are distinguished from the rest of the sound.
     pub onset: OnsetSettings,
     /// The buffer that a place is found in starts this long before the onset, s.
     pub lead_s: f64,
@@ -113,7 +114,7 @@ pub struct Heard {
 
 /// The impacts in a recording without the microphones' places: times only, one channel is enough.
 ///
-/// With one channel a click from elsewhere cannot be told from an impact.
+/// With one channel a click beyond the table cannot be distinguished from an impact.
 pub fn hear_times(sound: &Sound, settings: &HearSettings) -> Result<Heard, HearError> {
     let listened = Listened::new(&sound.channels, sound.rate_hz, settings.onset)?;
     let impact = |(number, onset): (usize, Onset)| {
@@ -216,8 +217,9 @@ fn timed(
 ) -> Result<Impact, HearError> {
     let relative = localiser.arrivals_s();
     let mut means: Vec<f64> = onset.channels.iter().zip(relative).map(|(c, r)| c.t_s - r).collect();
-    means.sort_by(f64::total_cmp);
-    let Instant { t_s: mean, sigma_s } = listened.aligned(means[means.len() / 2], relative)?;
+    // An onset has a channel; without one there is no time to look near.
+    let near_s = quantile(&mut means, 0.5).unwrap_or(0.0);
+    let Instant { t_s: mean, sigma_s } = listened.aligned(near_s, relative)?;
     let array = localiser.array();
     let n = relative.len();
     let travel = (0..n).map(|i| array.travel_s(i, location.x_m, location.y_m)).sum::<f64>() / n as f64;

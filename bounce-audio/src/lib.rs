@@ -14,5 +14,6 @@ pub mod missed;
 pub mod onset;
 pub mod playback;
 pub mod posterior;
+mod quantile;
 pub mod track;
 pub mod wav;

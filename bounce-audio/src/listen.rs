@@ -3,6 +3,7 @@
 use crate::hear::{HearError, HearSettings, Stray, StrayReason, doubt};
 use crate::localise::{LocaliseError, Localiser, Location};
 use crate::onset::{OnsetStream, Started};
+use crate::quantile::quantile;
 
 /// How time delays are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +39,7 @@ pub enum Sounded {
 
 /// Hears impacts in a stream: [`OnsetStream`] and [`Localiser`] put together, planned once.
 ///
-/// What is told is 7 to 9 ms old: the sound that phase correlation wants. The rules for what is an impact are those of
+/// What is reported is 7 to 9 ms old: the sound that phase correlation wants. The rules for what is an impact are those of
 /// [`hear`](crate::hear::hear()).
 ///
 /// ```
@@ -136,11 +137,13 @@ impl Placer {
         for ((mean, instant), delay) in self.means.iter_mut().zip(stream.instants()).zip(&self.arrivals_s) {
             *mean = instant.t_s - delay;
         }
-        self.means.sort_unstable_by(f64::total_cmp);
+        let Some(mean_s) = quantile(&mut self.means, 0.5) else {
+            return stray(StrayReason::Incoherent(0.0));
+        };
         let (n, array) = (self.means.len(), self.localiser.array());
         let travel = (0..n).map(|i| array.travel_s(i, location.x_m, location.y_m)).sum::<f64>() / n as f64;
         Sounded::Impact(Placed {
-            t_s: self.means[n / 2] - travel,
+            t_s: mean_s - travel,
             t_sigma_s: started.first.sigma_s,
             location,
             amplitude_sigmas: started.amplitude_sigmas,

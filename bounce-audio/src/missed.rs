@@ -1,8 +1,10 @@
 //! Impacts that were not heard: two flights that were taken for one; and sounds that were none: one flight taken for two.
 
+use crate::quantile::quantile;
+
 /// Most impacts in a row that may have gone unheard.
 const MOST: usize = 3;
-/// Below this restitution a flight that was cut short adds too little to the one before it to be told from chance.
+/// Below this restitution a flight that was cut short adds too little to the one before it to stand out of chance.
 const LEAST_RESTITUTION: f64 = 0.25;
 /// An unheard impact has to explain this much of the logarithm of a duration.
 const DOUBT: f64 = 0.15;
@@ -12,11 +14,7 @@ const DOUBT: f64 = 0.15;
 /// `drops` holds, drop by drop, the durations of its flights in s. `None` where no drop has two flights.
 pub fn typical_restitution<'a>(drops: impl IntoIterator<Item = &'a [f64]>) -> Option<f64> {
     let mut ratios: Vec<f64> = drops.into_iter().flat_map(|d| d.windows(2).map(|w| w[1] / w[0])).collect();
-    if ratios.is_empty() {
-        return None;
-    }
-    ratios.sort_by(f64::total_cmp);
-    Some(ratios[ratios.len() / 2])
+    quantile(&mut ratios, 0.5)
 }
 
 /// How many impacts went unheard within each of the flights (durations in s), for a ball of the given restitution in (0, 1).
@@ -68,8 +66,8 @@ pub fn extra(times_s: &[f64], restitution: f64) -> Option<usize> {
         return None;
     }
     let worst = |without: Option<usize>| {
-        let kept = times_s.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, t)| *t);
-        let flights: Vec<f64> = kept.clone().zip(kept.skip(1)).map(|(a, b)| b - a).collect();
+        let rest = times_s.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, t)| *t);
+        let flights: Vec<f64> = rest.clone().zip(rest.skip(1)).map(|(a, b)| b - a).collect();
         flights.windows(2).map(|w| (w[1] / w[0] / restitution).ln().abs()).fold(0.0, f64::max)
     };
     if worst(None) < BROKEN {

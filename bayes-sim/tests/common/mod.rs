@@ -121,7 +121,7 @@ pub(crate) fn reference(task: &Task, i: usize, count: usize) -> Option<(Vec<f64>
         "gaussian_linear" | "two_moons" | "slcp" => task.name,
         // What is added says nothing about the parameters: the same posterior.
         "slcp_distractors" => "slcp",
-        _ => return Some(references::own(task, i as u64, count)),
+        _ => return Some(references::simulated(task, i as u64, count)),
     };
     let folder = shared(&format!("sbibm/{shared_task}/num_observation_{i}"))?;
     let observation = std::fs::read_to_string(folder.join("observation.csv")).unwrap();

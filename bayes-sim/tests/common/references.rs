@@ -1,4 +1,4 @@
-//! Reference posteriors of tasks that are shared without one: exact draws where there are some, else a long plain Metropolis chain on
+//! Reference posteriors of tasks that are shared without one: exact draws where there are some, else a long Metropolis chain on
 //! the exact likelihood. Nothing of the crate is used but its tables.
 
 use bayes_sim::points::Points;
@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use super::simulators::{design, infected, populations, smoothness};
 use super::{Task, normal};
 
-/// An observation of its own and draws of its posterior.
-pub(crate) fn own(task: &Task, seed: u64, count: usize) -> (Vec<f64>, Points) {
+/// A simulated observation and draws of its posterior.
+pub(crate) fn simulated(task: &Task, seed: u64, count: usize) -> (Vec<f64>, Points) {
     let mut rng = ChaCha8Rng::seed_from_u64(1_000_000 + seed);
     let theta = task.prior.sample(&mut rng);
     let x = task.simulate(&theta, &mut rng);
@@ -65,7 +65,7 @@ fn predation(u: &[f64], x: &[f64]) -> f64 {
     ln_prior(u, &[[-0.125, 0.5], [-3.0, 0.5], [-0.125, 0.5], [-3.0, 0.5]]) + seen.sum::<f64>()
 }
 
-/// Random-walk Metropolis from `start`: steps from the covariance so far while it warms up, then one in `20 d` kept.
+/// Random-walk Metropolis from `start`: steps from the covariance so far while it warms up, then one in `20 d` recorded.
 fn metropolis(
     start: &[f64],
     count: usize,
@@ -77,7 +77,7 @@ fn metropolis(
     let mut at = DVector::from_column_slice(start);
     let mut here = ln(at.as_slice());
     let mut factor = DMatrix::identity(d, d) * 0.01;
-    let (mut seen, mut kept) = (Vec::new(), Vec::new());
+    let (mut seen, mut chain) = (Vec::new(), Vec::new());
     for i in 0..warm + thin * count {
         if i < warm && i % (100 * d) == 0 && i > 0 {
             // The later half: the way from the start is no part of the covariance.
@@ -95,10 +95,10 @@ fn metropolis(
         if i < warm {
             seen.push(at.clone());
         } else if (i - warm) % thin == 0 {
-            kept.push(at.as_slice().to_vec());
+            chain.push(at.as_slice().to_vec());
         }
     }
-    kept
+    chain
 }
 
 /// Gaussians cut to the prior's box, by rejection.

@@ -136,7 +136,7 @@ pub(crate) fn lotka_volterra() -> Task {
 /// Numbers among `slcp_distractors` that say nothing.
 const DISTRACTORS: usize = 92;
 
-/// Centres and factors of twenty Student distributions, and the order in which numbers are told.
+/// Centres and factors of twenty Student distributions, and the order in which numbers are given.
 struct Noise {
     parts: Vec<(DVector<f64>, DMatrix<f64>)>,
     order: Vec<usize>,

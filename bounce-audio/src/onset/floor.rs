@@ -1,5 +1,7 @@
 //! The noise floor: from the quieter stretches of a sound.
 
+use crate::quantile::quantile;
+
 /// Blocks, s; their quantile that is taken, and what it is of the mean for such blocks of noise.
 const FLOOR: (f64, f64, f64) = (2e-3, 0.2, 0.85);
 /// The noise is at least this part of a channel's root mean square, so that digital silence is a floor too.
@@ -18,8 +20,7 @@ pub(super) fn block(rate_hz: f64) -> usize {
 
 /// Standard deviation of the noise, from the powers of blocks (their order is lost) and the power of the whole.
 pub(super) fn sigma(blocks: &mut [f64], all: f64) -> f64 {
-    let at = (FLOOR.1 * blocks.len() as f64) as usize;
-    let quiet = if at < blocks.len() { *blocks.select_nth_unstable_by(at, f64::total_cmp).1 } else { 0.0 };
+    let quiet = quantile(blocks, FLOOR.1).unwrap_or(0.0);
     (quiet / FLOOR.2).max(LEAST_NOISE.powi(2) * all).max(1e-24).sqrt()
 }
 

@@ -1,8 +1,8 @@
-//! How impacts are told from the rest of a sound, and what is wrong with it or with that.
+//! How impacts are distinguished from the rest of a sound, and what is wrong with it or with that.
 
 use thiserror::Error;
 
-/// How impacts are told from the rest.
+/// How impacts are distinguished from the rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnsetSettings {
     /// Corner of the high-pass, Hz.

@@ -25,7 +25,7 @@ pub struct Started {
 
 /// Looks for onsets in a stream as [`Listened`](super::Listened) does in a recording; planned once, then nothing is allocated.
 ///
-/// The noise is that of the last 3 s, and nothing is heard in the first 50 ms. An onset is told once the samples that judging
+/// The noise is that of the last 3 s, and nothing is heard in the first 50 ms. An onset is reported once the samples that judging
 /// needs are there: about 6 ms after it.
 pub struct OnsetStream {
     rate_hz: f64,
@@ -53,7 +53,7 @@ pub struct OnsetStream {
 }
 
 impl OnsetStream {
-    /// For a number of channels at a sample rate (Hz); `after_s` of sound are there after each onset that is told, for
+    /// For a number of channels at a sample rate (Hz); `after_s` of sound are there after each onset that is reported, for
     /// [`OnsetStream::cut`] (at most 0.1 s).
     ///
     /// # Errors
@@ -150,7 +150,7 @@ impl OnsetStream {
         Ok(())
     }
 
-    /// When each channel heard the onset that was told last.
+    /// When each channel heard the onset that was reported last.
     pub fn instants(&self) -> &[Instant] {
         &self.instants
     }
