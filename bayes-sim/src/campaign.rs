@@ -70,11 +70,11 @@ pub struct Campaign {
 /// One simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// Its number in the campaign, from 0.
+    /// Number of the draw in the campaign, from 0.
     pub index: usize,
-    /// Its parameters.
+    /// Parameters of the draw.
     pub theta: Vec<f64>,
-    /// What came of it.
+    /// Its features, or why it failed.
     pub outcome: Result<Vec<f64>, SimulationFailure>,
 }
 
@@ -285,12 +285,12 @@ impl Results {
         self.campaign.count - self.records.len()
     }
 
-    /// Those that failed, with their parameters and reasons.
+    /// Simulations that failed, with their parameters and reasons.
     pub fn failures(&self) -> impl Iterator<Item = (&Record, &SimulationFailure)> {
         self.records.values().filter_map(|r| r.outcome.as_ref().err().map(|e| (r, e)))
     }
 
-    /// Those that succeeded, in order.
+    /// Simulations that succeeded, in order.
     ///
     /// # Errors
     /// [`Error::TooFew`] below 50.

@@ -67,7 +67,7 @@ pub enum Error {
     /// A setting out of its range.
     #[error("{name} = {value}: has to be {rule}")]
     Setting {
-        /// Its name.
+        /// Name of the setting.
         name: &'static str,
         /// What came.
         value: f64,
@@ -96,9 +96,9 @@ pub enum Error {
     Mismatch {
         /// Which property.
         what: &'static str,
-        /// Of the first.
+        /// Length of the first.
         left: String,
-        /// Of the second.
+        /// Length of the second.
         right: String,
     },
     /// A product of posteriors that cannot be normalised: the data agree less than the prior divided out.

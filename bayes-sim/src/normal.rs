@@ -80,7 +80,7 @@ pub(crate) fn truncated_quantile(a: f64, b: f64, u: f64) -> f64 {
     }
 }
 
-/// The same where both bounds are in the lower tail, by bisection on the log distribution function.
+/// The quantile where both bounds are in the lower tail, by bisection on the log distribution function.
 fn tail_quantile(a: f64, b: f64, u: f64) -> f64 {
     let target = {
         let gap = ln_cdf(a) - ln_cdf(b);

@@ -24,13 +24,13 @@ use crate::simulations::Simulations;
 
 /// Settings that know how to train what they are settings of.
 pub trait Trainer {
-    /// What is trained.
+    /// The density that is trained.
     type Density: ConditionalDensity + Saved;
 
     /// Trains it.
     ///
     /// # Errors
-    /// Those of the density's own `train`.
+    /// As the density's `train`.
     fn train(&self, prior: &Prior, simulations: &Simulations, seed: u64) -> Result<Self::Density, Error>;
 }
 
@@ -76,7 +76,7 @@ pub struct Rounds<D> {
 pub struct RoundReport {
     /// Simulations that succeeded.
     pub simulations: usize,
-    /// Those that failed.
+    /// Simulations that failed.
     pub failures: usize,
     /// Share of the prior (of the box about the posterior's draws, where that is smaller) that was still drawn from.
     pub acceptance: f64,

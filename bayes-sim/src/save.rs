@@ -33,7 +33,7 @@ struct Content<T> {
 
 /// What can be saved and loaded.
 pub trait Saved: Serialize + DeserializeOwned {
-    /// Its name in the file.
+    /// Name of the kind in the file.
     const KIND: &'static str;
 
     /// Writes a file.

@@ -25,7 +25,7 @@ pub(crate) struct Boxed {
     order: Vec<usize>,
     /// Lower triangular root of their covariance.
     root: DMatrix<f64>,
-    /// Their bounds, from the mean.
+    /// The variables' bounds, from the mean.
     bounds: Vec<[f64; 2]>,
     /// Share of each dimension alone that is outside, added up.
     tails: f64,

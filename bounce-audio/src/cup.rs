@@ -58,7 +58,7 @@ impl Scene {
         Ok(Self { model, half_m, cup, ball_radius_m, downhill, across: [-side, ahead, 0.0] })
     }
 
-    /// That of [Matl 2021], section 4.4: a table of 0.55 m that falls by 10.72 degrees towards x, a cup 8.6 inches from its lower edge, which is on the
+    /// The scene of [Matl 2021], section 4.4: a table of 0.55 m that falls by 10.72 degrees towards x, a cup 8.6 inches from its lower edge, which is on the
     /// floor. The cup's own size is not given there: 12 cm high, 9 cm wide.
     ///
     /// # Errors

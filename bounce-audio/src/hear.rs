@@ -16,7 +16,7 @@ pub struct HearSettings {
     pub onset: OnsetSettings,
     /// The buffer that a place is found in starts this long before the onset, s.
     pub lead_s: f64,
-    /// Its length, s, beyond the time that sound takes between the microphones farthest from each other.
+    /// Length of the buffer, s, beyond the time that sound takes between the microphones farthest from each other.
     pub length_s: f64,
     /// How far outside the rectangle around the microphones an impact may be, in diagonals of it.
     pub reach: f64,
@@ -78,7 +78,7 @@ pub struct Impact {
     pub location: Option<Location>,
     /// When each channel heard it, from the first sample, s.
     pub arrivals_s: Vec<f64>,
-    /// Its loudness over the noise, a ratio of amplitudes.
+    /// The impact's loudness over the noise, a ratio of amplitudes.
     pub amplitude_sigmas: f64,
 }
 
@@ -87,7 +87,7 @@ pub struct Impact {
 pub struct Stray {
     /// When the first channel heard it, s from the first sample.
     pub t_s: f64,
-    /// Why it is none.
+    /// Why it is no impact.
     pub reason: StrayReason,
 }
 

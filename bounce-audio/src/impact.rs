@@ -8,7 +8,7 @@ pub type Velocity = [f64; 3];
 pub struct Hop {
     /// From the one impact to the next, m.
     pub displacement_m: [f64; 3],
-    /// Its duration, s, above zero.
+    /// Duration of the flight, s, above zero.
     pub duration_s: f64,
 }
 

@@ -24,7 +24,7 @@ pub struct Placed {
     pub t_sigma_s: f64,
     /// Where it was. Of peak times the covariance holds only what a sample's length makes uncertain, and coherence is 1.
     pub location: Location,
-    /// Its loudness over the noise, a ratio of amplitudes.
+    /// The impact's loudness over the noise, a ratio of amplitudes.
     pub amplitude_sigmas: f64,
 }
 

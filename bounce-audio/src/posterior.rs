@@ -62,7 +62,7 @@ pub struct DropSimulator {
 }
 
 impl DropSimulator {
-    /// That of [Matl 2021]: from 0.26 m, measured without noise, all features.
+    /// The simulator of [Matl 2021]: from 0.26 m, measured without noise, all features.
     pub fn new() -> Self {
         Self {
             release: Release::at(DROP_HEIGHT_M),

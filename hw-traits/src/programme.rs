@@ -39,7 +39,7 @@ pub struct FeltPose {
 pub struct ProgrammeError {
     /// Number of the pose, from 0.
     pub pose: usize,
-    /// Its commanded angle, rad.
+    /// The pose's commanded angle, rad.
     pub angle_rad: f64,
     /// What went wrong.
     pub kind: ErrorKind,

@@ -131,10 +131,10 @@ pub struct Table {
 }
 
 impl Table {
-    /// A level one.
+    /// A level table.
     pub const LEVEL: Self = Self { normal: [0.0, 0.0, 1.0] };
 
-    /// One that falls by an angle (rad, below a right one) towards a direction in the plane, an angle from x (rad).
+    /// A table that falls by an angle (rad, below a right one) towards a direction in the plane, an angle from x (rad).
     ///
     /// # Errors
     /// [`DropError::Value`].
@@ -146,7 +146,7 @@ impl Table {
         Ok(Self { normal: [sin * ahead, sin * side, cos] })
     }
 
-    /// Its unit normal, upwards.
+    /// The table's unit normal, upwards.
     pub fn normal(&self) -> &Vector {
         &self.normal
     }

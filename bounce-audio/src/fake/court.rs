@@ -60,14 +60,14 @@ impl Default for CourtSettings {
 pub struct Toss {
     /// Where the ball's centre is let go, m.
     pub place_m: [f64; 3],
-    /// Its velocity, m/s.
+    /// Velocity of the ball's centre, m/s.
     pub velocity_m_s: [f64; 3],
 }
 
 /// How a throw ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Verdict {
-    /// It has not come to the plane yet.
+    /// The ball has not come to the plane yet.
     Flying,
     /// The paddle touched the ball.
     Touched,

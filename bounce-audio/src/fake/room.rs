@@ -104,7 +104,7 @@ impl Room {
         &self.microphones_m
     }
 
-    /// Their rate, Hz.
+    /// Sample rate of the microphones, Hz.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }

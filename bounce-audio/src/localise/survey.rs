@@ -19,11 +19,11 @@ pub struct Tap {
 /// What was known before, as standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurveyPrior {
-    /// Of each coordinate of a microphone, as it was measured with a tape, m.
+    /// Standard deviation of each coordinate of a microphone, as it was measured with a tape, m.
     pub position_sigma_m: f64,
-    /// Of the speed of sound, m/s.
+    /// Standard deviation of the speed of sound, m/s.
     pub speed_sigma_m_s: f64,
-    /// Of an arrival, s.
+    /// Standard deviation of an arrival, s.
     pub arrival_sigma_s: f64,
 }
 
@@ -57,7 +57,7 @@ pub enum SurveyError {
         tap: usize,
         /// Number of microphones.
         expected: usize,
-        /// Its arrivals.
+        /// Arrivals of the tap.
         got: usize,
     },
     /// No tap, or fewer than two microphones.

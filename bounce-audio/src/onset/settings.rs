@@ -76,7 +76,7 @@ pub enum OnsetError {
         channel: usize,
         /// Samples of channel 0.
         expected: usize,
-        /// Its samples.
+        /// The channel's samples.
         got: usize,
     },
     /// A sample is no number.

@@ -160,7 +160,7 @@ impl OnsetStream {
         self.copy(&self.raw, channel, from, into);
     }
 
-    /// The same, filtered.
+    /// As [`OnsetStream::cut`], from the filtered sound.
     pub fn cut_filtered(&self, channel: usize, from: isize, into: &mut [f64]) {
         self.copy(&self.filtered, channel, from, into);
     }

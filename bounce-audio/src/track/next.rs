@@ -51,7 +51,7 @@ impl Default for NextSettings {
 /// A flight as it might go: relative to the direction of the one before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Its duration, s.
+    /// Duration of the flight, s.
     pub duration_s: f64,
     /// Along the direction of the flight before, m.
     pub forward_m: f64,

@@ -55,7 +55,7 @@ pub struct Stochastic {
 #[derive(Default)]
 struct Ways {
     weight: f64,
-    /// Of time, y, z.
+    /// Weighted sums of time, y and z.
     first: [f64; 3],
     second: [f64; 3],
 }

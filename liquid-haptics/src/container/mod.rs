@@ -20,9 +20,9 @@ use nalgebra::{UnitVector3, Vector3};
 pub struct Fill {
     /// Volume of the liquid, m^3.
     pub volume_m3: f64,
-    /// Height of its surface along up, from the frame's origin, m.
+    /// Height of the liquid's surface along up, from the frame's origin, m.
     pub surface_height_m: f64,
-    /// Its centre of mass, m; for no liquid the lowest point of the cavity.
+    /// The liquid's centre of mass, m; for no liquid the lowest point of the cavity.
     pub center_of_mass: Vector3<f64>,
 }
 

@@ -11,7 +11,7 @@ pub struct Sensor {
     pub rate_hz: f64,
     /// Step of a force, and the standard deviation of its noise from reading to reading, N.
     pub force_step_n: f64,
-    /// The same of a torque, N m.
+    /// Step of a torque, and the standard deviation of its noise from reading to reading, N m.
     pub torque_step_nm: f64,
     /// Largest force, N.
     pub force_range_n: f64,

@@ -13,7 +13,7 @@ pub(super) struct Slosh {
     /// Mass that swings, kg.
     pub(super) mass_kg: f64,
     limit_m: f64,
-    /// Its displacement from where a level surface has it, m, and speed, m/s.
+    /// The swinging mass's displacement from where a level surface has it, m, and its speed, m/s.
     state: [f64; 2],
 }
 

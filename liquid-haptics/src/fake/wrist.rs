@@ -74,7 +74,7 @@ pub struct FakeWrist {
     offset: Wrench,
     /// Where the liquid lies across and along the container's axis at the table's angles, m.
     table: Vec<[f64; 2]>,
-    /// The same at an angle that was asked last.
+    /// Where the liquid lies at the angle that was asked last.
     last: Option<(f64, [f64; 2])>,
     slosh: Slosh,
     film: Option<Film>,

@@ -22,7 +22,7 @@ pub struct Decay {
     pub omega_rad_s: f64,
     /// Damping ratio, in [0, 1).
     pub damping_ratio: f64,
-    /// What is added.
+    /// Effects beyond the linear mode.
     pub effects: Effects,
 }
 

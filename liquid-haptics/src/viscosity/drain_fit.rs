@@ -14,7 +14,7 @@ pub(super) struct DrainFit {
     pub(super) fit: Fit,
     /// Standard error of the viscosity's logarithm.
     ln_error: f64,
-    /// How far the torque falls over the readings, and the standard error of that.
+    /// How far the torque falls over the readings, N m, and the standard error of that fall.
     pub(super) fall: f64,
     pub(super) fall_error: f64,
 }
@@ -79,7 +79,7 @@ impl DrainFit {
         self.fit.params[0].exp()
     }
 
-    /// Its 95 % interval, m^2/s.
+    /// The 95 % interval of the kinematic viscosity, m^2/s.
     pub(super) fn interval(&self) -> [f64; 2] {
         let reach = (normal_quantile() * self.ln_error).exp();
         [self.viscosity() / reach, self.viscosity() * reach]

@@ -38,7 +38,8 @@ pub enum Regime {
 pub struct ViscosityEstimate {
     /// Kinematic viscosity, m^2/s.
     pub kinematic_m2_s: f64,
-    /// Its 95 % interval, m^2/s: the readings' noise, and for a drain the error of the mass; not the error of the law itself.
+    /// The kinematic viscosity's 95 % interval, m^2/s: the readings' noise, and for a drain the error of the mass; not the error of the
+    /// law itself.
     pub interval_m2_s: [f64; 2],
     /// Dynamic viscosity, Pa s: the kinematic one times mass over volume.
     pub dynamic_pa_s: f64,
@@ -87,7 +88,7 @@ pub enum Refusal {
 pub enum Verdict {
     /// A viscosity.
     Viscosity(ViscosityEstimate),
-    /// None, and why.
+    /// No viscosity, and why.
     Refused(Refusal),
 }
 

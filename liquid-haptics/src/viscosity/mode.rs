@@ -9,11 +9,11 @@ use super::{ViscosityError, checked, normal_quantile};
 
 /// Damping ratios that the search starts from.
 const DAMPING_STARTS: [f64; 8] = [0.001, 0.004, 0.012, 0.03, 0.07, 0.15, 0.3, 0.6];
-/// Frequencies that it starts from, spaced by this share of what a record of this length resolves.
+/// Spacing of the frequencies that the search starts from, as a share of what a record of this length resolves.
 const RESOLUTION_SHARE: f64 = 0.35;
-/// Most frequencies that it starts from.
+/// Most frequencies that the search starts from.
 const MOST_FREQUENCIES: usize = 400;
-/// The starts that are followed to their end.
+/// Starts from which the fit is carried through.
 const FOLLOWED: usize = 3;
 
 /// A mode `offset + exp(-gamma omega t) (cos cos(omega_d t) + sin sin(omega_d t))` fitted to readings, t from the first of them.
@@ -21,21 +21,21 @@ const FOLLOWED: usize = 3;
 pub struct ModeFit {
     /// Angular frequency without damping, rad/s.
     pub omega_rad_s: f64,
-    /// Its standard error, rad/s.
+    /// Standard error of the angular frequency, rad/s.
     pub omega_error_rad_s: f64,
     /// Damping ratio gamma, above 0, below 1.
     pub damping_ratio: f64,
-    /// Standard error of its logarithm.
+    /// Standard error of the damping ratio's logarithm.
     pub ln_damping_error: f64,
     /// The reading that the mode decays to.
     pub offset: f64,
     /// Amplitude of the cosine, in units of the reading.
     pub cos: f64,
-    /// Amplitude of the sine, likewise.
+    /// Amplitude of the sine, in units of the reading.
     pub sin: f64,
-    /// Standard error of the amplitude, likewise.
+    /// Standard error of the amplitude, in units of the reading.
     pub amplitude_error: f64,
-    /// Standard deviation of the residuals, likewise.
+    /// Standard deviation of the residuals, in units of the reading.
     pub sigma: f64,
 }
 

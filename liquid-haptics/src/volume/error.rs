@@ -46,7 +46,7 @@ pub enum VolumeError {
     NegativeMass {
         /// The mass.
         mass_kg: f64,
-        /// Its standard error.
+        /// Standard error of the mass.
         error_kg: f64,
     },
     /// No tilt tells anything about the volume.

@@ -27,7 +27,7 @@ pub struct VolumeFit<'a> {
     pub container: &'a dyn Container,
     /// How it is held.
     pub grasp: Grasp,
-    /// What is known to differ from what was stated.
+    /// How the set-up is known to differ from the grasp as stated.
     pub departures: Departures,
     /// The liquid's mass or density.
     pub liquid: Liquid,

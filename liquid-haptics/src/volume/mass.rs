@@ -8,9 +8,9 @@ use crate::wrench::Grasp;
 /// Where the relative error of the forces comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ForceGain<'a> {
-    /// It is known; 0 for forces that are right.
+    /// The gain is known; 0 for forces that are right.
     Known(f64),
-    /// It is fitted, from poses of the same load with the container empty.
+    /// The gain is fitted, from poses of the same load with the container empty.
     FromEmpty(&'a [SettledPose]),
 }
 
@@ -31,11 +31,11 @@ pub struct MassFit<'a> {
 pub struct MassEstimate {
     /// The mass, kg; below 0 where noise makes it so.
     pub mass_kg: f64,
-    /// Its standard error, kg.
+    /// Standard error of the mass, kg.
     pub error_kg: f64,
     /// The relative error of the forces.
     pub force_gain: f64,
-    /// The standard error of that; 0 where it is known.
+    /// Standard error of the force gain; 0 where the gain is known.
     pub force_gain_error: f64,
     /// Offsets of the force across and along the container's axis, N; 0 where they are not fitted.
     pub offset_n: [f64; 2],

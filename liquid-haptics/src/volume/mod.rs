@@ -32,23 +32,23 @@ pub struct SettledPose {
 /// What is known of the liquid besides the torques, which depend on its mass and its volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Liquid {
-    /// Its mass is known, for instance from the forces.
+    /// The mass is known, for instance from the forces.
     Mass {
         /// The mass, kg.
         mass_kg: f64,
-        /// Its standard error, kg; 0 for a mass that is exact.
+        /// Standard error of the mass, kg; 0 for a mass that is exact.
         error_kg: f64,
     },
-    /// Its density is known, kg/m^3.
+    /// The density is known, kg/m^3.
     ///
     /// This leaves twins: gripped at half its height, a cylinder's torque is the same at every tilt with a volume of liquid as with
     /// all but that volume.
     Density(f64),
-    /// Both are known.
+    /// Mass and density are known.
     MassAndDensity {
         /// The mass, kg.
         mass_kg: f64,
-        /// Its standard error, kg, above 0.
+        /// Standard error of the mass, kg, above 0.
         error_kg: f64,
         /// The density, kg/m^3; taken as exact.
         density_kg_m3: f64,
@@ -61,7 +61,7 @@ impl From<&MassEstimate> for Liquid {
     }
 }
 
-/// A volume that explains the poses, and all beside it that do.
+/// A volume that explains the poses, and the interval about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     /// Where the misfit is least, m^3.

@@ -9,13 +9,13 @@ use crate::wrench::{Departures, Grasp};
 /// How the mass follows from the volume and the torques.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Mass {
-    /// As it is, kg.
+    /// A known mass, kg.
     Exact(f64),
     /// By least squares with a prior: mass (kg), and the torque's variance over the prior's ((N m / kg)^2).
     Prior(f64, f64),
     /// The capacity's mass, kg, times the share of it that is filled.
     Share(f64),
-    /// That (the capacity's mass first), with a prior as above.
+    /// The capacity's mass, kg, times the share of it that is filled; and a prior of the mass as in [`Mass::Prior`].
     ShareAndPrior(f64, f64, f64),
 }
 

@@ -10,9 +10,9 @@ use crate::root::root;
 
 /// Cells of the grid; narrower towards empty and full, where the torque changes fastest.
 const CELLS: usize = 64;
-/// To which a minimum is found, as a share of the capacity.
+/// Tolerance of a minimum, as a share of the capacity.
 const MINIMUM_TOLERANCE: f64 = 1e-9;
-/// To which an end of an interval is found, likewise.
+/// Tolerance of an end of an interval, as a share of the capacity.
 const END_TOLERANCE: f64 = 1e-8;
 
 /// A valley of the misfit: shares of the capacity.

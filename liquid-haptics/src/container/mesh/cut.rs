@@ -60,7 +60,7 @@ impl Cut {
         }
     }
 
-    /// The same over a part of the range: `t` becomes `begin + width t`.
+    /// The cut over a part of the range: `t` becomes `begin + width t`.
     #[inline]
     pub(super) fn part(&self, begin: f64, width: f64) -> Self {
         let [a, b, c] = self.area;

@@ -40,11 +40,11 @@ pub enum MeshError {
         "the edge from {from:?} to {to:?} belongs to {uses} triangles one way and {back} the other, expected one each"
     )]
     Open {
-        /// One end, m.
+        /// The edge's first end, m.
         from: [f64; 3],
-        /// The other end, m.
+        /// The edge's second end, m.
         to: [f64; 3],
-        /// Triangles that run along it from the one to the other.
+        /// Triangles that run along it from the first end to the second.
         uses: usize,
         /// Triangles that run along it the other way.
         back: usize,
@@ -68,7 +68,7 @@ pub enum MeshError {
     /// The wall is too thick for the container.
     #[error("a wall of {wall_m} m leaves no cavity")]
     Wall {
-        /// Its thickness, m.
+        /// The wall's thickness, m.
         wall_m: f64,
     },
 }
