@@ -113,7 +113,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let seconds = start.elapsed().as_secs_f64();
                 let mut sum = 0.0;
                 for i in 1..=observations {
-                    let Some((x, reference)) = common::reference(task, i, points) else { return Ok(()) };
+                    let (x, reference) = common::reference(task, i, points)?;
                     let draws = density.sample(&x, points, &mut common::dice(i as u64))?;
                     sum += c2st(&reference, &draws, 1)?;
                 }

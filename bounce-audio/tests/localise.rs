@@ -31,8 +31,9 @@ fn cut(channels: &[Vec<f64>], from: usize, length: usize) -> Vec<&[f64]> {
 
 /// 30 taps in a simulated room (rir simulation of another package): at least as good as the peers on them.
 #[test]
-fn the_practice_taps_are_found() {
-    let Some(folder) = shared("practice/localisation") else { return };
+#[ignore = "needs ../shared"]
+fn shared_practice_taps_are_found() {
+    let folder = shared("practice/localisation");
     let mut errors = Vec::new();
     let mut z = 0.0;
     for line in std::fs::read_to_string(folder.join("truth.csv")).unwrap().lines().skip(1) {
@@ -170,7 +171,7 @@ fn nonsense_is_an_error() {
 
 /// Prints how long one place takes: `cargo test --release -p bounce-audio --test localise -- --ignored --nocapture`.
 #[test]
-#[ignore = "a time depends on the machine"]
+#[ignore = "by hand: a time depends on the machine"]
 fn time_of_one_place() {
     let mut dice = Dice(7);
     for microphones in [&TRIANGLE[..], &SQUARE[..]] {

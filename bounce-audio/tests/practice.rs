@@ -7,9 +7,11 @@
 
 mod common;
 
+use std::path::PathBuf;
+
 use bounce_audio::hear::{HearSettings, hear, hear_times};
 use bounce_audio::wav::Sound;
-use common::{quantile, shared};
+use common::{bundled, quantile, shared};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -17,9 +19,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 /// Every impact of every drop is heard, none is invented, in time and place, under the true geometry; under the stated one as many.
-#[test]
-fn the_practice_drops_are_heard() {
-    let Some(folder) = shared("practice/bounce-audio") else { return };
+fn drops_are_heard(folder: PathBuf, least: usize) {
     let mut recordings = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let folder = entry.unwrap().path();
@@ -86,13 +86,25 @@ fn the_practice_drops_are_heard() {
         assert_eq!(clicks, known, "one channel hears the clicks that there are");
         recordings += 1;
     }
-    assert!(recordings >= 4, "{recordings} recordings");
+    assert!(recordings >= least, "{recordings} recordings");
+}
+
+#[test]
+fn the_practice_drops_are_heard() {
+    drops_are_heard(bundled("practice/bounce-audio"), 1);
+}
+
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_practice_drops_are_heard() {
+    drops_are_heard(shared("practice/bounce-audio"), 4);
 }
 
 /// The author's 30 times, read to 1 ms, and those that were heard.
 #[test]
-fn a_real_ball_is_heard_when_its_author_heard_it() {
-    let Some(folder) = shared("recordings/real/bounce") else { return };
+#[ignore = "needs ../shared"]
+fn shared_a_real_ball_is_heard_when_its_author_heard_it() {
+    let folder = shared("recordings/real/bounce");
     let sound = Sound::read(folder.join("erickson-pingpong-audio/run-00.wav")).unwrap();
     let heard = hear_times(&sound, &HearSettings::default()).unwrap();
     let text = std::fs::read_to_string(folder.join("erickson-pingpong-times/data.csv")).unwrap();

@@ -43,7 +43,7 @@ fn mean_sd(values: &[f64]) -> String {
 
 /// Prints; LIGGGHTS takes 25 CPU s a seed and has mean radius 33.9 mm, height 23.5 mm.
 #[test]
-#[ignore = "a timing, for an optimised build"]
+#[ignore = "by hand: a time depends on the machine"]
 fn peer_scene() {
     for (name, pour) in [("fine", scene()), ("campaign", campaign())] {
         let (mut seconds, mut numbers) = (Vec::new(), [const { Vec::new() }; 4]);

@@ -249,7 +249,7 @@ fn what_cannot_be_is_refused() {
 
 /// Prints how long an estimate of 19 poses takes.
 #[test]
-#[ignore = "a timing to look at"]
+#[ignore = "by hand: a time depends on the machine"]
 fn how_long_it_takes() {
     let bottle = bottle();
     let mut rng = ChaCha8Rng::seed_from_u64(11);

@@ -10,14 +10,14 @@
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-/// A folder of the shared recordings, or a line that says that nothing was tested.
-pub(crate) fn shared(folder: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(folder);
-    if path.is_dir() {
-        return Some(path);
-    }
-    println!("NOT TESTED: {} is not there", path.display());
-    None
+/// A folder of the recordings in the repository.
+pub(crate) fn bundled(folder: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../recordings").join(folder)
+}
+
+/// A folder of the data that lie beside the workspace.
+pub(crate) fn shared(folder: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(folder)
 }
 
 /// Uniform numbers in [0, 1) (Knuth's linear congruence with Numerical Recipes' constants, its upper bits).

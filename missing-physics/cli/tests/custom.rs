@@ -181,11 +181,8 @@ fn a_simulation_that_is_right_is_left_alone() {
 }
 
 #[test]
-fn a_program_is_asked_and_its_missing_friction_named() {
-    if Command::new("python3").arg("--version").output().is_err() {
-        println!("NOT TESTED: python3 is not there");
-        return;
-    }
+#[ignore = "needs python3"]
+fn python_a_program_is_asked_and_its_missing_friction_named() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recordings/swing");
     let answer = diagnose(&folder).unwrap();
     assert_eq!(answer["verdict"], "explained");

@@ -170,8 +170,8 @@ fn what_the_fuzzer_found_is_read_or_refused() {
 }
 
 #[test]
-#[ignore = "a minute for each kind of recording; .ci/run --long"]
-fn mutants_for_a_minute_each() {
+#[ignore = "long: .ci/run --long"]
+fn long_mutants_for_a_minute_each() {
     use std::io::Write as _;
     let mut file = std::fs::OpenOptions::new().append(true).open(kept()).unwrap();
     let mut all = Vec::new();

@@ -114,7 +114,7 @@ fn aside(read: &Read) -> [f64; 2] {
 }
 
 #[test]
-#[ignore = "needs recordings of another simulator"]
+#[ignore = "by hand: needs recordings of another simulator"]
 #[allow(clippy::print_stdout, clippy::unwrap_used, reason = "a table for a person")]
 fn another_simulator() {
     let folder =
@@ -207,7 +207,7 @@ fn pictures(rig: &Rig, scene: &Pour) -> Vec<[f64; COUNT]> {
 /// By how much statistics move with what a recording does not say, in sigmas from pour to pour: mean over scenes of spheres with no
 /// effect on, and their standard deviation from scene to scene.
 #[test]
-#[ignore = "pours 360 heaps"]
+#[ignore = "by hand: pours 360 heaps and prints"]
 #[allow(clippy::print_stdout, reason = "a table for a person")]
 fn what_a_recording_does_not_say() {
     let rig = BUNDLED_RIG;
