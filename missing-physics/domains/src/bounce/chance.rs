@@ -147,7 +147,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Late flights shorter than the ear's error: a straight drop is found all the same, and headings stay small.
+    /// Late flights shorter than the errors of heard places: a straight drop is found all the same, and headings stay small.
     #[test]
     fn wild_headings_do_not_lead_astray() {
         let mut wild = drop();

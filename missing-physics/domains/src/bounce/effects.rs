@@ -19,7 +19,7 @@ pub(super) struct Effects {
     /// Share of the speed along the table that is lost beyond the restitution.
     pub(super) friction: f64,
     pub(super) clock_rate: f64,
-    /// By how much later a sound is heard that is louder by a factor of e, s: no ear finds weak and loud onsets alike.
+    /// By how much later a sound is heard that is louder by a factor of e, s: weak and loud onsets are not detected alike.
     pub(super) walk_s: f64,
     pub(super) position_scale: f64,
     /// By how much places are too large, relative to 1, where they have been heard again with the right speed of sound.

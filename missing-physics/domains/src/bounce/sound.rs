@@ -110,7 +110,7 @@ fn drop_of(run: usize, impacts: &[Impact], rig: &Rig) -> Heard {
     Heard { label: (run + 1).to_string(), row: 0, drop, numbers }
 }
 
-/// Gives each impact its part of what the ear says of its own errors, and the sizes of typical ones; nothing where there are no
+/// Gives each impact its part of hearing's own estimate of its errors, and the sizes of typical ones; nothing where there are no
 /// places.
 fn weigh(heard: &mut [Heard], impacts: &[Vec<Impact>]) -> Option<[f64; 2]> {
     let root = |impact: &Impact| {

@@ -54,7 +54,7 @@ impl Linear {
 
     /// About a drop that keeps its first heading, as near to the measured places as such a one comes.
     ///
-    /// Late flights are so short that an ear's error exceeds them: headings read from them point anywhere, and a linearisation
+    /// Late flights are so short that errors of heard places exceed them: headings read from them point anywhere, and a linearisation
     /// that begins there stays there.
     pub(super) fn about_straight(measured: &Drop, effects: &Effects) -> Self {
         Self::about(measured, measured.straight(), effects)

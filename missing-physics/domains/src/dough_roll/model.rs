@@ -58,7 +58,7 @@ pub(super) struct DoughModel {
     spec: Spec,
     layout: Layout,
     blocks: Vec<Block>,
-    /// What the recording shows at first sight, all rolls alike: how what was not learned ties errors is said there.
+    /// Effects estimated from the recording, all rolls alike: errors are linearised about them, and whitened.
     first_estimate: Option<Effects>,
     /// Block and dough of each run.
     runs: HashMap<String, (usize, usize)>,
