@@ -5,14 +5,16 @@ use crate::data::Run;
 use crate::diagnosis::{
     ChannelFit, ChannelNoise, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
 };
-use crate::engine::size;
-use crate::estimate::estimates::{estimates, of_mechanism, with_open_noise};
-use crate::fit::gauss_newton::{Fit, NoiseRule};
-use crate::law;
+use crate::estimate::estimates::{estimates, of_mechanism};
+use crate::estimate::open_noise::with_open_noise;
+use crate::fit::optimum::Fit;
+use crate::fit::prediction::predictions;
 use crate::model::PredictError;
+use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::repaired::Repaired;
-use crate::selection::compare::{Candidate, HeldOut};
+use crate::selection::candidate::Candidate;
+use crate::selection::held_out::HeldOut;
 use crate::selection::ranking::{Best, Ranking};
 
 /// Sets that are listed.
@@ -86,7 +88,7 @@ impl Answer<'_> {
         if !self.baseline.fit.converged {
             remarks.push("the baseline's fit did not converge; its best estimate is used".to_owned());
         }
-        let (rows, unknowns) = size(self.problem);
+        let (rows, unknowns) = self.problem.size();
         if rows < 3 * unknowns {
             remarks.push(format!("few data: {rows} measured values for {unknowns} unknowns"));
         }
@@ -102,7 +104,7 @@ impl Answer<'_> {
             after: before.clone(),
             before,
         };
-        let before = law::predictions(self.problem, self.least_squares)?;
+        let before = predictions(self.problem, self.least_squares)?;
         Ok(self.problem.recording.runs.iter().zip(before).map(curves).collect())
     }
 
@@ -128,7 +130,7 @@ impl Answer<'_> {
     }
 
     pub(crate) fn errors(&self, fit: &Fit, score: &HeldOut) -> Result<Vec<ChannelFit>, PredictError> {
-        Ok(self.errors_of(&law::predictions(self.problem, fit)?, score))
+        Ok(self.errors_of(&predictions(self.problem, fit)?, score))
     }
 
     pub(crate) fn errors_of(&self, predictions: &[Vec<Vec<f64>>], score: &HeldOut) -> Vec<ChannelFit> {

@@ -6,16 +6,23 @@ use crate::answer::Answer;
 use crate::data::{Recording, RecordingError};
 use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Outlier, Verdict};
 use crate::experiment;
-use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, fit, solve};
-use crate::law;
-use crate::locate::scan::locate;
+use crate::fit::alternate::fit;
+use crate::fit::gauss_newton::solve;
+use crate::fit::optimum::Fit;
+use crate::fit::prediction::predictions;
+use crate::law::search::find;
+use crate::locate::locations::locate;
 use crate::model::{Experiment, Model, PredictError, Scope, Spec, SpecError};
-use crate::noise::process::{median, rough_sigma};
-use crate::noise::rule::noise_rule;
+use crate::noise::process::rough_sigma;
+use crate::noise::rule::{NoiseRule, NoiseState, noise_rule};
 use crate::observer::{Observer, Progress};
 use crate::problem::Problem;
-use crate::selection::compare::{Candidate, HeldOut, candidate, confusion, held_out, search};
+use crate::selection::candidate::{Candidate, candidate};
+use crate::selection::confusion::confusion;
+use crate::selection::held_out::{HeldOut, held_out};
 use crate::selection::ranking::{Best, Ranking, clearly};
+use crate::selection::search::search;
+use crate::statistics::median;
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -278,7 +285,7 @@ impl Course<'_> {
         let problem = &self.begun.problem;
         let chosen = ranking.at(best.at);
         diagnosis.chosen = answer.ids(&chosen.set);
-        let after = law::predictions(problem, &chosen.fit)?;
+        let after = predictions(problem, &chosen.fit)?;
         if let Some(score) = ranking.score_of(&chosen.set) {
             diagnosis.after = answer.errors_of(&after, score);
         }
@@ -320,7 +327,7 @@ impl Course<'_> {
     ) -> Result<(), DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell("looking for a law in the residual", 0.0)?;
-        if let Some(found) = law::find(problem, &rule.competing(), baseline, base)? {
+        if let Some(found) = find(problem, &rule.competing(), baseline, base)? {
             diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);
             draw(diagnosis, &found.predictions);
             diagnosis.noise = answer.noise(&found.fit);
@@ -383,15 +390,8 @@ fn check_experiment(
     Ok(())
 }
 
-/// Measured values, and unknowns of the baseline and its noise.
-pub(crate) fn size(problem: &Problem<'_>) -> (usize, usize) {
-    let selection = problem.select(&[], &[]);
-    let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-    (rows, selection.shared.len() + selection.nuisance.len() * problem.rows.len() + problem.channels())
-}
-
 fn enough_rows(problem: &Problem<'_>) -> Result<(), DiagnoseError> {
-    let (rows, parameters) = size(problem);
+    let (rows, parameters) = problem.size();
     if rows <= parameters { Err(DiagnoseError::TooFewRows { rows, parameters }) } else { Ok(()) }
 }
 

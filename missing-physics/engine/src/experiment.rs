@@ -1,14 +1,14 @@
 //! The next experiment: the action within the rig's range after which the least doubt between the rivals is expected.
 
-use nalgebra::DMatrix;
-
 use crate::data::Recording;
 use crate::diagnosis::NextExperiment;
-use crate::fit::gauss_newton::{NoiseState, whitened_columns};
-use crate::linalg::{RANK_FLOOR, backward, cholesky, dot, forward};
+use crate::fit::bordered::BorderedNormal;
+use crate::fit::columns::whitened_columns;
+use crate::linalg::gram;
 use crate::model::{Experiment, PredictError};
+use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
-use crate::selection::compare::Candidate;
+use crate::selection::candidate::Candidate;
 
 /// Below this expected log Bayes factor an experiment is not worth doing.
 const WORTHWHILE: f64 = 1.0;
@@ -103,43 +103,19 @@ fn expected(
     // The rivals' noise is a property of the rig: white at the level that the present data show.
     let noise = NoiseState { shape: vec![0; channels], sigma: truth.fit.noise.sigma.clone() };
     let selection: &Selection = &other.selection;
-    let (n_nuisance, n_shared) = (selection.nuisance.len(), selection.shared.len());
-    let mut information: DMatrix<f64> = other.fit.information.clone();
-    let mut right = vec![0.0; n_shared];
-    let mut total = 0.0;
+    let mut bordered = BorderedNormal::with_prior(other.fit.information.clone());
     for run in 0..future.rows.len() {
-        let columns = whitened_columns(
+        let nuisance = nuisance_of_next(other, &experiment.nuisance[run]);
+        bordered.add(&gram(&whitened_columns(
             &future,
             selection,
             &noise,
             run,
             &other.fit.shared,
-            &nuisance_of_next(other, &experiment.nuisance[run]),
-        )?;
-        let residual = &columns[n_nuisance + n_shared];
-        total += dot(residual, residual);
-        let mut factor = DMatrix::from_fn(n_nuisance, n_nuisance, |i, j| dot(&columns[i], &columns[j]));
-        let kept = cholesky(&mut factor, RANK_FLOOR);
-        let border = |j: usize| {
-            let mut column: Vec<f64> = (0..n_nuisance).map(|i| dot(&columns[i], &columns[j])).collect();
-            forward(&factor, &kept, &mut column);
-            column
-        };
-        let borders: Vec<Vec<f64>> = (n_nuisance..=n_nuisance + n_shared).map(border).collect();
-        total -= dot(&borders[n_shared], &borders[n_shared]);
-        for i in 0..n_shared {
-            for j in 0..n_shared {
-                information[(i, j)] +=
-                    dot(&columns[n_nuisance + i], &columns[n_nuisance + j]) - dot(&borders[i], &borders[j]);
-            }
-            right[i] += dot(&columns[n_nuisance + i], residual) - dot(&borders[i], &borders[n_shared]);
-        }
+            &nuisance,
+        )?));
     }
-    let gradient = right.clone();
-    let kept = cholesky(&mut information, RANK_FLOOR);
-    forward(&information, &kept, &mut right);
-    backward(&information, &kept, &mut right);
-    Ok(0.5 * (total - dot(&gradient, &right)).max(0.0))
+    Ok(0.5 * bordered.solve(&bordered.factor()).1)
 }
 
 /// A further run's nuisance parameters: those that a mechanism added have the mean of the runs so far.

@@ -19,4 +19,5 @@ mod problem;
 mod quantity;
 pub mod repaired;
 mod selection;
+mod statistics;
 pub mod synthetic;

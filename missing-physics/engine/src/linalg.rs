@@ -29,108 +29,122 @@ pub(crate) fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
     gram
 }
 
-/// Cholesky factor of a positive semidefinite matrix in place (lower triangle); a pivot below `floor` times its
-/// diagonal entry is dropped (its row and column count as zero). Returns which pivots were kept.
-pub(crate) fn cholesky(matrix: &mut DMatrix<f64>, floor: f64) -> Vec<bool> {
-    let n = matrix.nrows();
-    let mut kept = vec![false; n];
-    for j in 0..n {
-        let diagonal = matrix[(j, j)];
-        let mut pivot = diagonal;
-        for k in 0..j {
-            pivot -= matrix[(j, k)] * matrix[(j, k)];
-        }
-        kept[j] = pivot > floor * diagonal && pivot > 0.0 && pivot.is_finite();
-        if kept[j] {
-            let root = pivot.sqrt();
-            matrix[(j, j)] = root;
-            for i in j + 1..n {
-                let mut value = matrix[(i, j)];
-                for k in 0..j {
-                    value -= matrix[(i, k)] * matrix[(j, k)];
-                }
-                matrix[(i, j)] = value / root;
-            }
-        } else {
-            matrix[(j, j)] = 1.0;
-            for i in j + 1..n {
-                matrix[(i, j)] = 0.0;
-            }
+/// Cholesky factor of a positive semidefinite matrix; directions that the matrix does not determine are left out.
+#[derive(Debug, Clone)]
+pub(crate) struct SemiCholesky {
+    /// Lower triangle; the row and the column of a dropped pivot are those of the unit matrix.
+    factor: DMatrix<f64>,
+    kept: Vec<bool>,
+}
+
+impl SemiCholesky {
+    /// Factors the lower triangle of `matrix`; a pivot below `floor` times its diagonal entry is dropped (its row and column count as
+    /// zero).
+    pub(crate) fn new(mut matrix: DMatrix<f64>, floor: f64) -> Self {
+        let n = matrix.nrows();
+        let mut kept = vec![false; n];
+        for j in 0..n {
+            let diagonal = matrix[(j, j)];
+            let mut pivot = diagonal;
             for k in 0..j {
-                matrix[(j, k)] = 0.0;
+                pivot -= matrix[(j, k)] * matrix[(j, k)];
             }
-        }
-        for i in 0..j {
-            matrix[(i, j)] = 0.0;
-        }
-    }
-    kept
-}
-
-/// A run's nuisance coefficients once the shared ones are known: `nuisance` and the shared columns' `borders` are forward-solved with the nuisance
-/// columns' factor.
-pub(crate) fn back_substitute(
-    factor: &DMatrix<f64>,
-    kept: &[bool],
-    borders: &[Vec<f64>],
-    mut nuisance: Vec<f64>,
-    shared: &[f64],
-) -> Vec<f64> {
-    for (border, x) in borders.iter().zip(shared) {
-        nuisance.iter_mut().zip(border).for_each(|(o, b)| *o -= x * b);
-    }
-    backward(factor, kept, &mut nuisance);
-    nuisance
-}
-
-/// Cholesky with pivots judged against the columns' sums of squares before elimination.
-pub(crate) fn cholesky_against(matrix: &mut DMatrix<f64>, scales: &[f64]) -> Vec<bool> {
-    for (i, scale) in scales.iter().enumerate() {
-        if matrix[(i, i)] <= 1e-9 * scale {
-            for j in 0..scales.len() {
+            kept[j] = pivot > floor * diagonal && pivot > 0.0 && pivot.is_finite();
+            if kept[j] {
+                let root = pivot.sqrt();
+                matrix[(j, j)] = root;
+                for i in j + 1..n {
+                    let mut value = matrix[(i, j)];
+                    for k in 0..j {
+                        value -= matrix[(i, k)] * matrix[(j, k)];
+                    }
+                    matrix[(i, j)] = value / root;
+                }
+            } else {
+                matrix[(j, j)] = 1.0;
+                for i in j + 1..n {
+                    matrix[(i, j)] = 0.0;
+                }
+                for k in 0..j {
+                    matrix[(j, k)] = 0.0;
+                }
+            }
+            for i in 0..j {
                 matrix[(i, j)] = 0.0;
-                matrix[(j, i)] = 0.0;
             }
         }
+        Self { factor: matrix, kept }
     }
-    cholesky(matrix, 1e-9)
-}
 
-/// Solves `L x = b` in place; entries of dropped pivots become zero.
-pub(crate) fn forward(factor: &DMatrix<f64>, kept: &[bool], b: &mut [f64]) {
-    for i in 0..b.len() {
-        if !kept[i] {
-            b[i] = 0.0;
-            continue;
-        }
-        let mut value = b[i];
-        for k in 0..i {
-            value -= factor[(i, k)] * b[k];
-        }
-        b[i] = value / factor[(i, i)];
-    }
-}
-
-/// Solves `L^T x = b` in place; entries of dropped pivots become zero.
-pub(crate) fn backward(factor: &DMatrix<f64>, kept: &[bool], b: &mut [f64]) {
-    for i in (0..b.len()).rev() {
-        if !kept[i] {
-            b[i] = 0.0;
-            continue;
-        }
-        let mut value = b[i];
-        for k in i + 1..b.len() {
-            if kept[k] {
-                value -= factor[(k, i)] * b[k];
+    /// Factors what an elimination left of a matrix: columns of which less than a share [`rank::CHANNEL`] of their sum of squares before it
+    /// (`squares`) is left are dropped.
+    pub(crate) fn against(mut matrix: DMatrix<f64>, squares: &[f64]) -> Self {
+        for (i, square) in squares.iter().enumerate() {
+            if matrix[(i, i)] <= rank::CHANNEL * square {
+                matrix.row_mut(i).fill(0.0);
+                matrix.column_mut(i).fill(0.0);
             }
         }
-        b[i] = value / factor[(i, i)];
+        Self::new(matrix, rank::CHANNEL)
     }
-}
 
-/// Log determinant over the kept pivots.
-pub(crate) fn log_determinant(factor: &DMatrix<f64>, kept: &[bool]) -> f64 {
-    (0..kept.len()).filter(|&i| kept[i]).map(|i| 2.0 * factor[(i, i)].ln()).sum()
+    /// Solves `L x = b` in place; entries of dropped pivots become zero.
+    pub(crate) fn forward(&self, b: &mut [f64]) {
+        for i in 0..b.len() {
+            if !self.kept[i] {
+                b[i] = 0.0;
+                continue;
+            }
+            let mut value = b[i];
+            for k in 0..i {
+                value -= self.factor[(i, k)] * b[k];
+            }
+            b[i] = value / self.factor[(i, i)];
+        }
+    }
+
+    /// Solves `L^T x = b` in place; entries of dropped pivots become zero.
+    pub(crate) fn backward(&self, b: &mut [f64]) {
+        for i in (0..b.len()).rev() {
+            if !self.kept[i] {
+                b[i] = 0.0;
+                continue;
+            }
+            let mut value = b[i];
+            for k in i + 1..b.len() {
+                if self.kept[k] {
+                    value -= self.factor[(k, i)] * b[k];
+                }
+            }
+            b[i] = value / self.factor[(i, i)];
+        }
+    }
+
+    /// Solves `L L^T x = b` in place.
+    pub(crate) fn solve(&self, b: &mut [f64]) {
+        self.forward(b);
+        self.backward(b);
+    }
+
+    /// Log determinant over the kept pivots.
+    pub(crate) fn log_determinant(&self) -> f64 {
+        (0..self.size()).filter(|&i| self.kept[i]).map(|i| 2.0 * self.factor[(i, i)].ln()).sum()
+    }
+
+    /// Rows of the matrix.
+    pub(crate) fn size(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// Number of kept pivots.
+    pub(crate) fn rank(&self) -> usize {
+        self.kept.iter().filter(|kept| **kept).count()
+    }
+
+    /// Whether a pivot was kept.
+    pub(crate) fn keeps(&self, i: usize) -> bool {
+        self.kept[i]
+    }
 }
 
 /// Inverse of a symmetric matrix that may be of low rank, whatever the units of its rows: directions that it does not tell are
@@ -157,8 +171,17 @@ pub(crate) fn determined(here: &[f64], largest: &[f64]) -> Vec<usize> {
     (0..here.len()).filter(|&k| here[k] > 0.0 && here[k] >= 0.01 * largest[k]).collect()
 }
 
-/// Pivots below this share of their diagonal count as not determined.
-pub(crate) const RANK_FLOOR: f64 = 1e-11;
+/// What share of its diagonal entry must be left of a pivot so that it counts as determined.
+pub(crate) mod rank {
+    /// Normal equations of a fit, all channels together.
+    pub(crate) const FIT: f64 = 1e-11;
+    /// Normal equations of one channel, or columns beside which others stand that may span them.
+    pub(crate) const CHANNEL: f64 = 1e-9;
+    /// Whether a shared parameter is determined at all, the others being free.
+    pub(crate) const DETERMINED: f64 = 1e-13;
+    /// Covariance matrices of values that have errors.
+    pub(crate) const COVARIANCE: f64 = 1e-12;
+}
 
 #[cfg(test)]
 mod tests {
@@ -167,13 +190,12 @@ mod tests {
     #[test]
     fn a_dependent_column_is_dropped_and_the_rest_solved() {
         let columns = [[1.0, 2.0, 3.0, 4.0], [2.0, 4.0, 6.0, 8.0], [1.0, 0.0, -1.0, 5.0]];
-        let mut gram = DMatrix::from_fn(3, 3, |i, j| dot(&columns[i], &columns[j]));
+        let gram = DMatrix::from_fn(3, 3, |i, j| dot(&columns[i], &columns[j]));
         let target = [2.0, 2.0, 2.0, 9.0]; // first + third
         let mut b: Vec<f64> = columns.iter().map(|c| dot(c, &target)).collect();
-        let kept = cholesky(&mut gram, RANK_FLOOR);
-        assert_eq!(kept, vec![true, false, true]);
-        forward(&gram, &kept, &mut b);
-        backward(&gram, &kept, &mut b);
+        let factor = SemiCholesky::new(gram, rank::FIT);
+        assert_eq!((factor.kept.as_slice(), factor.rank()), ([true, false, true].as_slice(), 2));
+        factor.solve(&mut b);
         approx::assert_relative_eq!(b.as_slice(), [1.0, 0.0, 1.0].as_slice(), epsilon = 1e-12);
     }
 }

@@ -5,7 +5,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use crate::data::Recording;
 use crate::engine::{DiagnoseError, Options, baseline_of};
 use crate::model::Model;
-use crate::selection::compare::{candidate, held_out, search};
+use crate::selection::candidate::{Candidate, candidate};
+use crate::selection::held_out::held_out;
+use crate::selection::search::search;
 
 /// What the data say of the mechanisms that are truly at work.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,9 +51,7 @@ pub fn oracle(
         Some(found) => found,
         None => candidate(&problem, &competing, &set, &[], &baseline.fit, &[])?,
     };
-    let lacking = |c: &&crate::selection::compare::Candidate| {
-        !set.iter().all(|m| c.set.contains(m)) && c.ruled_out.is_none()
-    };
+    let lacking = |c: &&Candidate| !set.iter().all(|m| c.set.contains(m)) && c.ruled_out.is_none();
     let rival = all.iter().filter(lacking).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
     let likelihood_ratio = 2.0 * (truth.fit.log_likelihood - all[0].fit.log_likelihood);
     let degrees = truth.selection.shared.len() - all[0].selection.shared.len();

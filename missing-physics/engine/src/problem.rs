@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 use crate::data::{Recording, Run};
 use crate::model::{Model, Scope, Spec};
 use crate::noise::family::Family;
-use crate::noise::process::{Whitener, median};
+use crate::noise::process::Whitener;
+use crate::statistics::median;
 
 /// A model and a recording, with everything about the rows that no fit changes.
 pub(crate) struct Problem<'a> {
@@ -143,6 +144,14 @@ impl<'a> Problem<'a> {
         self.rows.iter().map(|r| r.valid[channel].len()).sum()
     }
 
+    /// Measured values, and unknowns of the baseline and its noise.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        let selection = self.select(&[], &[]);
+        let rows: usize = (0..self.channels()).map(|c| self.count(c)).sum();
+        (rows, selection.shared.len() + selection.nuisance.len() * self.rows.len() + self.channels())
+    }
+
+    /// The whitener of a channel's measured rows in a run, under a shape of noise.
     pub(crate) fn whitener(&self, run: usize, channel: usize, shape: usize) -> &Whitener {
         let rows = &self.rows[run];
         let page = rows.whiteners[channel][shape / PAGE].get_or_init(|| empty(PAGE).into_boxed_slice());

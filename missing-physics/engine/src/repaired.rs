@@ -4,12 +4,14 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Recording, RecordingError};
-use crate::fit::gauss_newton::{NoiseState, normal_of_run, solve};
+use crate::fit::columns::normal_of_run;
+use crate::fit::gauss_newton::solve;
 use crate::linalg::inverse;
 use crate::model::{Model, PredictError, Quantity, SpecError};
 use crate::noise::family::Family;
+use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
-use crate::selection::compare::Candidate;
+use crate::selection::candidate::Candidate;
 
 /// A model with its mechanisms on, and how well its parameters are known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::data::{Recording, Run};
-use crate::linalg::{cholesky, forward};
+use crate::linalg::{SemiCholesky, rank};
 use crate::model::{Model, PredictError, Quantity, Scope, Spec};
 
 /// A simulator with chance in it, seen through statistics of what it makes.
@@ -54,8 +54,7 @@ pub struct Synthetic<S> {
     draws: usize,
     seed: u64,
     centre: Vec<f64>,
-    factor: DMatrix<f64>,
-    kept: Vec<bool>,
+    factor: SemiCholesky,
     /// The runs with all their rows, by label: the engine sees one row of each.
     whole: HashMap<String, Run>,
 }
@@ -119,8 +118,7 @@ impl<S: Simulator> Synthetic<S> {
             draws,
             seed,
             centre: vec![0.0; n],
-            factor: DMatrix::identity(n, n),
-            kept: vec![true; n],
+            factor: SemiCholesky::new(DMatrix::identity(n, n), rank::COVARIANCE),
             whole: runs.iter().map(|(run, _)| (run.label.clone(), run.clone())).collect(),
         };
         let start = |scope: Scope| -> Vec<f64> {
@@ -145,8 +143,8 @@ impl<S: Simulator> Synthetic<S> {
         }
         // The prediction is itself a mean of draws and has their error.
         covariance *= 1.0 + 1.0 / draws as f64;
-        let kept = cholesky(&mut covariance, 1e-12);
-        (model.centre, model.factor, model.kept) = (centre, covariance, kept);
+        model.factor = SemiCholesky::new(covariance, rank::COVARIANCE);
+        model.centre = centre;
         let channels = model
             .simulator
             .statistics()
@@ -192,7 +190,7 @@ impl<S: Simulator> Synthetic<S> {
 
     fn standardised(&self, statistics: &[f64]) -> Vec<f64> {
         let mut left: Vec<f64> = statistics.iter().zip(&self.centre).map(|(s, c)| s - c).collect();
-        forward(&self.factor, &self.kept, &mut left);
+        self.factor.forward(&mut left);
         left
     }
 }

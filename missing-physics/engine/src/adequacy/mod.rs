@@ -1,5 +1,8 @@
 //! Whether a model is adequate, and which rows no model would explain.
 
 pub(crate) mod linearised;
+pub(crate) mod null;
+mod omnibus;
 pub(crate) mod outliers;
+mod tail;
 pub(crate) mod test;

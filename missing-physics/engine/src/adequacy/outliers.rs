@@ -1,10 +1,10 @@
 //! Wild readings: set aside before anything is judged, and listed.
 
 use crate::adequacy::linearised::Linearised;
-use crate::adequacy::test::residuals;
 use crate::data::Recording;
 use crate::diagnosis::Outlier;
-use crate::fit::gauss_newton::fit;
+use crate::fit::alternate::fit;
+use crate::fit::prediction::residuals;
 use crate::model::PredictError;
 use crate::noise::rule::noise_rule;
 use crate::problem::Problem;

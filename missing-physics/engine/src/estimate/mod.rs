@@ -1,3 +1,8 @@
 //! Values and intervals of parameters.
 
 pub(crate) mod estimates;
+pub(crate) mod open_noise;
+mod over_runs;
+pub(crate) mod profile;
+mod propagate;
+mod reach;

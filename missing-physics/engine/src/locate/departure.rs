@@ -3,7 +3,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::locate::scan::{bin, edges, solve, value, variables};
+use crate::locate::bins::{bin, edges, value, variables};
+use crate::locate::least_squares::least_squares;
 use crate::model::{CoupledRows, PredictError};
 use crate::problem::Problem;
 
@@ -146,7 +147,7 @@ impl<'a> Scan<'a> {
             }
         }
         let gathered = self.grams.iter().map(|gram| gather.tr_mul(&(gram * &gather)));
-        solve(gathered, n_nuisance, n_shared + shape.len())
+        least_squares(gathered, n_shared + shape.len())
     }
 
     /// By how much each channel's sum of squares falls.

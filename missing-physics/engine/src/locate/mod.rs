@@ -1,4 +1,7 @@
 //! Where the baseline misses the data.
 
-pub(crate) mod departure;
-pub(crate) mod scan;
+mod bins;
+mod departure;
+mod least_squares;
+pub(crate) mod locations;
+mod scan;

@@ -1,5 +1,7 @@
-//! Measurement noise: its law along a run, the shapes among which the data choose, and what is known of it before any fit.
+//! Measurement noise: its law along a run, the shapes among which the data choose, what is known of it before any fit, and what a fit
+//! shows of it.
 
+pub(crate) mod estimate;
 pub(crate) mod family;
 pub(crate) mod process;
 pub(crate) mod rule;

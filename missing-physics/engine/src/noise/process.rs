@@ -6,6 +6,8 @@
 //! column in O(n) at any spacing of the rows and with rows missing (Hartikainen and Sarkka 2010,
 //! doi:10.1109/MLSP.2010.5589113).
 
+use crate::statistics::median;
+
 /// How the unit-variance noise of one channel is correlated along a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
@@ -222,16 +224,6 @@ fn lagrange(positions: &[f64], ids: &[usize], at: f64) -> Vec<f64> {
                 .product()
         })
         .collect()
-}
-
-/// The median; `None` of nothing. Sorts its argument.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    Some(if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) })
 }
 
 #[cfg(test)]

@@ -2,8 +2,53 @@
 
 use std::collections::HashMap;
 
-use crate::fit::gauss_newton::NoiseRule;
+use crate::noise::process::Shape;
 use crate::problem::Problem;
+
+/// The noise of all channels as a fit assumes it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NoiseState {
+    /// Index into the family of shapes, by channel.
+    pub(crate) shape: Vec<usize>,
+    /// One sigma, by channel.
+    pub(crate) sigma: Vec<f64>,
+}
+
+/// How the noise is chosen while a model is fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct NoiseRule {
+    /// A channel's sigma where a calibration or replicates fix it.
+    pub(crate) fixed_sigma: Vec<Option<f64>>,
+    /// How well each fixed sigma is known: its relative standard error.
+    pub(crate) uncertainty: Vec<f64>,
+    /// The shapes that are tried one by one; those between them follow from the best.
+    pub(crate) allowed: Vec<usize>,
+    /// The longest correlation that is believed, in median steps between rows.
+    pub(crate) longest: f64,
+    /// Further log prior weight against correlated noise. Where mechanisms compete, colour that only some of them need is
+    /// one more thing that they assume; it cancels where all of them need it.
+    pub(crate) against_colour: f64,
+    /// The smallest sigma that is believed, by channel (a reading has a last digit).
+    pub(crate) floor: Vec<f64>,
+}
+
+impl NoiseRule {
+    /// Log prior weight of a shape.
+    pub(crate) fn log_prior(&self, problem: &Problem<'_>, shape: usize) -> f64 {
+        let weight = problem.family.shape(shape).log_prior();
+        if weight < 0.0 { weight - self.against_colour } else { weight }
+    }
+
+    /// Whether a shape between the allowed ones may be chosen.
+    pub(crate) fn admits(&self, shape: &Shape) -> bool {
+        shape.length_steps <= self.longest
+    }
+
+    /// The same rule for mechanisms that compete.
+    pub(crate) fn competing(&self) -> Self {
+        Self { against_colour: 6.0, ..self.clone() }
+    }
+}
 
 /// Relative standard error of a calibrated sigma.
 const CALIBRATION_UNCERTAINTY: f64 = 0.02;

@@ -1,5 +1,10 @@
 //! Which mechanisms have to be on: sets of mechanisms fitted, weighed, and judged on data that their fit has not seen.
 
-pub(crate) mod compare;
-pub(crate) mod nuisance_prior;
+pub(crate) mod candidate;
+pub(crate) mod confusion;
+pub(crate) mod evidence;
+pub(crate) mod held_out;
+mod nuisance_prior;
+mod prior;
 pub(crate) mod ranking;
+pub(crate) mod search;

@@ -5,10 +5,11 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::gauss_newton::{Fit, covariance, nuisance_prior_width};
-use crate::linalg::{cholesky, dot, forward, log_determinant};
+use crate::fit::columns::nuisance_prior_width;
+use crate::fit::optimum::{Fit, covariance};
+use crate::linalg::{SemiCholesky, dot, rank};
 use crate::problem::{Problem, Selection};
-use crate::selection::compare::LOG_RANGE;
+use crate::selection::prior::LOG_RANGE;
 
 /// Log evidence that the `i`-th free nuisance parameter costs: minus the log of the best normal law's density at the runs' values (with
 /// the errors that they have, alone and through the shared parameters), plus what choosing that law costs.
@@ -35,16 +36,16 @@ pub(crate) fn cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: u
         through + if r == q { a.error[i].min(widest).powi(2) } else { 0.0 }
     });
     let law = |width: f64, free_mean: bool| -> (f64, f64, f64) {
-        let mut factor = errors.clone();
-        (0..n).for_each(|r| factor[(r, r)] += width * width);
-        let kept = cholesky(&mut factor, 1e-12);
+        let mut covariance = errors.clone();
+        (0..n).for_each(|r| covariance[(r, r)] += width * width);
+        let factor = SemiCholesky::new(covariance, rank::COVARIANCE);
         let (mut ones, mut left) = (vec![1.0; n], values.clone());
-        forward(&factor, &kept, &mut ones);
-        forward(&factor, &kept, &mut left);
+        factor.forward(&mut ones);
+        factor.forward(&mut left);
         let precision = dot(&ones, &ones);
         let mean = if free_mean { dot(&ones, &left) / precision } else { 0.0 };
         let square = dot(&left, &left) - if free_mean { mean * mean * precision } else { 0.0 };
-        (0.5 * log_determinant(&factor, &kept) + 0.5 * square, mean, precision.sqrt().recip())
+        (0.5 * factor.log_determinant() + 0.5 * square, mean, precision.sqrt().recip())
     };
     let runs = n as f64;
     let largest = (dot(&values, &values) / runs).sqrt().clamp(1e-9 * widest, widest);

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use crate::adequacy::test::Adequacy;
 use crate::model::PredictError;
 use crate::problem::Problem;
-use crate::selection::compare::{Candidate, HeldOut, held_out, nested};
+use crate::selection::candidate::{Candidate, nested};
+use crate::selection::held_out::{HeldOut, held_out};
 
 /// Rivals within this log evidence of the best fit equally well (odds of 20 to 1).
 const RIVAL_GAP: f64 = 3.0;

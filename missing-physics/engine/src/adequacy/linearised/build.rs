@@ -1,9 +1,12 @@
 //! Linearises a model around a fit: the columns of its plane, and of the directions in which it might be wrong.
 
-use super::{Alternative, Block, Curves, DEGREE, Linearised};
-use crate::fit::gauss_newton::{Fit, NoiseRule, NoiseState, whitened_columns};
+use super::curves::{Curves, DEGREE};
+use super::plane::{Alternative, Block, Linearised};
+use crate::fit::columns::whitened_columns;
+use crate::fit::optimum::Fit;
 use crate::linalg::{determined, dot};
 use crate::model::{Mechanism, PredictError, Scope};
+use crate::noise::rule::{NoiseRule, NoiseState};
 use crate::problem::{Problem, Selection};
 
 /// Everything that the model or any rival frees, and where its columns stand in a block: nuisance of the model, shared of the model, nuisance

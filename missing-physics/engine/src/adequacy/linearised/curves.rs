@@ -1,9 +1,11 @@
 //! Smooth functions of the inputs and of the prediction itself: what a residual may depend on when nothing is known.
 
-use super::DEGREE;
-use crate::fit::gauss_newton::Fit;
+use crate::fit::optimum::Fit;
 use crate::model::PredictError;
 use crate::problem::Problem;
+
+/// Degree of the polynomial in a variable that the adequacy test looks for.
+pub(crate) const DEGREE: usize = 5;
 
 /// Range of a prediction, in sigmas, below which it counts as constant.
 const LEAST_RANGE: f64 = 0.1;

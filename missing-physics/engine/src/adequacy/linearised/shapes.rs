@@ -1,6 +1,6 @@
 //! Which noise a data vector has, of the shapes on the family's lattice.
 
-use super::Linearised;
+use super::plane::Linearised;
 
 /// Most moves of a climb at one stride.
 const CLIMB: usize = 8;
@@ -11,14 +11,7 @@ impl Linearised<'_> {
     pub(crate) fn noise_beyond_mechanisms(&self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
         let products = self.products(data);
         let nuisance: Vec<usize> = (0..self.n_nuisance).collect();
-        let mut shared: Vec<usize> = (self.n_nuisance..self.n_nuisance + self.n_shared).collect();
-        for alternative in &self.alternatives[..self.mechanisms] {
-            for column in &alternative.shared {
-                if !shared.contains(column) {
-                    shared.push(*column);
-                }
-            }
-        }
+        let (_, shared) = self.columns_with(self.mechanisms);
         let start = self.white_start(&products);
         let (_, noise, _) = self.alternate(&products, &nuisance, &shared, &start, 8);
         noise.into_iter().map(|(shape, sigma)| (self.in_play[shape], sigma)).collect()

@@ -2,40 +2,30 @@
 
 use nalgebra::DMatrix;
 
-use super::{Linearised, Product, Products};
-use crate::linalg::{RANK_FLOOR, back_substitute, backward, cholesky, cholesky_against, dot, forward};
+use super::plane::{Linearised, Product, Products};
+use crate::fit::bordered::BorderedNormal;
+use crate::linalg::dot;
 
 impl Linearised<'_> {
+    /// Products of a data vector with all columns.
     pub(super) fn products(&self, data: &[Vec<Vec<f64>>]) -> Products {
-        let values = self
-            .blocks
-            .iter()
-            .zip(data)
-            .enumerate()
-            .map(|(run, (row, data))| {
-                row.iter()
-                    .zip(data)
-                    .enumerate()
-                    .map(|(channel, (block, raw))| {
-                        block
-                            .shapes
-                            .iter()
-                            .zip(&self.in_play)
-                            .map(|(shape, &index)| {
-                                let mut y = raw.clone();
-                                self.problem.whitener(run, channel, index).whiten(&mut y);
-                                let with: Vec<f64> = shape.columns.iter().map(|c| dot(c, &y)).collect();
-                                let mut nuisance: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
-                                forward(&shape.nuisance.0, &shape.nuisance.1, &mut nuisance);
-                                let total = dot(&y, &y);
-                                Product { with, left: total - dot(&nuisance, &nuisance), nuisance, total }
-                            })
-                            .collect()
-                    })
-                    .collect()
-            })
-            .collect();
-        Products { values }
+        let of_block = |run: usize, channel: usize| -> Vec<Product> {
+            let shapes = self.blocks[run][channel].shapes.iter().zip(&self.in_play);
+            shapes
+                .map(|(whitened, &shape)| {
+                    let mut y = data[run][channel].clone();
+                    self.problem.whitener(run, channel, shape).whiten(&mut y);
+                    let with: Vec<f64> = whitened.columns.iter().map(|c| dot(c, &y)).collect();
+                    let mine = &self.blocks[run][channel].mine;
+                    let mut nuisance: Vec<f64> = mine.iter().map(|&i| with[i]).collect();
+                    whitened.eliminated.forward(&mut nuisance);
+                    let total = dot(&y, &y);
+                    Product { with, left: total - dot(&nuisance, &nuisance), nuisance, total }
+                })
+                .collect()
+        };
+        let of_run = |run: usize| (0..data[run].len()).map(|channel| of_block(run, channel)).collect();
+        Products { values: (0..data.len()).map(of_run).collect() }
     }
 
     /// Fits the model with an alternative's columns added, for a given noise.
@@ -46,55 +36,26 @@ impl Linearised<'_> {
         nuisance: &[usize],
         shared: &[usize],
     ) -> Vec<Vec<f64>> {
-        let (q, s) = (nuisance.len(), shared.len());
-        let mut information = DMatrix::zeros(s, s);
-        let mut right = vec![0.0; s];
-        let mut parts = Vec::with_capacity(self.blocks.len());
+        let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
+        let last = ids.len();
+        let mut bordered = BorderedNormal::new(shared.len());
         for (row, values) in self.blocks.iter().zip(&products.values) {
-            let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
-            let mut normal = DMatrix::zeros(q + s, q + s);
-            let mut b = vec![0.0; q + s];
+            let mut normal = DMatrix::zeros(last + 1, last + 1);
             for ((block, value), &(shape, sigma)) in row.iter().zip(values).zip(noise) {
                 let weight = 1.0 / (sigma * sigma);
                 let gram = &block.shapes[shape].gram;
                 for (i, &a) in ids.iter().enumerate() {
-                    b[i] += weight * value[shape].with[a];
+                    normal[(last, i)] += weight * value[shape].with[a];
                     for (j, &c) in ids.iter().enumerate().take(i + 1) {
                         normal[(i, j)] += weight * gram[(a, c)];
                     }
                 }
             }
-            let mut factor = normal.view((0, 0), (q, q)).into_owned();
-            let kept = cholesky(&mut factor, RANK_FLOOR);
-            let borders: Vec<Vec<f64>> = (0..s)
-                .map(|j| {
-                    let mut column: Vec<f64> = (0..q).map(|i| normal[(q + j, i)]).collect();
-                    forward(&factor, &kept, &mut column);
-                    column
-                })
-                .collect();
-            let mut reduced = b[..q].to_vec();
-            forward(&factor, &kept, &mut reduced);
-            for i in 0..s {
-                for j in 0..=i {
-                    information[(i, j)] += normal[(q + i, q + j)] - dot(&borders[i], &borders[j]);
-                }
-                right[i] += b[q + i] - dot(&borders[i], &reduced);
-            }
-            parts.push((factor, kept, borders, reduced));
+            bordered.add(&normal);
         }
         // A column that the others already span (a polynomial within the nuisances) is dropped.
-        let kept = cholesky_against(&mut information, &self.scales(noise, shared));
-        forward(&information, &kept, &mut right);
-        backward(&information, &kept, &mut right);
-        parts
-            .into_iter()
-            .map(|(factor, kept, borders, reduced)| {
-                let mut all = back_substitute(&factor, &kept, &borders, reduced, &right);
-                all.extend_from_slice(&right);
-                all
-            })
-            .collect()
+        let (x, _) = bordered.solve(&bordered.factor_against(&self.scales(noise, shared)));
+        bordered.coefficients(&x)
     }
 
     /// Sums of squares of the shared columns before anything is eliminated, the measure of "already spanned".
@@ -124,13 +85,14 @@ impl Linearised<'_> {
         for ((row, values), x) in self.blocks.iter().zip(&products.values).zip(coefficients) {
             // The nuisance coefficients are fitted anew under each shape; the others are given.
             let block = &row[channel].shapes[shape];
+            let borders = &block.eliminated.borders;
             let product = &values[channel][shape];
             let mut form = product.left;
             let others = || ids.iter().zip(x).filter(|(a, _)| !row[channel].mine.contains(a));
             for (&a, xa) in others() {
-                let mut inner = -2.0 * (product.with[a] - dot(&block.borders[a], &product.nuisance));
+                let mut inner = -2.0 * (product.with[a] - dot(&borders[a], &product.nuisance));
                 for (&c, xc) in others() {
-                    inner += (block.gram[(a, c)] - dot(&block.borders[a], &block.borders[c])) * xc;
+                    inner += (block.gram[(a, c)] - dot(&borders[a], &borders[c])) * xc;
                 }
                 form += xa * inner;
             }

@@ -1,0 +1,64 @@
+//! What a data vector says of the model and of its alternatives.
+
+use super::plane::{Alternative, Linearised, Products, Reading};
+
+impl Linearised<'_> {
+    /// Fits the model and every alternative to a data vector (`[run][channel]`, measured rows).
+    pub(crate) fn read(&self, data: &[Vec<Vec<f64>>]) -> Reading {
+        let products = self.products(data);
+        let (nuisance, shared) = self.columns_with(0);
+        let start = self.white_start(&products);
+        let (score, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
+        let gain = |alternative| self.gain(&products, (&nuisance, &shared), &noise, alternative);
+        let gains = self.alternatives.iter().map(gain).collect();
+        Reading { score, gains, noise, coefficients }
+    }
+
+    /// By how much an alternative lowers the sum of squares that the model alone leaves, in units of the noise that is left beside the
+    /// alternative; nothing where its coefficient has the wrong sign.
+    fn gain(
+        &self,
+        products: &Products,
+        (nuisance, shared): (&[usize], &[usize]),
+        noise: &[(usize, f64)],
+        alternative: &Alternative,
+    ) -> f64 {
+        let with_nuisance = [nuisance, &alternative.nuisance].concat();
+        let with_shared = [shared, &alternative.shared].concat();
+        let (_, beside, _) = self.alternate(products, &with_nuisance, &with_shared, noise, 4);
+        let x = self.solve(products, &beside, &with_nuisance, &with_shared);
+        let wrong = alternative.sign != 0.0
+            && x.first().and_then(|x| x.last()).is_some_and(|value| value * alternative.sign < 0.0);
+        if wrong {
+            return 0.0;
+        }
+        let with = self.chi2(products, &beside, &with_nuisance, &with_shared, &x);
+        let without = self.solve(products, &beside, nuisance, shared);
+        (self.chi2(products, &beside, nuisance, shared, &without) - with).max(0.0)
+    }
+
+    /// The whitened residual of a data vector under the model alone, `[run][channel]`.
+    pub(crate) fn whitened_residual(&self, data: &[Vec<Vec<f64>>], reading: &Reading) -> Vec<Vec<Vec<f64>>> {
+        let used = self.n_nuisance + self.n_shared;
+        data.iter()
+            .enumerate()
+            .map(|(run, row)| {
+                row.iter()
+                    .enumerate()
+                    .map(|(channel, raw)| {
+                        let (shape, sigma) = reading.noise[channel];
+                        let mut y = raw.clone();
+                        for (column, x) in
+                            self.blocks[run][channel].raw[..used].iter().zip(&reading.coefficients[run])
+                        {
+                            y.iter_mut().zip(column).for_each(|(v, c)| *v -= x * c);
+                        }
+                        self.problem.whitener(run, channel, self.in_play[shape]).whiten(&mut y);
+                        y.iter_mut().for_each(|v| *v /= sigma);
+                        y
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,36 @@
+//! Parameters and noise fitted in turn.
+
+use crate::fit::gauss_newton::solve;
+use crate::fit::optimum::Fit;
+use crate::model::PredictError;
+use crate::noise::estimate::estimate_noise;
+use crate::noise::rule::{NoiseRule, NoiseState};
+use crate::problem::{Problem, Selection};
+
+/// Fits parameters and noise in turn until neither moves.
+pub(crate) fn fit(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    rule: &NoiseRule,
+    start: (&[f64], &[Vec<f64>]),
+    noise: Option<&NoiseState>,
+) -> Result<Fit, PredictError> {
+    let first = match noise {
+        Some(noise) => noise.clone(),
+        None => {
+            let sigma = rule.fixed_sigma.iter().zip(&rule.floor).map(|(s, f)| s.unwrap_or(*f)).collect();
+            NoiseState { shape: vec![0; problem.channels()], sigma }
+        }
+    };
+    let mut best = solve(problem, selection, &first, start.0, start.1)?;
+    for _ in 0..6 {
+        let noise = estimate_noise(problem, selection, rule, &best.shared, &best.nuisance)?;
+        let still = noise.shape == best.noise.shape
+            && noise.sigma.iter().zip(&best.noise.sigma).all(|(a, b)| (a / b - 1.0).abs() < 1e-4);
+        if still {
+            break;
+        }
+        best = solve(problem, selection, &noise, &best.shared, &best.nuisance)?;
+    }
+    Ok(best)
+}

@@ -1,0 +1,92 @@
+//! The linearised model of one run: whitened columns, and the normal equations of them.
+
+use nalgebra::DMatrix;
+
+use crate::linalg::gram;
+use crate::model::PredictError;
+use crate::noise::rule::NoiseState;
+use crate::problem::{Problem, Selection};
+
+/// How wide the prior of a run's nuisance parameter is, in units of its scale.
+const NUISANCE_PRIOR: f64 = 1e3;
+/// The same for one that a mechanism adds.
+const ADDED_NUISANCE_PRIOR: f64 = 10.0;
+
+/// Standard deviation of the prior of the `i`-th free nuisance parameter.
+pub(crate) fn nuisance_prior_width(problem: &Problem<'_>, selection: &Selection, i: usize) -> f64 {
+    let width = if selection.added_nuisance[i] { ADDED_NUISANCE_PRIOR } else { NUISANCE_PRIOR };
+    width * problem.nuisance.scale[selection.nuisance[i]]
+}
+
+/// Whitened columns of one run: Jacobian by nuisance, by shared parameters, and the residual; channels one after the other.
+pub(crate) fn whitened_columns(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    run: usize,
+    shared: &[f64],
+    nuisance: &[f64],
+) -> Result<Vec<Vec<f64>>, PredictError> {
+    let data = &problem.recording.runs[run];
+    let rows = problem.channels() * data.len();
+    let free = selection.shared.len() + selection.nuisance.len();
+    let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows * free]);
+    problem.model.jacobian(
+        data,
+        shared,
+        nuisance,
+        &selection.shared,
+        &selection.nuisance,
+        &mut out,
+        &mut jacobian,
+    )?;
+    if let Some(bad) = out.iter().chain(&jacobian).find(|v| !v.is_finite()) {
+        return Err(PredictError { run: data.label.clone(), reason: format!("the prediction holds {bad}") });
+    }
+    let mut columns = vec![Vec::with_capacity(rows); free + 1];
+    for channel in 0..problem.channels() {
+        let whitener = problem.whitener(run, channel, noise.shape[channel]);
+        let inverse_sigma = 1.0 / noise.sigma[channel];
+        let mut push = |target: usize, mut picked: Vec<f64>| {
+            whitener.whiten(&mut picked);
+            columns[target].extend(picked.into_iter().map(|v| v * inverse_sigma));
+        };
+        for k in 0..free {
+            // The model lists shared columns first; the normal equations eliminate nuisance ones first.
+            let source = if k < selection.nuisance.len() {
+                selection.shared.len() + k
+            } else {
+                k - selection.nuisance.len()
+            };
+            push(k, problem.pick(run, channel, &jacobian[source * rows..(source + 1) * rows]));
+        }
+        let residual: Vec<f64> = problem.rows[run].valid[channel]
+            .iter()
+            .map(|&i| data.outputs[channel][i] - out[channel * data.len() + i])
+            .collect();
+        push(free, residual);
+    }
+    Ok(columns)
+}
+
+/// Normal equations of one run with the prior of its nuisance parameters, which come first, then the shared ones, then the residual.
+pub(crate) fn normal_of_run(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    run: usize,
+    shared: &[f64],
+    nuisance: &[f64],
+) -> Result<DMatrix<f64>, PredictError> {
+    let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, nuisance)?);
+    let last = gram.nrows() - 1;
+    for (i, &slot) in selection.nuisance.iter().enumerate() {
+        let precision = 1.0 / nuisance_prior_width(problem, selection, i).powi(2);
+        let departure = problem.nuisance_start[run][slot] - nuisance[slot];
+        gram[(i, i)] += precision;
+        gram[(i, last)] += precision * departure;
+        gram[(last, i)] += precision * departure;
+        gram[(last, last)] += precision * departure * departure;
+    }
+    Ok(gram)
+}

@@ -1,0 +1,107 @@
+//! Laws of an extended model: fitted, judged and put into words.
+
+use crate::diagnosis::{Estimate, Law};
+use crate::estimate::estimates::estimates;
+use crate::fit::optimum::Fit;
+use crate::fit::prediction::predictions;
+use crate::law::extended::{Added, Extended};
+use crate::law::found::{Found, compared, improves};
+use crate::model::PredictError;
+use crate::noise::rule::NoiseRule;
+use crate::problem::Problem;
+use crate::selection::candidate::{Candidate, candidate};
+use crate::selection::held_out::{HeldOut, held_out};
+
+/// Fits an extended model and says what law it is.
+pub(crate) fn extended(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    baseline: &Candidate,
+    seen: &HeldOut,
+    model: &Extended<'_>,
+) -> Result<Option<Found>, PredictError> {
+    let wide = Problem::new(model, problem.recording.clone());
+    let mut near = baseline.fit.clone();
+    near.shared.extend_from_slice(&wide.shared.start[model.inner_shared..]);
+    for nuisance in &mut near.nuisance {
+        nuisance.extend_from_slice(&wide.nuisance.start[model.inner_nuisance..]);
+    }
+    let Ok(fitted) = candidate(&wide, rule, &[], &[], &near, &[]) else { return Ok(None) };
+    let Ok(score) = held_out(&wide, &fitted) else { return Ok(None) };
+    if !improves(seen, &score) {
+        return Ok(None);
+    }
+    let added: Vec<usize> =
+        (0..wide.shared.index.len()).skip(model.inner_shared).map(|slot| wide.shared.index[slot]).collect();
+    let coefficients = estimates(&wide, &fitted, &added, &[], rule, false);
+    let (heldout_rmse, gain) = (compared(problem, seen, &score), score.log_score - seen.log_score);
+    let law = Law {
+        heldout_rmse,
+        heldout_log_score_gain: gain,
+        ..match &model.term {
+            Added::Periodic => periodic(problem, model, &fitted.fit, coefficients),
+            Added::Smooth { channel, variable, centre, half_width } => {
+                smooth(problem, *channel, *variable, [*centre, *half_width], coefficients)
+            }
+        }
+    };
+    let predictions = predictions(&wide, &fitted.fit)?;
+    Ok(Some(Found { law, predictions, held_out: score, fit: fitted.fit }))
+}
+
+/// An oscillation in words.
+fn periodic(problem: &Problem<'_>, model: &Extended<'_>, fit: &Fit, coefficients: Vec<Estimate>) -> Law {
+    let omega = fit.shared[model.inner_shared];
+    let amplitude = |c: usize| {
+        let at = model.inner_nuisance + 2 * c;
+        let of_runs = fit.nuisance.iter().map(|nuisance| nuisance[at].hypot(nuisance[at + 1]));
+        let mean = of_runs.sum::<f64>() / fit.nuisance.len() as f64;
+        let channel = &problem.recording.channels[c];
+        format!("{} {mean:.2e} {}", channel.name, channel.unit)
+    };
+    let amplitudes: Vec<String> = (0..model.channels).map(amplitude).collect();
+    let (along, unit) = match model.noise_along {
+        Some(v) => (problem.recording.variables[v].name.clone(), problem.recording.variables[v].unit.clone()),
+        None => ("row".into(), String::new()),
+    };
+    let named = |e: Estimate| Estimate {
+        name: "omega".into(),
+        unit: if unit.is_empty() { "rad".into() } else { format!("rad/{unit}") },
+        ..e
+    };
+    Law {
+        formula: format!(
+            "measured += A cos({omega:.4} {along}) + B sin({omega:.4} {along}), A and B of each run; mean amplitude: {}",
+            amplitudes.join(", ")
+        ),
+        kind: "periodic",
+        adds_to: ("measured".to_owned(), String::new()),
+        coefficients: coefficients.into_iter().map(named).collect(),
+        variables: vec![(along, unit)],
+        heldout_rmse: Vec::new(),
+        heldout_log_score_gain: 0.0,
+    }
+}
+
+/// A smooth curve in words.
+fn smooth(
+    problem: &Problem<'_>,
+    channel: usize,
+    variable: usize,
+    [centre, half_width]: [f64; 2],
+    coefficients: Vec<Estimate>,
+) -> Law {
+    let (quantity, v) = (&problem.recording.channels[channel], &problem.recording.variables[variable]);
+    Law {
+        formula: format!(
+            "{} += an empirical curve of {}: sum of c_k x^k, x = ({} - {centre:.6e}) / {half_width:.6e}",
+            quantity.name, v.name, v.name
+        ),
+        kind: "smooth",
+        adds_to: (quantity.name.clone(), quantity.unit.clone()),
+        variables: vec![(v.name.clone(), v.unit.clone())],
+        coefficients,
+        heldout_rmse: Vec::new(),
+        heldout_log_score_gain: 0.0,
+    }
+}

@@ -1,0 +1,171 @@
+//! A set of mechanisms, fitted from several starts.
+
+use crate::fit::alternate::fit;
+use crate::fit::gauss_newton::solve;
+use crate::fit::optimum::Fit;
+use crate::model::PredictError;
+use crate::noise::rule::NoiseRule;
+use crate::problem::{Problem, Selection};
+use crate::selection::evidence::evidence;
+
+/// Whole numbers that are less likely than the best by more than this logarithm (1 in 20) are ruled out.
+const OPEN: f64 = 3.0;
+
+/// A set of mechanisms, fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    /// Indices into the model's mechanisms, rising.
+    pub(crate) set: Vec<usize>,
+    pub(crate) selection: Selection,
+    pub(crate) fit: Fit,
+    /// Fits with other whole numbers (which row, which sensor) that the data leave open, likeliest first.
+    pub(crate) alternative_modes: Vec<Fit>,
+    /// Log marginal likelihood plus log prior odds of the set.
+    pub(crate) evidence: f64,
+    /// Why it is no explanation.
+    pub(crate) ruled_out: Option<String>,
+}
+
+/// Values of shared parameters at which a fit begins: slots and values.
+pub(crate) type Guess = Vec<(usize, f64)>;
+
+/// Fits one set, from several starts.
+pub(crate) fn candidate(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    set: &[usize],
+    terms: &[usize],
+    near: &Fit,
+    guesses: &[Guess],
+) -> Result<Candidate, PredictError> {
+    let selection = problem.select(set, terms);
+    let integers = problem.integer_slots(set);
+    let near = without_others(problem, &selection, &integers, near);
+    let starts = starts(problem, &selection, &integers, &near, guesses);
+    let mut fits = fits(problem, rule, &selection, &integers, &near, &starts)?;
+    let likelihood = |fit: &Fit| likelihood(problem, rule, fit);
+    fits.sort_by(|a, b| likelihood(b).total_cmp(&likelihood(a)));
+    let mut alternative_modes = fits.split_off(1);
+    let fit = fits.remove(0);
+    alternative_modes.retain(|other| likelihood(other) > likelihood(&fit) - OPEN);
+    let (mut evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
+    evidence += log_prior(problem, rule, &fit);
+    Ok(Candidate { set: set.to_vec(), selection, fit, alternative_modes, evidence, ruled_out })
+}
+
+/// A neighbour's fit: what it had on and this set does not is off again.
+fn without_others(problem: &Problem<'_>, selection: &Selection, integers: &[usize], near: &Fit) -> Fit {
+    let mut near = near.clone();
+    for slot in (0..near.shared.len()).filter(|s| !selection.shared.contains(s) && !integers.contains(s)) {
+        near.shared[slot] = problem.shared.start[slot];
+    }
+    for (run, nuisance) in near.nuisance.iter_mut().enumerate() {
+        for slot in (0..nuisance.len()).filter(|s| !selection.nuisance.contains(s)) {
+            nuisance[slot] = problem.nuisance_start[run][slot];
+        }
+    }
+    near
+}
+
+/// Shared parameters at which fits begin: at the guesses, or where there is none with what was added off, or on a little to either
+/// side.
+fn starts(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    integers: &[usize],
+    near: &Fit,
+    guesses: &[Guess],
+) -> Vec<Vec<f64>> {
+    let mine = |slot: &usize| selection.shared.contains(slot) || integers.contains(slot);
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    for guess in guesses {
+        let mut start = near.shared.clone();
+        guess.iter().filter(|(slot, _)| mine(slot)).for_each(|&(slot, value)| start[slot] = value);
+        starts.push(start);
+    }
+    if guesses.is_empty() {
+        let table = &problem.shared;
+        let added = || selection.shared.iter().zip(&selection.added_shared).filter(|(_, added)| **added);
+        for side in [0.0, 0.3, -0.3] {
+            let mut start = near.shared.clone();
+            for (&slot, _) in added() {
+                start[slot] = (table.start[slot] + side * table.scale[slot])
+                    .clamp(table.lower[slot], table.upper[slot]);
+            }
+            if !starts.contains(&start) {
+                starts.push(start);
+            }
+        }
+    }
+    starts
+}
+
+/// The best fit for each choice of whole numbers, one at least.
+///
+/// Sigmas of the baseline's fit are too large where it misses; a smaller one only sharpens the same surface. Between whole numbers
+/// there is no surface: the best start with each of them is fitted with a noise of its own.
+fn fits(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    selection: &Selection,
+    integers: &[usize],
+    near: &Fit,
+    starts: &[Vec<f64>],
+) -> Result<Vec<Fit>, PredictError> {
+    let mut best_of: Vec<(Vec<f64>, Fit)> = Vec::new();
+    let mut failure = None;
+    for start in starts {
+        let numbers: Vec<f64> = integers.iter().map(|&slot| start[slot]).collect();
+        match solve(problem, selection, &near.noise, start, &near.nuisance) {
+            Ok(fit) => match best_of.iter_mut().find(|(n, _)| *n == numbers) {
+                Some((_, best)) if fit.chi2 < best.chi2 - 1e-9 => *best = fit,
+                Some(_) => {}
+                None => best_of.push((numbers, fit)),
+            },
+            Err(error) => failure = Some(error),
+        }
+    }
+    let mut fits = Vec::new();
+    for (_, best) in best_of {
+        match fit(problem, selection, rule, (&best.shared, &best.nuisance), Some(&best.noise)) {
+            Ok(fit) => fits.push(fit),
+            Err(error) => failure = Some(error),
+        }
+    }
+    if fits.is_empty() {
+        let none = || PredictError { run: "(all)".into(), reason: "no start was possible".into() };
+        return Err(failure.unwrap_or_else(none));
+    }
+    Ok(fits)
+}
+
+impl Candidate {
+    /// The same set better fitted from another start: whole numbers that were open stay so where they are likely still.
+    pub(crate) fn in_place_of(mut self, worse: Self, problem: &Problem<'_>, rule: &NoiseRule) -> Self {
+        let integers = problem.integer_slots(&self.set);
+        let same = |a: &Fit, b: &Fit| integers.iter().all(|&slot| a.shared[slot] == b.shared[slot]);
+        for other in std::iter::once(worse.fit).chain(worse.alternative_modes) {
+            let known = same(&other, &self.fit) || self.alternative_modes.iter().any(|e| same(&other, e));
+            if !known && likelihood(problem, rule, &other) > likelihood(problem, rule, &self.fit) - OPEN {
+                self.alternative_modes.push(other);
+            }
+        }
+        self
+    }
+}
+
+/// Whether every parameter that `small` frees is also freed by `large`.
+pub(crate) fn nested(small: &Candidate, large: &Candidate) -> bool {
+    small.selection.shared.iter().all(|s| large.selection.shared.contains(s))
+        && small.selection.nuisance.iter().all(|s| large.selection.nuisance.contains(s))
+}
+
+/// Log likelihood with the prior weight of the noise.
+fn likelihood(problem: &Problem<'_>, rule: &NoiseRule, fit: &Fit) -> f64 {
+    fit.log_likelihood + log_prior(problem, rule, fit)
+}
+
+/// Log prior weight of a fit's noise.
+fn log_prior(problem: &Problem<'_>, rule: &NoiseRule, fit: &Fit) -> f64 {
+    fit.noise.shape.iter().map(|&shape| rule.log_prior(problem, shape)).sum()
+}

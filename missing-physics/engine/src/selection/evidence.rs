@@ -1,0 +1,136 @@
+//! How probable a set of mechanisms is, given the data.
+
+use nalgebra::DMatrix;
+
+use crate::fit::optimum::{Fit, covariance};
+use crate::linalg::{SemiCholesky, rank};
+use crate::problem::{Problem, Selection};
+use crate::selection::nuisance_prior;
+use crate::selection::prior::{LOG_PRIOR_ODDS, LOG_RANGE};
+
+/// Standard deviation of a shared parameter's prior where unseen data are predicted, in units of its scale.
+const WIDE: f64 = 10.0;
+
+/// Laplace's approximation of the marginal likelihood of mechanisms `set` and `terms`, and why the fit is no explanation, if it is none.
+pub(crate) fn evidence(
+    problem: &Problem<'_>,
+    set: &[usize],
+    terms: &[usize],
+    selection: &Selection,
+    fit: &Fit,
+) -> (f64, Option<String>) {
+    let covariance = covariance(&fit.information);
+    let added: Vec<usize> = (0..selection.shared.len()).filter(|&i| selection.added_shared[i]).collect();
+    if added.iter().any(|&i| !covariance[(i, i)].is_finite()) {
+        return (f64::NEG_INFINITY, Some("these data do not determine it".into()));
+    }
+    let mut evidence = Evidence { problem, selection, fit, covariance, value: 0.0 };
+    evidence.value = marginal(problem, selection, fit, &fit.information);
+    for slot in problem.integer_slots(set) {
+        evidence.value -= (problem.shared.upper[slot] - problem.shared.lower[slot] + 1.0).ln();
+    }
+    // Each free parameter's prior belongs to the first mechanism or term that frees it.
+    let mut left = added.clone();
+    let spec = problem.spec();
+    for mechanism in set.iter().map(|&m| &spec.mechanisms[m]) {
+        let frees: Vec<usize> = mechanism.parameters.iter().chain(&mechanism.companions).copied().collect();
+        evidence.pay(&mut left, &frees, &mechanism.shape_parameters);
+    }
+    for &term in terms {
+        evidence.pay(&mut left, &[spec.terms[term].parameter], &[]);
+    }
+    (evidence.value, evidence.ruled_out(set, &added))
+}
+
+/// An evidence in the making.
+struct Evidence<'a> {
+    problem: &'a Problem<'a>,
+    selection: &'a Selection,
+    fit: &'a Fit,
+    covariance: DMatrix<f64>,
+    value: f64,
+}
+
+impl Evidence<'_> {
+    /// What a mechanism or term pays that frees the parameters `frees`, of which `shapes` are shape parameters: its prior odds, and the
+    /// priors of those that are `left` (numbers among the free shared ones), which it takes.
+    fn pay(&mut self, left: &mut Vec<usize>, frees: &[usize], shapes: &[usize]) {
+        let parameter = |i: usize| self.problem.shared.index[self.selection.shared[i]];
+        let (mine, others): (Vec<usize>, Vec<usize>) =
+            left.iter().copied().partition(|&i| frees.contains(&parameter(i)));
+        *left = others;
+        let (shapes, strengths): (Vec<usize>, Vec<usize>) =
+            mine.into_iter().partition(|&i| shapes.contains(&parameter(i)));
+        self.value += LOG_PRIOR_ODDS;
+        self.pay_shapes(&shapes);
+        if !strengths.is_empty() {
+            self.pay_strengths(&strengths);
+        }
+    }
+
+    /// A shape parameter has a flat prior within its bounds, on a log scale where these are above zero.
+    fn pay_shapes(&mut self, shapes: &[usize]) {
+        for &i in shapes {
+            let slot = self.selection.shared[i];
+            let table = &self.problem.shared;
+            let (low, high, x) = (table.lower[slot], table.upper[slot], self.fit.shared[slot]);
+            self.value -= if low > 0.0 { ((high / low).ln() * x).ln() } else { (high - low).ln() };
+        }
+    }
+
+    /// Strengths have a prior that is flat in the logarithm of their common size, and even over directions.
+    fn pay_strengths(&mut self, strengths: &[usize]) {
+        let dimension = strengths.len() as f64;
+        let table = &self.problem.shared;
+        let mut square = 0.0;
+        let mut one_sided = false;
+        for &i in strengths {
+            let slot = self.selection.shared[i];
+            let scale = table.scale[slot];
+            square += ((self.fit.shared[slot] - table.start[slot]).powi(2) + self.covariance[(i, i)])
+                / (scale * scale);
+            self.value -= scale.ln();
+            one_sided |= table.lower[slot] >= table.start[slot];
+        }
+        let sphere = 2.0 * std::f64::consts::PI.powf(dimension / 2.0)
+            / statrs::function::gamma::gamma(dimension / 2.0);
+        let sphere = if one_sided { 0.5 * sphere } else { sphere };
+        self.value -= sphere.ln() + dimension * 0.5 * square.ln() + LOG_RANGE.ln();
+    }
+
+    /// Why a fit is no explanation: a parameter at its bound, values that make no sense together, no convergence.
+    fn ruled_out(&self, set: &[usize], added: &[usize]) -> Option<String> {
+        let Self { problem, selection, fit, .. } = self;
+        let bound = added.iter().map(|&i| selection.shared[i]).find(|slot| fit.at_bound.contains(slot));
+        let at_bound = |slot: usize| {
+            let name = &problem.spec().parameters[problem.shared.index[slot]].name;
+            format!("{name} ended at its bound of {}", fit.shared[slot])
+        };
+        let senseless = || {
+            let limits = problem.model.extensions().limits?;
+            set.iter().find_map(|&mechanism| limits.implausible(mechanism, &fit.shared))
+        };
+        bound
+            .map(at_bound)
+            .or_else(senseless)
+            .or_else(|| (!fit.converged).then(|| "its fit did not converge".to_owned()))
+    }
+}
+
+/// Log likelihood with the parameters of runs and all runs integrated out, before what the prior of the latter says.
+fn marginal(problem: &Problem<'_>, selection: &Selection, fit: &Fit, information: &DMatrix<f64>) -> f64 {
+    let factor = SemiCholesky::new(information.clone(), rank::DETERMINED);
+    let volume = factor.rank() as f64 * std::f64::consts::TAU.ln();
+    let nuisance = (0..selection.nuisance.len()).filter(|&i| selection.added_nuisance[i]);
+    fit.log_likelihood + 0.5 * (volume - factor.log_determinant())
+        - nuisance.map(|i| nuisance_prior::cost(problem, selection, fit, i)).sum::<f64>()
+}
+
+/// The marginal likelihood with so wide a normal prior of the shared parameters that no data are needed to bound them.
+pub(crate) fn bounded_marginal(problem: &Problem<'_>, selection: &Selection, fit: &Fit) -> f64 {
+    let mut information = fit.information.clone();
+    for (i, &slot) in selection.shared.iter().enumerate() {
+        information[(i, i)] += (WIDE * problem.shared.scale[slot]).powi(-2);
+    }
+    marginal(problem, selection, fit, &information)
+}

@@ -1,0 +1,174 @@
+//! The search for sets of mechanisms that explain the data.
+
+use rayon::prelude::*;
+
+use crate::data::Run;
+use crate::estimate::profile::better_top;
+use crate::fit::prediction::residuals;
+use crate::noise::rule::NoiseRule;
+use crate::problem::{Problem, RunRows};
+use crate::selection::candidate::{Candidate, Guess, candidate};
+
+/// How many sets of one size are tried with one more mechanism.
+const BEAM: usize = 3;
+/// Sets within this log evidence of the best may become it once their best top is found.
+const POLISHED: f64 = 6.0;
+/// The largest set tried.
+const MOST: usize = 3;
+
+/// Tries sets of mechanisms: each alone, then the best ones with one more, to three.
+pub(crate) fn search(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    baseline: Candidate,
+    allowed: &[usize],
+    tell: &(dyn Fn(f64) -> bool + Sync),
+) -> Option<Vec<Candidate>> {
+    let mut all = vec![baseline];
+    let mut layer: Vec<usize> = vec![0];
+    for size in 1..=MOST {
+        let wanted = larger(&all, &layer, allowed);
+        let fitted: Vec<Candidate> =
+            wanted.par_iter().filter_map(|(set, parent)| fitted(problem, rule, &all, set, *parent)).collect();
+        if !tell(size as f64 / MOST as f64) {
+            return None;
+        }
+        let before = best_evidence(&all);
+        let first = all.len();
+        all.extend(fitted);
+        let mut order: Vec<usize> = (first..all.len()).filter(|&i| all[i].evidence.is_finite()).collect();
+        order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
+        if size > 1 && best_evidence(&all) <= before {
+            break;
+        }
+        order.truncate(BEAM);
+        layer = order;
+    }
+    polish(problem, rule, &mut all);
+    Some(all)
+}
+
+/// The sets of a layer with one more mechanism each, every set once, and where its parent stands.
+fn larger(all: &[Candidate], layer: &[usize], allowed: &[usize]) -> Vec<(Vec<usize>, usize)> {
+    let mut wanted: Vec<(Vec<usize>, usize)> = Vec::new();
+    for &parent in layer {
+        for &m in allowed {
+            let mut set = all[parent].set.clone();
+            if !set.contains(&m) {
+                set.push(m);
+                set.sort_unstable();
+                if !wanted.iter().any(|(s, _)| *s == set) {
+                    wanted.push((set, parent));
+                }
+            }
+        }
+    }
+    wanted
+}
+
+/// A set fitted from its parent's fit, and where it has several mechanisms from the fits of each of them alone too.
+fn fitted(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    all: &[Candidate],
+    set: &[usize],
+    parent: usize,
+) -> Option<Candidate> {
+    let parent = &all[parent];
+    let guesses = guesses(problem, parent, set);
+    let found = candidate(problem, rule, set, &[], &parent.fit, &guesses).ok();
+    if set.len() == 1 {
+        return found;
+    }
+    let other = candidate(problem, rule, set, &[], &parent.fit, &[hints(problem, all, set)]).ok();
+    match (found, other) {
+        (Some(found), Some(other)) if other.fit.log_likelihood > found.fit.log_likelihood + 1e-6 => {
+            Some(other.in_place_of(found, problem, rule))
+        }
+        (found, other) => found.or(other),
+    }
+}
+
+/// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
+fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
+    let best = best_evidence(all);
+    let worth =
+        |c: &&mut Candidate| c.ruled_out.is_none() && !c.set.is_empty() && c.evidence > best - POLISHED;
+    let mut likely: Vec<&mut Candidate> = all.iter_mut().filter(worth).collect();
+    likely.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    likely.truncate(BEAM);
+    likely.par_iter_mut().for_each(|c| {
+        for _ in 0..BEAM {
+            let Some(top) = better_top(problem, c) else { break };
+            match candidate(problem, rule, &c.set, &[], &top, &[vec![]]) {
+                Ok(better) if better.evidence > c.evidence => {
+                    **c = better.in_place_of(c.clone(), problem, rule);
+                }
+                _ => break,
+            }
+        }
+    });
+}
+
+fn best_evidence(all: &[Candidate]) -> f64 {
+    all.iter().filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Where the model says to begin the mechanism that a set has and its parent has not, with all whole numbers that it knows for those
+/// of the others: what was the best of them alone need not be so in company.
+fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Guess> {
+    let Some(modes) = problem.model.extensions().modes else { return Vec::new() };
+    let Ok(left) = residuals(problem, &parent.fit) else { return Vec::new() };
+    let whole = over_all_rows(problem, left);
+    let shared = |p: usize| problem.shared.index.iter().position(|&i| i == p);
+    let mut all: Vec<Guess> = Vec::new();
+    for &mechanism in set {
+        let integers = problem.integer_slots(&[mechanism]);
+        let new = !parent.set.contains(&mechanism);
+        if !new && integers.is_empty() {
+            continue;
+        }
+        let mut starts: Vec<Guess> = Vec::new();
+        for start in modes.starts(mechanism, &problem.recording.runs, &whole) {
+            let of_it = start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value)));
+            let start: Vec<_> = of_it.filter(|(slot, _)| new || integers.contains(slot)).collect();
+            if !start.is_empty() && !starts.contains(&start) {
+                starts.push(start);
+            }
+        }
+        if all.is_empty() {
+            all = starts;
+        } else if !starts.is_empty() {
+            all = all.iter().flat_map(|a| starts.iter().map(|b| [&a[..], b].concat())).collect();
+        }
+    }
+    all
+}
+
+/// Values of the measured rows, `[run][channel]`, as columns over all rows: NaN where nothing was measured.
+fn over_all_rows(problem: &Problem<'_>, values: Vec<Vec<Vec<f64>>>) -> Vec<Vec<Vec<f64>>> {
+    let of_run = |((channels, rows), run): ((Vec<Vec<f64>>, &RunRows), &Run)| {
+        let spread = |(values, valid): (Vec<f64>, &Vec<usize>)| {
+            let mut column = vec![f64::NAN; run.len()];
+            valid.iter().zip(values).for_each(|(&i, v)| column[i] = v);
+            column
+        };
+        channels.into_iter().zip(&rows.valid).map(spread).collect()
+    };
+    values.into_iter().zip(&problem.rows).zip(&problem.recording.runs).map(of_run).collect()
+}
+
+/// Values of a set's parameters from the fits of its members alone.
+fn hints(problem: &Problem<'_>, all: &[Candidate], set: &[usize]) -> Guess {
+    let mut hints = Vec::new();
+    for &m in set {
+        let Some(single) = all.iter().find(|c| c.set == [m]) else { continue };
+        let mechanism = &problem.spec().mechanisms[m];
+        for &p in mechanism.parameters.iter().chain(&mechanism.companions) {
+            if let Some(slot) = problem.shared.index.iter().position(|&i| i == p) {
+                hints.push((slot, single.fit.shared[slot]));
+            }
+        }
+    }
+    hints
+}
