@@ -1,9 +1,12 @@
 //! The answer: everything that a report, a machine or another program needs of a diagnosis.
 
+use serde::Serialize;
+
 use crate::repaired::Repaired;
 
 /// What the recording says of the baseline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// The baseline explains the data to within their noise.
     Adequate,
@@ -28,7 +31,8 @@ impl Verdict {
 }
 
 /// Where a channel's noise level comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum NoiseSource {
     /// A calibration that came with the recording.
     Calibration,
@@ -50,7 +54,7 @@ impl NoiseSource {
 }
 
 /// The noise of one channel under the model that the diagnosis ended with.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelNoise {
     /// Name of the channel.
     pub channel: String,
@@ -67,7 +71,7 @@ pub struct ChannelNoise {
 }
 
 /// One test of a model's adequacy.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TestOutcome {
     /// What was tested, for a person (`z_m depends on t_s`).
     pub name: String,
@@ -78,7 +82,7 @@ pub struct TestOutcome {
 }
 
 /// A place where the baseline misses the data.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Location {
     /// Name of the channel.
     pub channel: String,
@@ -101,7 +105,7 @@ pub struct Location {
 }
 
 /// A parameter's estimate.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
     /// Name with its unit as a suffix.
     pub name: String,
@@ -114,7 +118,7 @@ pub struct Estimate {
 }
 
 /// What is said of one mechanism.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MechanismReport {
     /// Identifier.
     pub id: String,
@@ -137,7 +141,7 @@ pub struct MechanismReport {
 }
 
 /// What is said of one set of mechanisms.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetReport {
     /// Identifiers; empty for the baseline.
     pub ids: Vec<String>,
@@ -152,7 +156,7 @@ pub struct SetReport {
 }
 
 /// Errors of one channel under one model.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelFit {
     /// Name of the channel.
     pub channel: String,
@@ -163,7 +167,7 @@ pub struct ChannelFit {
 }
 
 /// How often data from one rival are taken for another's, by simulation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusion {
     /// The rival sets.
     pub sets: Vec<Vec<String>>,
@@ -172,7 +176,7 @@ pub struct Confusion {
 }
 
 /// The empirical law found in the residual of an unexplained recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Law {
     /// The whole law, in plain text.
     pub formula: String,
@@ -191,7 +195,7 @@ pub struct Law {
 }
 
 /// The action that separates the rivals best.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NextExperiment {
     /// Settings, by name with unit.
     pub action: Vec<(String, f64)>,
@@ -204,7 +208,7 @@ pub struct NextExperiment {
 }
 
 /// A row that was set aside because its neighbours contradict it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outlier {
     /// Label of the run.
     pub run: String,
@@ -217,7 +221,7 @@ pub struct Outlier {
 }
 
 /// Data and fits of one run, for drawing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curves {
     /// Label of the run.
     pub run: String,
@@ -231,8 +235,8 @@ pub struct Curves {
     pub after: Vec<Vec<f64>>,
 }
 
-/// A whole diagnosis.
-#[derive(Debug, Clone, PartialEq)]
+/// A whole diagnosis. It is [`Serialize`] as it stands; the format of the tool's answers is the report's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// The verdict.
     pub verdict: Verdict,

@@ -50,6 +50,7 @@ impl<L: Likelihood> Scores<L> {
         seed: u64,
     ) -> Result<(Synthetic<Self>, Recording), SyntheticError> {
         let spec = likelihood.spec();
+        spec.check()?;
         if let Some(nuisance) = spec.parameters.iter().find(|p| p.scope != Scope::Shared) {
             let reason = format!("parameter {} is of each run, expected shared ones", nuisance.name);
             return Err(PredictError { run: "(all)".into(), reason }.into());

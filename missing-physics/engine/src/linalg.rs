@@ -96,8 +96,8 @@ impl SemiCholesky {
                 continue;
             }
             let mut value = b[i];
-            for k in 0..i {
-                value -= self.factor[(i, k)] * b[k];
+            for (k, x) in b[..i].iter().enumerate() {
+                value -= self.factor[(i, k)] * x;
             }
             b[i] = value / self.factor[(i, i)];
         }
@@ -111,9 +111,9 @@ impl SemiCholesky {
                 continue;
             }
             let mut value = b[i];
-            for k in i + 1..b.len() {
+            for (k, x) in b.iter().enumerate().skip(i + 1) {
                 if self.kept[k] {
-                    value -= self.factor[(k, i)] * b[k];
+                    value -= self.factor[(k, i)] * x;
                 }
             }
             b[i] = value / self.factor[(i, i)];

@@ -1,9 +1,11 @@
-//! What could be known of a recording at best: the answer of somebody who was told the truth, to measure a diagnosis by.
+//! What could be known of a recording at best: the answer of an analysis that knows which mechanisms are at work, to measure a
+//! diagnosis by.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::data::Recording;
-use crate::engine::{DiagnoseError, Options, baseline_of};
+use crate::engine::begin::{Begun, begin};
+use crate::engine::{DiagnoseError, Options};
 use crate::model::Model;
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::held_out::held_out;
@@ -35,7 +37,7 @@ pub fn oracle(
     truth: &[String],
     options: &Options,
 ) -> Result<Oracle, DiagnoseError> {
-    let (problem, rule, baseline) = baseline_of(model, recording, options)?;
+    let Begun { problem, rule, baseline, .. } = begin(model, recording, options)?;
     let mut set = Vec::with_capacity(truth.len());
     for id in truth {
         let at = problem.spec().mechanisms.iter().position(|m| m.id == *id);

@@ -237,6 +237,6 @@ pub(crate) struct Selection {
     pub(crate) nuisance: Vec<usize>,
     /// Which of `shared` a mechanism or term added to the baseline.
     pub(crate) added_shared: Vec<bool>,
-    /// Which of `nuisance` likewise.
+    /// Which of `nuisance` a mechanism or term added to the baseline.
     pub(crate) added_nuisance: Vec<bool>,
 }

@@ -69,7 +69,7 @@ pub enum RepairedError {
     /// Sizes, signs or numbers that no diagnosis writes.
     #[error("the model is damaged: {0}")]
     Damaged(&'static str),
-    /// A run whose nuisance parameters nothing tells.
+    /// A run with too few measured values for its nuisance parameters.
     #[error("run {run} has {got} measured values, expected at least {expected} to tell how it began")]
     NotStarted {
         /// Label of the run.

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::data::{Recording, Run};
 use crate::linalg::{SemiCholesky, rank};
-use crate::model::{Model, PredictError, Quantity, Scope, Spec};
+use crate::model::{Model, PredictError, Quantity, Scope, Spec, SpecError};
 
 /// A simulator with chance in it, seen through statistics of what it makes.
 pub trait Simulator: Sync {
@@ -72,6 +72,9 @@ pub enum SyntheticError {
         /// Draws needed.
         expected: usize,
     },
+    /// The simulator's specification makes no sense.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
     /// The observed runs have another number of statistics.
     #[error("run {run} has {got} statistics, expected {expected}")]
     Statistics {
@@ -100,6 +103,7 @@ impl<S: Simulator> Synthetic<S> {
         draws: usize,
         seed: u64,
     ) -> Result<(Self, Recording), SyntheticError> {
+        simulator.spec().check()?;
         let n = simulator.statistics().len();
         if draws < 10 * n.max(1) {
             return Err(SyntheticError::TooFewDraws { draws, statistics: n, expected: 10 * n.max(1) });
@@ -121,14 +125,24 @@ impl<S: Simulator> Synthetic<S> {
             factor: SemiCholesky::new(DMatrix::identity(n, n), rank::COVARIANCE),
             whole: runs.iter().map(|(run, _)| (run.label.clone(), run.clone())).collect(),
         };
+        let (centre, covariance) = model.moments(runs)?;
+        model.factor = SemiCholesky::new(covariance, rank::COVARIANCE);
+        model.centre = centre;
+        let recording = model.recording(runs);
+        Ok((model, recording))
+    }
+
+    /// Mean and covariance of the statistics at the reference parameters, over all runs.
+    fn moments(&self, runs: &[(Run, Vec<f64>)]) -> Result<(Vec<f64>, DMatrix<f64>), PredictError> {
+        let n = self.centre.len();
         let start = |scope: Scope| -> Vec<f64> {
-            model.simulator.spec().parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
+            self.simulator.spec().parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
         };
         let nuisance = start(Scope::PerRun);
-        let shared = model.simulator.reference().map_or_else(|| start(Scope::Shared), <[f64]>::to_vec);
+        let shared = self.simulator.reference().map_or_else(|| start(Scope::Shared), <[f64]>::to_vec);
         let (mut covariance, mut centre) = (DMatrix::zeros(n, n), vec![0.0; n]);
         for (run, _) in runs {
-            let drawn = model.draw(run, &shared, &nuisance)?;
+            let drawn = self.draw(run, &shared, &nuisance)?;
             let count = drawn.len() as f64;
             let mean: Vec<f64> = (0..n).map(|k| drawn.iter().map(|d| d[k]).sum::<f64>() / count).collect();
             for d in &drawn {
@@ -142,17 +156,21 @@ impl<S: Simulator> Synthetic<S> {
             centre.iter_mut().zip(&mean).for_each(|(c, m)| *c += m / runs.len() as f64);
         }
         // The prediction is itself a mean of draws and has their error.
-        covariance *= 1.0 + 1.0 / draws as f64;
-        model.factor = SemiCholesky::new(covariance, rank::COVARIANCE);
-        model.centre = centre;
-        let channels = model
+        covariance *= 1.0 + 1.0 / self.draws as f64;
+        Ok((centre, covariance))
+    }
+
+    /// The observed runs as the engine sees them.
+    fn recording(&self, runs: &[(Run, Vec<f64>)]) -> Recording {
+        let n = self.centre.len();
+        let channels = self
             .simulator
             .statistics()
             .iter()
             .map(|q| Quantity::new(format!("{} (given those before it)", q.name), "sigma"))
             .collect();
         let inputs = runs.first().map_or(0, |(r, _)| r.inputs.len());
-        let recording = Recording {
+        Recording {
             channels,
             variables: (0..inputs).map(|i| Quantity::new(format!("input_{i}"), "")).collect(),
             runs: runs
@@ -160,15 +178,14 @@ impl<S: Simulator> Synthetic<S> {
                 .map(|(run, statistics)| Run {
                     // One row a run: of an input that varies within a run the first value stands for it.
                     inputs: run.inputs.iter().map(|c| c.first().copied().into_iter().collect()).collect(),
-                    outputs: model.standardised(statistics).into_iter().map(|v| vec![v]).collect(),
+                    outputs: self.standardised(statistics).into_iter().map(|v| vec![v]).collect(),
                     ..run.clone()
                 })
                 .collect(),
             noise_along: None,
             calibration: vec![Some(1.0); n],
             resolution: vec![0.0; n],
-        };
-        Ok((model, recording))
+        }
     }
 
     /// The simulator.

@@ -6,11 +6,16 @@ mod common;
 use common::{Ball, World, mechanism, parameter};
 use missing_physics::data::{Recording, RecordingError, Run};
 use missing_physics::engine::{DiagnoseError, Options, diagnose};
+use missing_physics::likelihood::{Likelihood, Scores};
 use missing_physics::model::{
     Experiment, Mechanism, Model, Parameter, PredictError, Quantity, Scope, Spec, SpecBuilder, SpecError,
     Term, UNBOUNDED,
 };
 use missing_physics::observer::Silent;
+use missing_physics::oracle::oracle;
+use missing_physics::repaired::RepairedError;
+use missing_physics::synthetic::{Simulator, Synthetic, SyntheticError};
+use rand::Rng;
 
 /// A model that says nothing but its specification.
 struct Said(Spec);
@@ -200,4 +205,71 @@ fn an_experiment_fits_the_model() {
         e.runs[0].inputs.push(vec![0.0; 8]);
     };
     assert_eq!(refused(&ragged), wrong("inputs of a run", 2, 1));
+}
+
+/// A specification whose bounds are crossed.
+fn crossed() -> Said {
+    let parameters = vec![parameter("rate", 0.0, [1.0, -1.0])];
+    Said(Spec { parameters, ..Spec::default() })
+}
+
+#[test]
+fn a_repaired_model_and_an_oracle_check_the_specification_too() {
+    let recording = World::NULL.draw(1);
+    let options = Options { replicates: 99, ..Options::default() };
+    let repaired = diagnose(&Ball::default(), &recording, &[], &options, &Silent).unwrap().repaired;
+    let refused = repaired.predict(&crossed(), &recording);
+    assert!(matches!(refused, Err(RepairedError::Spec(SpecError::Bounds { .. }))));
+    let refused = oracle(&crossed(), &recording, &[], &options);
+    assert!(matches!(refused, Err(DiagnoseError::Spec(SpecError::Bounds { .. }))));
+}
+
+/// A simulator that makes nothing.
+struct Idle(Spec);
+
+impl Simulator for Idle {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+
+    fn statistics(&self) -> &[Quantity] {
+        &[]
+    }
+
+    fn simulate(
+        &self,
+        _: &Run,
+        _: &[f64],
+        _: &[f64],
+        _: &mut dyn Rng,
+        _: &mut [f64],
+    ) -> Result<(), PredictError> {
+        Ok(())
+    }
+}
+
+/// A likelihood that is the same everywhere.
+struct Flat(Spec);
+
+impl Likelihood for Flat {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+
+    fn log_density(&self, _: &Run, _: &[f64]) -> Result<f64, PredictError> {
+        Ok(0.0)
+    }
+
+    fn draw(&self, _: &mut Run, _: &[f64], _: &mut dyn Rng) -> Result<(), PredictError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn stochastic_models_check_the_specification_too() {
+    let runs = World::NULL.draw(1).runs;
+    let refused = Synthetic::new(Idle(crossed().0), &[], 10, 1).err();
+    assert!(matches!(refused, Some(SyntheticError::Spec(SpecError::Bounds { .. }))));
+    let refused = Scores::put(Flat(crossed().0), &runs, 10, 1).err();
+    assert!(matches!(refused, Some(SyntheticError::Spec(SpecError::Bounds { .. }))));
 }

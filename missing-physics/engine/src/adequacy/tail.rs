@@ -4,9 +4,9 @@ use statrs::distribution::{ContinuousCDF, Gamma, Normal};
 
 /// The upper tail of a statistic's null distribution: a gamma law with its mean and variance, or the normal law that it becomes.
 ///
-/// It only puts the tests on one scale; the p-value of all of them together is counted, not read from this law.
+/// The law only puts the tests on one scale; the p-value of all tests together is counted, not read from it.
 pub(crate) enum Tail {
-    /// It does not vary.
+    /// The statistic does not vary.
     Constant,
     Gamma(Gamma),
     Normal(Normal),

@@ -26,7 +26,7 @@ pub(crate) struct Profile<'a> {
 }
 
 impl<'a> Profile<'a> {
-    /// Of the `i`-th free shared parameter of a candidate.
+    /// The profile of the `i`-th free shared parameter of a candidate.
     pub(crate) fn new(problem: &'a Problem<'a>, candidate: &'a Candidate, i: usize) -> Self {
         let mut others = candidate.selection.clone();
         let slot = others.shared.remove(i);

@@ -230,7 +230,7 @@ mod tests {
                     (0..nuisance + shared + 1).map(|k| column(10f64.powi(k as i32 % 3 - 1))).collect();
                 if deficient && nuisance > 1 {
                     columns[nuisance - 1] =
-                        columns[0].iter().map(|v| if r % 2 == 0 { 3.0 * v } else { 0.0 }).collect();
+                        columns[0].iter().map(|v| if r == 0 { 3.0 * v } else { 0.0 }).collect();
                 }
                 if deficient && shared > 1 {
                     columns[nuisance + shared - 1] = columns[nuisance].iter().map(|v| -2.0 * v).collect();

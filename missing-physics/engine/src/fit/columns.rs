@@ -9,7 +9,7 @@ use crate::problem::{Problem, Selection};
 
 /// How wide the prior of a run's nuisance parameter is, in units of its scale.
 const NUISANCE_PRIOR: f64 = 1e3;
-/// The same for one that a mechanism adds.
+/// How wide the prior of a nuisance parameter is that a mechanism adds, in units of its scale.
 const ADDED_NUISANCE_PRIOR: f64 = 10.0;
 
 /// Standard deviation of the prior of the `i`-th free nuisance parameter.

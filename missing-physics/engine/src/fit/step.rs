@@ -8,7 +8,7 @@ use crate::problem::{Problem, Selection};
 
 /// The normal equations at a point.
 pub(crate) struct NormalEquations {
-    /// Of each run: free nuisance parameters first, then free shared ones, then the residual.
+    /// Each run's normal equations: free nuisance parameters first, then free shared ones, then the residual.
     pub(crate) normals: Vec<DMatrix<f64>>,
     /// Sum of squares, the nuisance parameters' prior included.
     pub(crate) chi2: f64,

@@ -24,7 +24,7 @@ pub(crate) struct Departure {
     pub(crate) worth: f64,
     /// By how much that of each channel falls.
     pub(crate) gains: Vec<f64>,
-    /// Of each run, the coefficients of the baseline's columns where nothing departs.
+    /// Each run's coefficients of the baseline's columns where nothing departs.
     pub(crate) baseline: Vec<Vec<f64>>,
 }
 
@@ -124,7 +124,7 @@ impl<'a> Scan<'a> {
         judged.max_by(|a, b| a.worth.total_cmp(&b.worth))
     }
 
-    /// The same all through the interval, from zero at either of its ends, and a straight line.
+    /// A departure that is even all through the interval, one from zero at either of its ends, and a straight line.
     fn shapes(&self, (from, to): (usize, usize)) -> [Shape; 4] {
         let rising = |edge: usize| [-along(self.edges[edge], &self.edges), 1.0];
         let even = [1.0, 0.0];

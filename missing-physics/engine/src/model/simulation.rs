@@ -8,7 +8,7 @@ use crate::model::spec::{Scope, Spec};
 /// A full model: a simulation with every effect in it.
 ///
 /// Parameters come in two slices: `shared` (those with [`Scope::Shared`], in the order of [`Spec::parameters`]) and
-/// `nuisance` (those with [`Scope::PerRun`], likewise). A prediction fills `out` channel by channel:
+/// `nuisance` (those with [`Scope::PerRun`], in that order too). A prediction fills `out` channel by channel:
 /// `out[c * run.len() + i]` is channel `c` at row `i`.
 ///
 /// These methods serve every simulation; what only some of them know is in [`Extensions`].

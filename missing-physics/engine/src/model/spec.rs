@@ -71,7 +71,7 @@ pub struct DerivedPerRun {
     pub name: String,
     /// The unit alone.
     pub unit: String,
-    /// What is reported of it.
+    /// Which summary of the runs' values is reported.
     pub over: Over,
     /// The value from the shared parameters and the run's nuisance ones, each in the order of [`Spec::parameters`].
     pub value: OfRun,

@@ -44,7 +44,7 @@ pub(crate) struct OpenShape {
     pub(crate) weight: f64,
 }
 
-/// Of each channel the shapes of noise that a fit's residuals leave open, for somebody who prefers no kind.
+/// The shapes of noise that a fit's residuals leave open, by channel, for somebody who prefers no kind.
 pub(crate) fn open_shapes(
     problem: &Problem<'_>,
     selection: &Selection,

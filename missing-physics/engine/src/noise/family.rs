@@ -35,7 +35,7 @@ struct Lattice {
 enum Kind {
     /// An autoregression along the noise variable.
     Rough,
-    /// The same from row to row.
+    /// An autoregression from row to row.
     ByRow,
     /// White noise and an autoregression.
     Mixed,
@@ -73,7 +73,7 @@ const WHOLE: Axis = Axis { from: f64::INFINITY, step: 1.0, count: 1 };
 const SHARES: Axis = Axis { from: -2.6, step: 0.1, count: 73 };
 /// Correlations of neighbours by Fisher's z = atanh(phi), whose standard error is 1/sqrt(rows): 0.04 to 0.99.
 const CORRELATIONS: Axis = Axis { from: 0.04, step: 0.02, count: 136 };
-/// The same beside white noise: 0.46 to 0.99.
+/// Correlations of neighbours beside white noise, by Fisher's z: 0.46 to 0.99.
 const MIXED_CORRELATIONS: Axis = Axis { from: 0.5, step: 0.04, count: 57 };
 /// Logarithms of smooth lengths: 2 to 30 steps.
 const LENGTHS: Axis = Axis { from: 0.69, step: 0.05, count: 55 };

@@ -44,7 +44,7 @@ impl NoiseRule {
         shape.length_steps <= self.longest
     }
 
-    /// The same rule for mechanisms that compete.
+    /// The rule where mechanisms compete.
     pub(crate) fn competing(&self) -> Self {
         Self { against_colour: 6.0, ..self.clone() }
     }

@@ -140,7 +140,7 @@ fn fits(
 }
 
 impl Candidate {
-    /// The same set better fitted from another start: whole numbers that were open stay so where they are likely still.
+    /// Takes the place of a worse fit of this set: whole numbers that it left open stay so where they are likely still.
     pub(crate) fn in_place_of(mut self, worse: Self, problem: &Problem<'_>, rule: &NoiseRule) -> Self {
         let integers = problem.integer_slots(&self.set);
         let same = |a: &Fit, b: &Fit| integers.iter().all(|&slot| a.shared[slot] == b.shared[slot]);

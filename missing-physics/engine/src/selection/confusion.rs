@@ -68,14 +68,12 @@ impl<'a> Rival<'a> {
     /// Log evidence of this set for data that are simulated from `truth` with this noise.
     fn score(&self, truth: &Self, noise: &[Vec<Vec<f64>>]) -> f64 {
         // Simulated less predicted: noise, plus what truth predicts more than this set does.
-        let column = |((noise, mine), theirs): ((&Vec<f64>, &Vec<f64>), &Vec<f64>)| -> Vec<f64> {
-            noise.iter().zip(mine).zip(theirs).map(|((n, mine), theirs)| n + mine - theirs).collect()
+        let column = |run: usize, channel: usize| -> Vec<f64> {
+            let predicted = self.residual[run][channel].iter().zip(&truth.residual[run][channel]);
+            noise[run][channel].iter().zip(predicted).map(|(n, (mine, theirs))| n + mine - theirs).collect()
         };
-        let run = |((noise, mine), theirs): ((&Vec<Vec<f64>>, &Vec<Vec<f64>>), &Vec<Vec<f64>>)| {
-            noise.iter().zip(mine).zip(theirs).map(column).collect()
-        };
-        let data: Vec<Vec<Vec<f64>>> =
-            noise.iter().zip(&self.residual).zip(&truth.residual).map(run).collect();
+        let of_run = |run: usize| (0..noise[run].len()).map(|channel| column(run, channel)).collect();
+        let data: Vec<Vec<Vec<f64>>> = (0..noise.len()).map(of_run).collect();
         self.linearised.read(&data).score + self.constant
     }
 }

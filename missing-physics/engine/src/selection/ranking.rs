@@ -30,7 +30,7 @@ pub(crate) struct Ranking {
 pub(crate) struct Best {
     /// Where it stands.
     pub(crate) at: usize,
-    /// Of its adequacy.
+    /// p-value of the set's adequacy.
     pub(crate) p_value: f64,
     /// What the likeliest set fails in first, if it does.
     pub(crate) failing: String,

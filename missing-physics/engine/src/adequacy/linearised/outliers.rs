@@ -30,7 +30,7 @@ struct Fitted<'a> {
     noise: Vec<(usize, f64)>,
     coefficients: Vec<Vec<f64>>,
     bordered: BorderedNormal,
-    /// Of the shared parameters' information.
+    /// Factor of the shared parameters' information.
     factor: SemiCholesky,
 }
 

@@ -1,0 +1,80 @@
+//! The beginning of every diagnosis.
+
+use crate::adequacy::outliers::set_aside;
+use crate::data::Recording;
+use crate::diagnosis::Outlier;
+use crate::engine::input::{DiagnoseError, Options, check};
+use crate::fit::alternate::fit;
+use crate::fit::gauss_newton::solve;
+use crate::fit::optimum::Fit;
+use crate::model::{Model, PredictError};
+use crate::noise::process::rough_sigma;
+use crate::noise::rule::{NoiseRule, NoiseState, noise_rule};
+use crate::problem::Problem;
+use crate::selection::candidate::{Candidate, candidate};
+use crate::statistics::median;
+
+/// A recording without its wild readings, and its baseline.
+pub(crate) struct Begun<'a> {
+    /// The recording without its wild readings.
+    pub(crate) problem: Problem<'a>,
+    pub(crate) outliers: Vec<Outlier>,
+    pub(crate) rule: NoiseRule,
+    pub(crate) baseline: Candidate,
+    /// The first fit of the baseline.
+    start: Fit,
+}
+
+/// Sets wild readings aside, finds what is known of the noise, and fits the baseline.
+pub(crate) fn begin<'a>(
+    model: &'a dyn Model,
+    recording: &Recording,
+    options: &Options,
+) -> Result<Begun<'a>, DiagnoseError> {
+    model.spec().check()?;
+    check(recording, options)?;
+    let problem = Problem::new(model, recording.clone());
+    enough_rows(&problem)?;
+    let (cleaned, outliers) = set_aside(&problem)?;
+    let problem = Problem::new(model, cleaned);
+    let rule = noise_rule(&problem);
+    enough_rows(&problem)?;
+    let selection = problem.select(&[], &[]);
+    let start = fit(&problem, &selection, &rule, (&problem.shared.start, &problem.nuisance_start), None)?;
+    let baseline = candidate(&problem, &rule, &[], &[], &start, &[])?;
+    Ok(Begun { problem, outliers, rule, baseline, start })
+}
+
+fn enough_rows(problem: &Problem<'_>) -> Result<(), DiagnoseError> {
+    let (rows, parameters) = problem.size();
+    if rows <= parameters { Err(DiagnoseError::TooFewRows { rows, parameters }) } else { Ok(()) }
+}
+
+/// What a plain least-squares simulation looks like beside the data: drawn, located and counted as "before".
+pub(super) fn least_squares_baseline(begun: &Begun<'_>) -> Result<Candidate, PredictError> {
+    let Begun { problem, rule, baseline, start, .. } = begun;
+    let white = NoiseState { shape: vec![0; problem.channels()], sigma: rough_sigmas(problem, rule, start) };
+    let fit = solve(problem, &baseline.selection, &white, &start.shared, &start.nuisance)?;
+    Ok(Candidate { fit, ..baseline.clone() })
+}
+
+/// Sigma of each channel's rough part, whatever the model: what is left once everything smooth is taken away.
+pub(super) fn rough_sigmas(problem: &Problem<'_>, rule: &NoiseRule, fallback: &Fit) -> Vec<f64> {
+    (0..problem.channels())
+        .map(|c| {
+            let mut sigmas: Vec<f64> = problem
+                .rows
+                .iter()
+                .enumerate()
+                .filter_map(|(r, rows)| {
+                    let column = &problem.recording.runs[r].outputs[c];
+                    let values: Vec<f64> = rows.valid[c].iter().map(|&i| column[i]).collect();
+                    rough_sigma(&rows.positions[c], &values)
+                })
+                .collect();
+            rule.fixed_sigma[c]
+                .or_else(|| median(&mut sigmas))
+                .map_or(fallback.noise.sigma[c], |s| s.max(rule.floor[c]))
+        })
+        .collect()
+}
