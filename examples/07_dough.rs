@@ -4,21 +4,22 @@
 //! `--picture FILE.svg` draws)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
-use dough_mbrl::cem::Cem;
 use dough_mbrl::dough::DoughError;
-use dough_mbrl::dynamics::{Action, Dynamics, Roll, State};
+use dough_mbrl::dynamics::Dynamics;
 use dough_mbrl::fake::{DoughKind, Effects, FakeRig};
+use dough_mbrl::gaussian_process::GaussianProcess;
 use dough_mbrl::goal::Goal;
-use dough_mbrl::matching::Matched;
+use dough_mbrl::handling::RigError;
+use dough_mbrl::matching::{Known, Matched};
 use dough_mbrl::mpc::{Mpc, MpcSettings};
 use dough_mbrl::network::Ensemble;
-use dough_mbrl::objective::Worth;
+use dough_mbrl::planner::Objective;
+use dough_mbrl::planner::cem::Cem;
+use dough_mbrl::planner::powell::PowellPlanner;
 use dough_mbrl::policy::{Explore, Heuristic, Policy};
-use dough_mbrl::powell::PowellPlanner;
 use dough_mbrl::predictor::{PlanError, Predictor, Refit};
-use dough_mbrl::process::Process;
 use dough_mbrl::ridge::Ridge;
-use dough_mbrl::roll::{Limits, RigError};
+use dough_mbrl::roll::{Action, Limits, Roll, State};
 use dough_mbrl::rollout::{Rollout, RolloutError, Setup};
 use dough_mbrl::stiffness::{BandForce, Palpation, Press};
 use examples::bars::Bars;
@@ -98,7 +99,7 @@ fn held_out(a: &[Roll], unseen: &[Roll]) -> Result<(), Failure> {
         "polynomial with remainder, doughs followed",
         &Dynamics::learn(&a.iter().map(|r| vec![*r]).collect::<Vec<_>>())?,
     );
-    show("Gaussian process", &Process::learn(a)?);
+    show("Gaussian process", &GaussianProcess::learn(a)?);
     show("five small networks", &Ensemble::learn(a, 4)?);
     Ok(())
 }
@@ -109,14 +110,14 @@ fn controller<M: Refit + Clone + 'static>(
     refit_every: Option<usize>,
     caution: f64,
 ) -> Result<Box<dyn Policy>, RolloutError> {
-    let worth = Worth { horizon, caution, ..Worth::default() };
-    let settings = MpcSettings { worth, refit_every, ..MpcSettings::default() };
+    let objective = Objective { horizon, caution, ..Objective::default() };
+    let settings = MpcSettings { objective, refit_every, ..MpcSettings::default() };
     Ok(Box::new(Mpc::new(dynamics.clone(), PowellPlanner::default(), settings)?))
 }
 
 /// Rolls to the goal: policies by goals.
 fn figure_7_4(size: &Size, a: &[Roll], model: &Ridge) -> Result<Vec<Bars>, Failure> {
-    let process = Process::learn(a)?;
+    let process = GaussianProcess::learn(a)?;
     let policies: [(&str, Make<'_>); 6] = [
         ("random", &|_| Ok(Box::new(Explore))),
         ("heuristic", &|_| Ok(Box::new(Heuristic::default()))),
@@ -258,7 +259,8 @@ fn figure_7_5(
     [c, long_c]: [&Ridge; 2],
     stiffness: &[f64; 3],
 ) -> Result<Vec<picture::Lines>, Failure> {
-    let known = [(stiffness[0], a.clone()), (stiffness[2], c.clone())];
+    let known = [(stiffness[0], a), (stiffness[2], c)]
+        .map(|(stiffness_n_m, dynamics)| Known { stiffness_n_m, dynamics: dynamics.clone() });
     let matched = [0, 1, 2].map(|k| Matched::new(&known, stiffness[k]));
     let [matched_a, matched_b, matched_c] = matched;
     let (matched_a, matched_b, matched_c) = (matched_a?, matched_b?, matched_c?);

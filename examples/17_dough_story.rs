@@ -13,9 +13,9 @@ use dough_mbrl::band::Band;
 use dough_mbrl::fake::{DoughKind, Effects, FakeRig};
 use dough_mbrl::goal::Goal;
 use dough_mbrl::mpc::{Mpc, MpcSettings};
-use dough_mbrl::objective::Worth;
+use dough_mbrl::planner::Objective;
+use dough_mbrl::planner::powell::PowellPlanner;
 use dough_mbrl::policy::{Explore, Policy};
-use dough_mbrl::powell::PowellPlanner;
 use dough_mbrl::predictor::{Predictor, Refit};
 use dough_mbrl::repair::{Repaired, Response};
 use dough_mbrl::ridge::Ridge;
@@ -289,8 +289,8 @@ impl Done {
         refit_every: Option<usize>,
     ) -> Outcome<Self> {
         let controller = |_| -> Result<Box<dyn Policy>, RolloutError> {
-            let worth = Worth { horizon: 5, ..Worth::default() };
-            let settings = MpcSettings { worth, refit_every, ..MpcSettings::default() };
+            let objective = Objective { horizon: 5, ..Objective::default() };
+            let settings = MpcSettings { objective, refit_every, ..MpcSettings::default() };
             Ok(Box::new(Mpc::new(model.clone(), PowellPlanner::default(), settings)?))
         };
         let (mut values, mut missed) = (Vec::new(), 0);

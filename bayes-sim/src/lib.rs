@@ -20,6 +20,7 @@ mod modes;
 mod network;
 mod normal;
 pub mod novelty;
+pub mod perceptron;
 pub mod points;
 pub mod posterior;
 pub mod prior;

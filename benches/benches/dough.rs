@@ -5,18 +5,17 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use dough_mbrl::cem::Cem;
 use dough_mbrl::dough::View;
-use dough_mbrl::dynamics::Roll;
 use dough_mbrl::fake::{DoughKind, Effects};
 use dough_mbrl::goal::Goal;
 use dough_mbrl::mpc::{Mpc, MpcSettings};
-use dough_mbrl::objective::{Planner, Task, Worth};
+use dough_mbrl::planner::cem::Cem;
+use dough_mbrl::planner::powell::PowellPlanner;
+use dough_mbrl::planner::{Objective, Planner, Task};
 use dough_mbrl::policy::Policy;
-use dough_mbrl::powell::PowellPlanner;
 use dough_mbrl::predictor::{Predictor, Refit};
 use dough_mbrl::ridge::Ridge;
-use dough_mbrl::roll::Limits;
+use dough_mbrl::roll::{Limits, Roll};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -63,7 +62,8 @@ fn dough(c: &mut Criterion) {
     });
 
     let Ok(goal) = Goal::cylinder(0.2, 4e-5) else { return };
-    let task = Task { dynamics: &ridge, state, goal, limits: Limits::default(), worth: Worth::default() };
+    let task =
+        Task { dynamics: &ridge, state, goal, limits: Limits::default(), objective: Objective::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut costs = [0.0; 2];
     let (mut cem, mut powell) = (Cem::default(), PowellPlanner::default());

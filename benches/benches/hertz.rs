@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use hertz_contact::fit::{Curve, Fit, Loss, Noise, Workspace};
+use hertz_contact::fit::{Curve, Fit, LayerBelow, Loss, Noise, Workspace};
 use hertz_contact::indenter::Indenter;
 use hertz_contact::law::{Base, Elastic, Indentation, Law, Layer};
 use hertz_contact::viscoelastic::{Contact, LinearSolid, Scratch};
@@ -24,14 +24,17 @@ fn fits(c: &mut Criterion) {
     let stage: Vec<f64> = (0..ROWS).map(|i| 1.5e-3 * i as f64 / ROWS as f64).collect();
     let force: Vec<f64> = stage.iter().map(|d| law.force(d - 0.4e-3) + noise()).collect();
     let curve = [Curve { indentation_m: &stage, force_n: &force, sigma_n: None }];
-    let plain = Fit { loss: Loss::Square, ..Fit::new(SPHERE, 0.5) };
+    let least_squares = Fit { loss: Loss::Square, ..Fit::new(SPHERE, 0.5) };
     let Ok(layer) = Layer::new(&SPHERE, 0.5, Base::Bonded) else { return };
     let mut group = c.benchmark_group("hertz/fit");
     for (name, fit) in [
-        ("least squares", plain),
+        ("least squares", least_squares),
         ("Tukey", Fit::new(SPHERE, 0.5)),
-        ("noise that grows", Fit { noise: Noise::Proportional, ..plain }),
-        ("on a layer", Fit { layer: Some((layer, 1.0 / 0.02)), ..plain }),
+        ("noise that grows", Fit { noise: Noise::Proportional, ..least_squares }),
+        (
+            "on a layer",
+            Fit { layer: Some(LayerBelow { layer, inverse_thickness_per_m: 1.0 / 0.02 }), ..least_squares },
+        ),
     ] {
         let mut workspace = Workspace::new();
         if let Ok(report) = fit.run(&curve, &mut workspace) {

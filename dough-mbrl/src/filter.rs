@@ -1,11 +1,11 @@
 //! A dough followed through its rolls: an extended Kalman filter (Särkkä 2013, doi:10.1017/CBO9781139344203) whose innovations
-//! say by how much each measurement is off what all earlier ones lead to expect.
+//! are each measurement less what all earlier ones predict of it.
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::dynamics::{Roll, State};
+use crate::roll::{Roll, State};
 
-/// What scatters the measured states, variances in m^2.
+/// Noise of the measured states: variances, m^2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Of a measurement before a roll, and after it.
@@ -16,21 +16,21 @@ pub struct Noise {
     pub scatter: f64,
 }
 
-/// What is known of a fresh dough.
+/// The state of a dough before its first measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fresh {
-    /// Its mean state.
+pub struct InitialState {
+    /// The mean, m.
     pub mean: Vector3<f64>,
-    /// How doughs differ.
+    /// The covariance from dough to dough, m^2.
     pub covariance: Matrix3<f64>,
 }
 
-impl Fresh {
+impl InitialState {
     /// From the measured first states of several doughs, with the noise that is in them.
     ///
-    /// The noise is not taken out: of a few doughs too little may be left, and a dough that begins elsewhere than is held possible stays off
-    /// through all its rolls. What is too wide is narrowed by the first measurement. With fewer than four doughs nothing is held to be
-    /// known: the spread is as wide as the state itself.
+    /// The noise is not taken out: of a few doughs too little variance may be left, and a dough that begins outside of it stays off
+    /// through all its rolls. A covariance that is too wide is narrowed by the first measurement. With fewer than four doughs the
+    /// spread is as wide as the state itself.
     pub fn of(first: &[State], noise: &Noise) -> Self {
         let n = first.len().max(1) as f64;
         let mean = first.iter().map(|s| Vector3::from(*s)).sum::<Vector3<f64>>() / n;
@@ -46,35 +46,41 @@ impl Fresh {
         let covariance = spread * (1.0 + 1.0 / n) + Matrix3::from_diagonal(&noise.measured[0]);
         Self { mean, covariance }
     }
+
+    /// From the first states of doughs that are followed.
+    pub(crate) fn of_doughs(doughs: &[Vec<Roll>], noise: &Noise) -> Self {
+        let first: Vec<_> = doughs.iter().filter_map(|d| Some(d.first()?.state)).collect();
+        Self::of(&first, noise)
+    }
 }
 
-/// One measurement against what was expected of it.
+/// One measurement against its prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
-    /// Measured less expected.
-    pub off: Vector3<f64>,
+    /// Measured less predicted, m.
+    pub residual: Vector3<f64>,
     /// Lower factor of its covariance.
     pub factor: Matrix3<f64>,
-    /// What of it goes into the estimate.
+    /// The Kalman gain: the part of the residual that goes into the estimate.
     pub gain: Matrix3<f64>,
 }
 
 impl Innovation {
-    /// What of it goes into an estimate whose errors go by `cross` with those of the expected measurement.
-    fn share(&self, cross: &Matrix3<f64>) -> Matrix3<f64> {
-        // A measurement that tells nothing of what it measures tells nothing of anything else.
+    /// The gain of another estimate, whose errors have the covariance `cross` with those of the predicted measurement.
+    fn gain_of(&self, cross: &Matrix3<f64>) -> Matrix3<f64> {
+        // A measurement without a gain in its own state has none in any other.
         if self.gain == Matrix3::zeros() {
             return self.gain;
         }
-        let mut share = cross.transpose();
-        let solved = self.factor.solve_lower_triangular_mut(&mut share)
-            && self.factor.tr_solve_lower_triangular_mut(&mut share);
-        if solved { share.transpose() } else { Matrix3::zeros() }
+        let mut gain = cross.transpose();
+        let solved = self.factor.solve_lower_triangular_mut(&mut gain)
+            && self.factor.tr_solve_lower_triangular_mut(&mut gain);
+        if solved { gain.transpose() } else { Matrix3::zeros() }
     }
 
-    /// Standardised: independent, of variance one.
-    pub fn white(&self) -> Vector3<f64> {
-        self.factor.solve_lower_triangular(&self.off).unwrap_or_default()
+    /// The residual, whitened: independent components of variance one.
+    pub fn whitened(&self) -> Vector3<f64> {
+        self.factor.solve_lower_triangular(&self.residual).unwrap_or_default()
     }
 }
 
@@ -87,30 +93,30 @@ pub struct Step {
     pub state: Vector3<f64>,
     /// See `state`.
     pub covariance: Matrix3<f64>,
-    /// What the roll is to change.
+    /// The predicted change by the roll, m.
     pub change: Vector3<f64>,
     /// Derivative of the state after it with respect to the state before.
     pub gradient: Matrix3<f64>,
     /// Of the measurement after it.
     pub after: Innovation,
-    /// What of that goes into the estimate of the state before.
-    pub back: Matrix3<f64>,
-    /// What of the state after it, and of the one before it, makes the state before the next roll.
-    pub shares: [f64; 2],
+    /// The gain of that measurement in the estimate of the state before (one step of a smoother).
+    pub smoother_gain: Matrix3<f64>,
+    /// Weights of the state after the roll, and of the one before it, in the state before the next roll.
+    pub weights: [f64; 2],
 }
 
-/// What becomes of a dough beside its dynamics.
+/// What happens to a dough beside its dynamics.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beside {
-    /// The part of each roll's strain that is undone before the next roll.
-    pub undone: f64,
-    /// What a roll leaves of each dimension; what it takes does not come back.
-    pub left: f64,
+pub struct Relaxation {
+    /// The part of each roll's strain that springs back before the next roll.
+    pub springback: f64,
+    /// The factor on each dimension by the dough that a roll takes away, which does not come back; 1: nothing is lost.
+    pub loss_factor: f64,
 }
 
-impl Beside {
+impl Relaxation {
     /// A dough that keeps all its shape and volume.
-    pub const NOTHING: Self = Self { undone: 0.0, left: 1.0 };
+    pub const NONE: Self = Self { springback: 0.0, loss_factor: 1.0 };
 }
 
 /// Covariances of the states before and after a roll, and between them.
@@ -121,30 +127,35 @@ struct Both {
 }
 
 impl Both {
-    /// Covariance of a state made of shares of the one after and the one before, once the one after was measured.
-    fn between(&self, measured: &Innovation, back: &Matrix3<f64>, [kept, part]: [f64; 2]) -> Matrix3<f64> {
+    /// Covariance of the weighted sum of the state after and the one before, once the one after was measured.
+    fn weighted(
+        &self,
+        measured: &Innovation,
+        smoother_gain: &Matrix3<f64>,
+        [a, b]: [f64; 2],
+    ) -> Matrix3<f64> {
         let after = self.after - measured.gain * self.after;
-        let before = self.before - back * self.cross.transpose();
-        let cross = self.cross - back * self.after;
-        let p = kept * kept * after + part * part * before + part * kept * (cross + cross.transpose());
+        let before = self.before - smoother_gain * self.cross.transpose();
+        let cross = self.cross - smoother_gain * self.after;
+        let p = a * a * after + b * b * before + b * a * (cross + cross.transpose());
         0.5 * (p + p.transpose())
     }
 }
 
 /// Follows a dough through its rolls.
 ///
-/// `next(i, x)` is the state after roll `i` from the state `x`, without what a roll takes beside its dynamics.
+/// `next(i, x)` is the state after roll `i` from the state `x`, before the loss.
 pub fn follow(
     rolls: &[Roll],
-    fresh: &Fresh,
+    initial: &InitialState,
     noise: &Noise,
-    Beside { undone, left }: Beside,
+    Relaxation { springback, loss_factor }: Relaxation,
     next: impl Fn(usize, &Vector3<f64>) -> Vector3<f64>,
 ) -> Vec<Step> {
     const STEP_M: f64 = 1e-6;
-    let shares = [1.0 - undone, undone * left];
-    let next = |i: usize, x: &Vector3<f64>| left * next(i, x);
-    let (mut x, mut p) = (fresh.mean, fresh.covariance);
+    let weights = [1.0 - springback, springback * loss_factor];
+    let next = |i: usize, x: &Vector3<f64>| loss_factor * next(i, x);
+    let (mut x, mut p) = (initial.mean, initial.covariance);
     let mut steps = Vec::with_capacity(rolls.len());
     for (i, roll) in rolls.iter().enumerate() {
         let before = innovation(&Vector3::from(roll.state), &x, &p, &noise.measured[0]);
@@ -157,18 +168,18 @@ pub fn follow(
             moved[k] += STEP_M;
             gradient.set_column(k, &((next(i, &moved) - there) / STEP_M));
         }
-        let change = there - left * x;
+        let change = there - loss_factor * x;
         let scatter = change * change.transpose() * noise.scatter;
         // The states before and after it, estimated together.
         let mut both = Both { before: p, cross: p * gradient.transpose(), after: Matrix3::zeros() };
         both.after = gradient * both.cross + Matrix3::from_diagonal(&noise.process) + scatter;
         let after = innovation(&Vector3::from(roll.next), &there, &both.after, &noise.measured[1]);
-        let back = after.share(&both.cross);
-        steps.push(Step { before, state, covariance, change, gradient, after, back, shares });
+        let smoother_gain = after.gain_of(&both.cross);
+        steps.push(Step { before, state, covariance, change, gradient, after, smoother_gain, weights });
         (x, p) = updated(&there, &both.after, &after);
-        if undone != 0.0 {
-            x = shares[0] * x + shares[1] * (state + back * after.off);
-            p = both.between(&after, &back, shares);
+        if springback != 0.0 {
+            x = weights[0] * x + weights[1] * (state + smoother_gain * after.residual);
+            p = both.weighted(&after, &smoother_gain, weights);
         }
     }
     steps
@@ -183,14 +194,14 @@ fn innovation(
     let covariance = p + Matrix3::from_diagonal(noise);
     match covariance.cholesky() {
         Some(factor) => {
-            Innovation { off: measured - x, factor: factor.l(), gain: factor.solve(p).transpose() }
+            Innovation { residual: measured - x, factor: factor.l(), gain: factor.solve(p).transpose() }
         }
-        // A covariance that is no longer one: the measurement tells nothing.
-        None => Innovation { off: measured - x, factor: Matrix3::identity(), gain: Matrix3::zeros() },
+        // A covariance that is not positive definite: the measurement has no gain.
+        None => Innovation { residual: measured - x, factor: Matrix3::identity(), gain: Matrix3::zeros() },
     }
 }
 
 fn updated(x: &Vector3<f64>, p: &Matrix3<f64>, innovation: &Innovation) -> (Vector3<f64>, Matrix3<f64>) {
     let p = p - innovation.gain * p;
-    (x + innovation.gain * innovation.off, 0.5 * (p + p.transpose()))
+    (x + innovation.gain * innovation.residual, 0.5 * (p + p.transpose()))
 }

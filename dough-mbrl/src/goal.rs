@@ -1,7 +1,6 @@
 //! Goals: uniform cylinders, and whether a dough can become one.
 
-use crate::dynamics::State;
-use crate::roll::Limits;
+use crate::roll::{Limits, State};
 
 /// A state to be reached.
 #[derive(Debug, Clone, Copy, PartialEq)]

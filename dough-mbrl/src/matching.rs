@@ -1,7 +1,16 @@
-//! Dynamics of a dough that is not known, from those of doughs that are: interpolated by stiffness (thesis, eq. 7.2).
+//! Dynamics of a dough that is not known, from those of doughs that are: interpolated by stiffness ([Matl 2021], eq. 7.2).
 
-use crate::dynamics::{Action, LearnError, Prediction, Roll, State};
-use crate::predictor::{Predictor, Refit};
+use crate::predictor::{LearnError, Prediction, Predictor, Refit};
+use crate::roll::{Action, Roll, State};
+
+/// A dough whose stiffness and dynamics are known.
+#[derive(Debug, Clone)]
+pub struct Known<M> {
+    /// Its stiffness, N/m.
+    pub stiffness_n_m: f64,
+    /// Its dynamics.
+    pub dynamics: M,
+}
 
 /// Known dynamics by stiffness, mixed for one stiffness.
 #[derive(Debug, Clone)]
@@ -33,25 +42,29 @@ impl<M: Clone> Matched<M> {
     ///
     /// # Errors
     /// [`MatchError`].
-    pub fn new(known: &[(f64, M)], stiffness_n_m: f64) -> Result<Self, MatchError> {
-        let mut sorted: Vec<&(f64, M)> = known.iter().collect();
-        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    pub fn new(known: &[Known<M>], stiffness_n_m: f64) -> Result<Self, MatchError> {
+        let mut sorted: Vec<&Known<M>> = known.iter().collect();
+        sorted.sort_by(|a, b| a.stiffness_n_m.total_cmp(&b.stiffness_n_m));
         let bad = |s: f64| !(s > 0.0 && s.is_finite());
-        if let Some(&s) = known.iter().map(|(s, _)| s).chain([&stiffness_n_m]).find(|s| bad(**s)) {
+        if let Some(&s) = known.iter().map(|k| &k.stiffness_n_m).chain([&stiffness_n_m]).find(|s| bad(**s)) {
             return Err(MatchError::Stiffness { stiffness_n_m: s });
         }
-        if let Some(twice) = sorted.windows(2).find(|w| w[0].0 == w[1].0) {
-            return Err(MatchError::Stiffness { stiffness_n_m: twice[0].0 });
+        if let Some(twice) = sorted.windows(2).find(|w| w[0].stiffness_n_m == w[1].stiffness_n_m) {
+            return Err(MatchError::Stiffness { stiffness_n_m: twice[0].stiffness_n_m });
         }
-        let pair = sorted.windows(2).find(|w| stiffness_n_m <= w[1].0).or_else(|| sorted.windows(2).last());
+        let pair = sorted
+            .windows(2)
+            .find(|w| stiffness_n_m <= w[1].stiffness_n_m)
+            .or_else(|| sorted.windows(2).last());
         let Some([low, high]) = pair else { return Err(MatchError::TooFew { known: known.len() }) };
-        let share = ((stiffness_n_m - low.0) / (high.0 - low.0)).clamp(0.0, 1.0);
-        Ok(Self { low: low.1.clone(), high: high.1.clone(), share })
+        let share =
+            ((stiffness_n_m - low.stiffness_n_m) / (high.stiffness_n_m - low.stiffness_n_m)).clamp(0.0, 1.0);
+        Ok(Self { low: low.dynamics.clone(), high: high.dynamics.clone(), share })
     }
 }
 
 impl<M> Matched<M> {
-    /// Share of the stiffer dough, in [0, 1]: the thesis's beta.
+    /// Share of the stiffer dough, in [0, 1]: beta of [Matl 2021].
     pub fn share(&self) -> f64 {
         self.share
     }

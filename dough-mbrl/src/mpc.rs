@@ -1,19 +1,18 @@
-//! Model-predictive control: plan, roll once, look, plan again; learn every few rolls (thesis, section 7.4).
+//! Model-predictive control: plan, roll once, look, plan again; learn every few rolls ([Matl 2021], section 7.4).
 
 use rand::Rng;
 
-use crate::dynamics::{Action, Roll, State};
 use crate::goal::Goal;
-use crate::objective::{Planner, Task, Worth};
+use crate::planner::{Objective, Planner, Task};
 use crate::policy::Policy;
 use crate::predictor::{PlanError, Refit};
-use crate::roll::Limits;
+use crate::roll::{Action, Limits, Roll, State};
 
-/// Settings; the defaults are the thesis's.
+/// Settings; the defaults are those of [Matl 2021].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MpcSettings {
     /// What counts, and how far ahead.
-    pub worth: Worth,
+    pub objective: Objective,
     /// Rolls after which the dynamics are learned anew: T; none: they stay as they are.
     pub refit_every: Option<usize>,
     /// Weight of a roll of this rollout; one of the exploration has 1.
@@ -25,7 +24,7 @@ pub struct MpcSettings {
 
 impl Default for MpcSettings {
     fn default() -> Self {
-        Self { worth: Worth::default(), refit_every: Some(10), weight: 10.0, reach_m: f64::INFINITY }
+        Self { objective: Objective::default(), refit_every: Some(10), weight: 10.0, reach_m: f64::INFINITY }
     }
 }
 
@@ -46,7 +45,7 @@ impl<M: Refit, P: Planner> Mpc<M, P> {
     /// # Errors
     /// [`PlanError::Setting`].
     pub fn new(dynamics: M, planner: P, settings: MpcSettings) -> Result<Self, PlanError> {
-        settings.worth.check()?;
+        settings.objective.check()?;
         let every = settings.refit_every.unwrap_or(1);
         PlanError::setting("refit_every", every as f64, every > 0, "at least 1 roll")?;
         let good = settings.weight > 0.0 && settings.weight.is_finite();
@@ -85,7 +84,7 @@ impl<M: Refit, P: Planner> Policy for Mpc<M, P> {
             state: *state,
             goal: *goal,
             limits: *limits,
-            worth: self.settings.worth,
+            objective: self.settings.objective,
         };
         // What was planned before, one roll on.
         if self.plan.len() == task.len() {

@@ -1,11 +1,10 @@
-//! Policies that choose the next roll: the trait, and the two that know no dynamics (thesis, section 7.4).
+//! Policies that choose the next roll: the trait, and the two that know no dynamics ([Matl 2021], section 7.4).
 
 use rand::{Rng, RngExt};
 
-use crate::dynamics::{Action, Roll, State};
 use crate::goal::Goal;
 use crate::predictor::PlanError;
-use crate::roll::Limits;
+use crate::roll::{Action, Limits, Roll, State};
 
 /// Chooses rolls.
 pub trait Policy {
@@ -50,7 +49,7 @@ impl Policy for Explore {
 /// The fixed policy: a long band, pressed to half the goal's height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heuristic {
-    /// Throw as a part of the largest; the thesis's is 4/5.
+    /// Throw as a part of the largest; 4/5 in [Matl 2021].
     pub throw: f64,
 }
 
@@ -69,7 +68,7 @@ impl Policy for Heuristic {
         _: &mut dyn Rng,
     ) -> Result<Action, PlanError> {
         PlanError::check(state)?;
-        let wanted = [self.throw * limits.throw_m.1, state[2] - 0.5 * goal.state[2]];
+        let wanted = [self.throw * limits.most_throw_m, state[2] - 0.5 * goal.state[2]];
         Ok(limits.at(state).clamp(wanted))
     }
 }

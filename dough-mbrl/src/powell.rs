@@ -2,12 +2,10 @@
 //! doi:10.1093/comjnl/7.2.155), each searched by bracketing and Brent's steps (Brent 1973), never outside the bounds.
 
 use argmin::core::{
-    CostFunction, Error, Executor, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus,
+    CostFunction, Error, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus,
 };
-use rand::Rng;
 
-use crate::objective::{Planner, Task};
-use crate::predictor::PlanError;
+use crate::line_search::LineSearch;
 
 type Iterate = IterState<Vec<f64>, (), (), (), (), f64>;
 
@@ -20,7 +18,7 @@ pub struct Powell {
     directions: Vec<f64>,
     trial: Vec<f64>,
     before: Vec<f64>,
-    line: Line,
+    line_search: LineSearch,
     tolerance: f64,
     converged: bool,
 }
@@ -57,7 +55,7 @@ impl Powell {
             directions: vec![0.0; n * n],
             trial: vec![0.0; n],
             before: vec![0.0; n],
-            line: Line::default(),
+            line_search: LineSearch::default(),
             converged: false,
             low,
             high,
@@ -71,7 +69,7 @@ impl Powell {
     /// and 2e-3: enough to plan, coarse for a narrow valley.
     #[must_use]
     pub fn with_lines(mut self, most: usize, precision: f64) -> Self {
-        self.line = Line { most, precision: precision.clamp(1e-12, 0.5) };
+        self.line_search = LineSearch { most, precision: precision.clamp(1e-12, 0.5) };
         self
     }
 
@@ -116,7 +114,7 @@ impl Powell {
             }
             cost(trial)
         };
-        let (t, value) = self.line.least(&mut along, at, from, to)?;
+        let (t, value) = self.line_search.least(&mut along, at, from, to)?;
         if value < at {
             for k in 0..x.len() {
                 x[k] = (x[k] + t * direction[k]).clamp(self.low[k], self.high[k]);
@@ -187,128 +185,6 @@ impl Powell {
     }
 }
 
-/// A search on an interval.
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    /// Costs that are asked for at most.
-    most: usize,
-    /// Part of the interval to which the place is found.
-    precision: f64,
-}
-
-impl Default for Line {
-    fn default() -> Self {
-        Self { most: 16, precision: 2e-3 }
-    }
-}
-
-const GOLDEN: f64 = 0.381_966_011_250_105_1;
-
-impl Line {
-    /// The least cost found between two places about 0, where it is `at`.
-    fn least(
-        &self,
-        cost: &mut dyn FnMut(f64) -> Result<f64, Error>,
-        at: f64,
-        from: f64,
-        to: f64,
-    ) -> Result<(f64, f64), Error> {
-        let span = to - from;
-        let (mut a, mut b, mut x, mut fx, mut asked) = self.bracket(cost, at, from, to)?;
-        // Brent: parabolas through the three best places, golden sections where these mislead.
-        let (mut w, mut fw, mut v, mut fv) = (x, fx, x, fx);
-        let (mut step, mut last) = (0.0_f64, b - a);
-        let fine = self.precision * span;
-        while asked < self.most && (b - a) > 2.0 * fine {
-            let middle = 0.5 * (a + b);
-            let (r, q) = ((x - w) * (fx - fv), (x - v) * (fx - fw));
-            let mut p = (x - v) * q - (x - w) * r;
-            let mut q = 2.0 * (q - r);
-            if q > 0.0 {
-                p = -p;
-            }
-            q = q.abs();
-            let good = p.abs() < 0.5 * q * last.abs() && p > q * (a - x) && p < q * (b - x);
-            last = step;
-            step = if good {
-                p / q
-            } else {
-                last = if x < middle { b - x } else { a - x };
-                GOLDEN * last
-            };
-            let u = if step.abs() >= fine { x + step } else { x + fine.copysign(step) };
-            let u = u.clamp(a, b);
-            let fu = cost(u)?;
-            asked += 1;
-            if fu <= fx {
-                if u < x {
-                    b = x
-                } else {
-                    a = x
-                }
-                (v, fv, w, fw, x, fx) = (w, fw, x, fx, u, fu);
-            } else {
-                if u < x {
-                    a = u
-                } else {
-                    b = u
-                }
-                if fu <= fw || w == x {
-                    (v, fv, w, fw) = (w, fw, u, fu);
-                } else if fu <= fv || v == x || v == w {
-                    (v, fv) = (u, fu);
-                }
-            }
-        }
-        Ok((x, fx))
-    }
-
-    /// Goes downhill from 0 with growing steps until the cost rises or the interval ends: both ends, the best place and its
-    /// cost, and how many costs were asked for.
-    fn bracket(
-        &self,
-        cost: &mut dyn FnMut(f64) -> Result<f64, Error>,
-        at: f64,
-        from: f64,
-        to: f64,
-    ) -> Result<(f64, f64, f64, f64, usize), Error> {
-        // Towards the roomier side first.
-        let ends = if to >= -from { [to, from] } else { [from, to] };
-        let mut asked = 0;
-        let mut uphill = 0.0;
-        for end in ends {
-            if end == 0.0 {
-                continue;
-            }
-            let (mut behind, mut x, mut fx) = (uphill, 0.0_f64, at);
-            let mut reach = 0.15 * (to - from);
-            loop {
-                let next = if x.abs() + reach < end.abs() { x + reach.copysign(end) } else { end };
-                let f = cost(next)?;
-                asked += 1;
-                if !(f < fx) {
-                    if x == 0.0 {
-                        uphill = next;
-                        break;
-                    }
-                    return Ok((behind.min(next), behind.max(next), x, fx, asked));
-                }
-                (behind, x, fx) = (x, next, f);
-                if next == end {
-                    return Ok((behind.min(end), behind.max(end), x, fx, asked));
-                }
-                reach *= 2.0;
-            }
-        }
-        // Uphill to both sides: the best place is between.
-        let first = if ends[0] > 0.0 { from } else { to };
-        let other = if uphill == 0.0 { first } else { uphill };
-        let near = 0.15 * (to - from);
-        let (a, b) = ((-near).max(from).min(other), near.min(to).max(other));
-        Ok((a.min(0.0), b.max(0.0), 0.0, at, asked))
-    }
-}
-
 impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Solver<O, Iterate> for Powell {
     fn name(&self) -> &'static str {
         "Powell in a box"
@@ -344,54 +220,5 @@ impl<O: CostFunction<Param = Vec<f64>, Output = f64>> Solver<O, Iterate> for Pow
             return TerminationStatus::Terminated(TerminationReason::SolverConverged);
         }
         TerminationStatus::NotTerminated
-    }
-}
-
-/// Plans with Powell's method from where the plan is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PowellPlanner {
-    /// Sweeps at most.
-    pub sweeps: u64,
-    /// Relative gain of a sweep at which it ends.
-    pub tolerance: f64,
-}
-
-impl Default for PowellPlanner {
-    fn default() -> Self {
-        Self { sweeps: 12, tolerance: 1e-3 }
-    }
-}
-
-/// A task as argmin sees it.
-struct Cost<'a>(&'a Task<'a>);
-
-impl CostFunction for Cost<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, plan: &Vec<f64>) -> Result<f64, Error> {
-        Ok(self.0.cost(plan))
-    }
-}
-
-impl Planner for PowellPlanner {
-    fn plan(&mut self, task: &Task<'_>, plan: &mut Vec<f64>, _: &mut dyn Rng) -> Result<f64, PlanError> {
-        task.check()?;
-        let n = task.len();
-        plan.resize(n, 0.5);
-        let settings = |_| PlanError::Setting { name: "horizon", value: n as f64, expected: "1 to 50 rolls" };
-        let powell = Powell::new(vec![0.0; n], vec![1.0; n], self.tolerance).map_err(settings)?;
-        let executor = Executor::new(Cost(task), powell)
-            .configure(|s| s.param(plan.clone()).max_iters(self.sweeps))
-            .timer(false)
-            .ctrlc(false);
-        let failed = |_| PlanError::Prediction { state: task.state };
-        let mut result = executor.run().map_err(failed)?;
-        let cost = result.state.get_best_cost();
-        match result.state.take_best_param() {
-            Some(best) => plan.copy_from_slice(&best),
-            None => return Err(PlanError::Prediction { state: task.state }),
-        }
-        Ok(cost)
     }
 }

@@ -1,6 +1,15 @@
 //! What planners ask of dynamics, however these were learned.
 
-use crate::dynamics::{Action, Dynamics, LearnError, Prediction, Roll, State};
+use crate::roll::{Action, Roll, State};
+
+/// A prediction of one output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// The mean.
+    pub mean: f64,
+    /// One sigma of what will be measured: noise and all that was not learned.
+    pub sigma: f64,
+}
 
 /// Dynamics that say what a roll does.
 pub trait Predictor {
@@ -27,6 +36,27 @@ pub trait Refit: Predictor {
 
     /// Distance (m) of a state from the nearest one that was learned from.
     fn distance_m(&self, state: &State) -> f64;
+}
+
+/// Why nothing could be learned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LearnError {
+    /// There are too few rolls for the coefficients.
+    #[error("{rolls} rolls are too few for {coefficients} coefficients: at least {least} are needed")]
+    TooFew {
+        /// Rolls there are.
+        rolls: usize,
+        /// Coefficients of the polynomial.
+        coefficients: usize,
+        /// Rolls needed.
+        least: usize,
+    },
+    /// A value is not finite, or all rolls are too much alike for their polynomial.
+    #[error("the rolls do not determine a polynomial of degree {degree} of state and action")]
+    Undetermined {
+        /// The degree.
+        degree: u8,
+    },
 }
 
 /// Why no roll could be planned.
@@ -112,15 +142,4 @@ pub(crate) fn enough(rolls: &[Roll], coefficients: usize, degree: u8) -> Result<
         return Err(LearnError::TooFew { rolls: rolls.len(), coefficients, least: coefficients });
     }
     if rolls.iter().all(finite) { Ok(()) } else { Err(LearnError::Undetermined { degree }) }
-}
-
-impl Predictor for Dynamics {
-    fn next(&self, state: &State, action: &Action) -> State {
-        let change = self.change(&nalgebra::Vector3::from(*state), action);
-        std::array::from_fn(|k| state[k] + change[k])
-    }
-
-    fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
-        Dynamics::predict(self, state, action)
-    }
 }

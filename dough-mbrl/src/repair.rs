@@ -2,8 +2,8 @@
 //! below some force there is none.
 
 use crate::band::Band;
-use crate::dynamics::{Action, LearnError, Prediction, Roll, State};
-use crate::predictor::{PlanError, Predictor, Refit};
+use crate::predictor::{LearnError, PlanError, Prediction, Predictor, Refit};
+use crate::roll::{Action, Roll, State};
 
 /// What a diagnosis found; the default changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,4 @@
-//! The thesis's dynamics: ridge regression on polynomial features, refitted roll by roll.
+//! The dynamics of [Matl 2021]: ridge regression on polynomial features, refitted roll by roll.
 //!
 //! Rolls go into sums (normal equations) as they come, so that a refit costs the same however many rolls there were, and equals the
 //! fit to all of them at once. The sums are of 21 terms for degree 2: nalgebra's Cholesky factor of them takes microseconds, and
@@ -6,8 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::dynamics::{Action, LearnError, Prediction, Roll, State};
-use crate::predictor::{Predictor, Refit, enough, finite, nearest_m, row};
+use crate::predictor::{LearnError, Prediction, Predictor, Refit, enough, finite, nearest_m, row};
+use crate::roll::{Action, Roll, State};
 
 /// Inputs: state and action.
 const INPUTS: usize = 5;
@@ -148,8 +148,8 @@ impl Predictor for Ridge {
     /// Noise and coefficients both count; weights make no rolls that were not rolled (sandwich estimator, White 1980,
     /// doi:10.2307/1912934).
     fn predict(&self, state: &State, action: &Action) -> [Prediction; 3] {
-        let told = self.factor.solve(&self.features(state, action));
-        let unsure = told.dot(&(&self.spread * &told));
+        let solved = self.factor.solve(&self.features(state, action));
+        let unsure = solved.dot(&(&self.spread * &solved));
         let next = self.next(state, action);
         std::array::from_fn(|k| Prediction { mean: next[k], sigma: self.sigma[k] * (1.0 + unsure).sqrt() })
     }

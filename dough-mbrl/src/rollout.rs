@@ -8,11 +8,11 @@ use hw_traits::gripper::Gripper;
 use rand::Rng;
 
 use crate::dough::{Shape, View};
-use crate::dynamics::Roll;
 use crate::goal::{Goal, GoalError};
+use crate::handling::{Handling, Motion, RigError, Side, device, look};
 use crate::policy::Policy;
 use crate::predictor::PlanError;
-use crate::roll::{Handling, Limits, Motion, RigError, Side, look};
+use crate::roll::{Limits, Roll};
 
 /// All that a rollout is told, but rig and policy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +114,7 @@ impl Setup {
         let before = self.look(rig)?;
         let state = before.state();
         let action = policy.act(&state, goal, &self.limits, rng)?;
-        let t_s = rig.now_s().map_err(crate::roll::device("reading the clock"))?;
+        let t_s = rig.now_s().map_err(device("reading the clock"))?;
         let motion = Motion::constrained(&before, action);
         self.handling.roll(rig, before.ground_m, &motion, Side::draw(&mut rng))?;
         let after = self.look(rig)?;

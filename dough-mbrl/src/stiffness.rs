@@ -1,4 +1,4 @@
-//! Stiffness: the band's force, fitted on a rigid probe, and palpation (thesis, section 7.4 and Table 7.1).
+//! Stiffness: the band's force, fitted on a rigid probe, and palpation ([Matl 2021], section 7.4 and Table 7.1).
 
 use hw_traits::arm::Arm;
 use hw_traits::camera::DepthCamera;
@@ -7,7 +7,7 @@ use hw_traits::gripper::Gripper;
 use nalgebra::{DMatrix, DVector};
 
 use crate::features::Polynomial;
-use crate::roll::RigError;
+use crate::handling::RigError;
 use crate::rollout::Setup;
 
 /// One press on a rigid probe.

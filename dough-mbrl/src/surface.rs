@@ -6,8 +6,9 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::dynamics::{Action, LearnError, Roll};
 use crate::features::Polynomial;
+use crate::predictor::LearnError;
+use crate::roll::{Action, Roll};
 
 /// Degree of the polynomial, and of its remainder.
 const DEGREE: u8 = 2;
@@ -35,7 +36,7 @@ impl Body {
     }
 }
 
-/// The change of a state by a roll.
+/// The change of a state by a roll: a response surface.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     features: Polynomial,
@@ -46,13 +47,13 @@ pub(crate) struct Surface {
     /// Scale of each term, so that each is of unit mean square over the rolls that were learned from.
     weights: DVector<f64>,
     coefficients: DMatrix<f64>,
-    /// Mean square of what the polynomial without its remainder leaves, by dimension, m^2.
-    pub(crate) left: Vector3<f64>,
+    /// Variance of the residuals of the polynomial without its remainder, by dimension, m^2.
+    pub(crate) residual_variance: Vector3<f64>,
 }
 
 impl Surface {
     /// Least squares on measured states, without a remainder and without the size: where learning begins.
-    pub(crate) fn measured(rolls: &[&Roll]) -> Result<Self, LearnError> {
+    pub(crate) fn least_squares(rolls: &[&Roll]) -> Result<Self, LearnError> {
         let n = rolls.len();
         let states: Vec<Vector3<f64>> = rolls.iter().map(|r| Vector3::from(r.state)).collect();
         let mean_m = states.iter().sum::<Vector3<f64>>() / n.max(1) as f64;
@@ -82,12 +83,13 @@ impl Surface {
         }
         let found = r.solve_upper_triangular(&qr.q().tr_mul(&change)).ok_or_else(Self::undetermined)?;
         let rest = change - design * &found;
-        let left = Vector3::from_fn(|k, _| (rest.column(k).norm_squared() / (n - free) as f64).max(1e-16));
+        let residual_variance =
+            Vector3::from_fn(|k, _| (rest.column(k).norm_squared() / (n - free) as f64).max(1e-16));
         let mut coefficients = DMatrix::zeros(features.len(), 3);
         for (j, &term) in sizeless.iter().enumerate() {
             coefficients.row_mut(term).copy_from(&found.row(j));
         }
-        Ok(Self { features, usual, mean_m, weights, coefficients, left })
+        Ok(Self { features, usual, mean_m, weights, coefficients, residual_variance })
     }
 
     pub(crate) fn undetermined() -> LearnError {

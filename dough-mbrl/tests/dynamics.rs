@@ -1,10 +1,12 @@
 //! Dynamics learned from rolls whose law is known.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-use dough_mbrl::dynamics::{Dynamics, LearnError, Roll};
-use dough_mbrl::filter::{Beside, Fresh, Noise, follow};
-use dough_mbrl::sensitivity::{PER_ROLL, white};
-use dough_mbrl::tie::Tie;
+use dough_mbrl::dynamics::Dynamics;
+use dough_mbrl::filter::{InitialState, Noise, Relaxation, follow};
+use dough_mbrl::predictor::LearnError;
+use dough_mbrl::roll::Roll;
+use dough_mbrl::sensitivity::{PER_ROLL, whitened};
+use dough_mbrl::whitener::CommonModeWhitener;
 use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +22,7 @@ fn law(state: [f64; 3], action: [f64; 2], cubic: f64) -> [f64; 3] {
 }
 
 fn doughs(n: usize, cubic: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Roll>> {
-    uneven(n, cubic, sigma, [0.0; 2], Beside::NOTHING, rng)
+    uneven(n, cubic, sigma, [0.0; 2], Relaxation::NONE, rng)
 }
 
 /// Doughs that are rolled eight times each; states are measured twice, after a roll and before the next. Each roll, and each dough in all
@@ -30,7 +32,7 @@ fn uneven(
     cubic: f64,
     sigma: f64,
     [scatter, softness]: [f64; 2],
-    Beside { undone, left }: Beside,
+    Relaxation { springback, loss_factor }: Relaxation,
     rng: &mut ChaCha8Rng,
 ) -> Vec<Vec<Roll>> {
     let part = |sigma: f64, rng: &mut ChaCha8Rng| -> f64 {
@@ -57,8 +59,10 @@ fn uneven(
                     let before = measured(state, rng);
                     let next = law(state, action, cubic);
                     let does = soft * part(scatter, rng);
-                    let after = std::array::from_fn(|k| left * (state[k] + does * (next[k] - state[k])));
-                    state = std::array::from_fn(|k| after[k] + undone * (left * state[k] - after[k]));
+                    let after =
+                        std::array::from_fn(|k| loss_factor * (state[k] + does * (next[k] - state[k])));
+                    state =
+                        std::array::from_fn(|k| after[k] + springback * (loss_factor * state[k] - after[k]));
                     Roll { state: before, action, next: measured(after, rng) }
                 })
                 .collect()
@@ -85,11 +89,14 @@ fn the_law_is_learned_and_not_the_noise_of_the_states() {
     for cubic in [0.0, 0.05] {
         let training = doughs(60, cubic, SIGMA, &mut rng);
         let dynamics = Dynamics::learn(&training).unwrap();
-        let own = error(&dynamics, cubic, &mut rng);
+        let followed = error(&dynamics, cubic, &mut rng);
         // Doughs of one roll each cannot be followed: the regression is on what was measured.
         let apart: Vec<Vec<Roll>> = training.into_iter().flatten().map(|r| vec![r]).collect();
         let naive = error(&Dynamics::learn(&apart).unwrap(), cubic, &mut rng);
-        assert!(own < 0.4 * SIGMA && own < 0.8 * naive, "cubic {cubic}: {own} m, plain regression {naive} m");
+        assert!(
+            followed < 0.4 * SIGMA && followed < 0.8 * naive,
+            "cubic {cubic}: {followed} m, regression on measured states {naive} m"
+        );
         for measured in dynamics.noise().measured {
             for variance in measured.iter() {
                 assert!((0.8..1.2).contains(&(variance.sqrt() / SIGMA)), "{}", variance.sqrt());
@@ -129,17 +136,18 @@ fn doughs_that_were_not_learned_from_are_off_by_as_much_as_is_said() {
         let dynamics = Dynamics::learn(&doughs(40, 0.05, SIGMA, &mut rng)).unwrap();
         let others = doughs(12, 0.05, SIGMA, &mut rng);
         let first: Vec<[f64; 3]> = others.iter().map(|d| d[0].state).collect();
-        let fresh = Fresh::of(&first, dynamics.noise());
+        let initial = InitialState::of(&first, dynamics.noise());
         let follow_one = |dough: &Vec<Roll>| {
-            follow(dough, &fresh, dynamics.noise(), Beside::NOTHING, |i, x| {
+            follow(dough, &initial, dynamics.noise(), Relaxation::NONE, |i, x| {
                 x + dynamics.change(x, &dough[i].action)
             })
         };
         let steps: Vec<_> = others.iter().map(follow_one).collect();
         let answers: Vec<_> =
             others.iter().zip(&steps).map(|(d, s)| dynamics.unlearned(s, d, |_| 1.0)).collect();
-        let off: Vec<f64> = steps.iter().flat_map(|s| white(s).iter().copied().collect::<Vec<_>>()).collect();
-        let apart = Tie::new(&answers).untie(&DVector::from_vec(off));
+        let off: Vec<f64> =
+            steps.iter().flat_map(|s| whitened(s).iter().copied().collect::<Vec<_>>()).collect();
+        let apart = CommonModeWhitener::new(&answers).whiten(&DVector::from_vec(off));
         square += apart.norm_squared();
         count += apart.len() as f64;
         for dough in apart.as_slice().chunks(8 * PER_ROLL) {
@@ -161,10 +169,11 @@ fn scatter_of_rolls_and_softness_of_doughs_are_told_apart() {
     for [scatter, softness] in [[0.1, 0.0], [0.0, 0.1]] {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let dynamics =
-            Dynamics::learn(&uneven(60, 0.0, SIGMA, [scatter, softness], Beside::NOTHING, &mut rng)).unwrap();
+            Dynamics::learn(&uneven(60, 0.0, SIGMA, [scatter, softness], Relaxation::NONE, &mut rng))
+                .unwrap();
         for (name, found, is) in [
             ("scatter", dynamics.noise().scatter.sqrt(), scatter),
-            ("softness", dynamics.own().softness.sqrt(), softness),
+            ("softness", dynamics.nuisance().softness.sqrt(), softness),
         ] {
             let held = if is > 0.0 { (0.7 * is)..(1.3 * is) } else { 0.0..0.04 };
             assert!(held.contains(&found), "{name}: {found} of {is}");
@@ -175,28 +184,32 @@ fn scatter_of_rolls_and_softness_of_doughs_are_told_apart() {
 /// A filter that knows the law, the noise and how much springs back and is lost leaves innovations that are white.
 #[test]
 fn innovations_are_white() {
-    for (undone, left) in [(0.0, 1.0), (0.4, 1.0), (0.4, 0.98)] {
-        let beside = Beside { undone, left };
+    for (springback, loss_factor) in [(0.0, 1.0), (0.4, 1.0), (0.4, 0.98)] {
+        let relaxation = Relaxation { springback, loss_factor };
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let doughs = uneven(200, 0.0, SIGMA, [0.0, 0.0], beside, &mut rng);
+        let doughs = uneven(200, 0.0, SIGMA, [0.0, 0.0], relaxation, &mut rng);
         let variance = nalgebra::Vector3::repeat(SIGMA * SIGMA);
         let noise = Noise { measured: [variance; 2], process: nalgebra::Vector3::zeros(), scatter: 0.0 };
         let first: Vec<[f64; 3]> = doughs.iter().map(|d| d[0].state).collect();
-        let fresh = Fresh::of(&first, &noise);
-        let (mut squares, mut tied, mut count) = (0.0, 0.0, 0.0);
+        let initial = InitialState::of(&first, &noise);
+        let (mut squares, mut correlated, mut count) = (0.0, 0.0, 0.0);
         for dough in &doughs {
             let next = |i: usize, x: &nalgebra::Vector3<f64>| law((*x).into(), dough[i].action, 0.0).into();
-            for pair in follow(dough, &fresh, &noise, beside, next).windows(2) {
-                let [after, before] = [pair[0].after.white(), pair[1].before.white()];
+            for pair in follow(dough, &initial, &noise, relaxation, next).windows(2) {
+                let [after, before] = [pair[0].after.whitened(), pair[1].before.whitened()];
                 squares += after.norm_squared() + before.norm_squared();
-                tied += after.dot(&before);
+                correlated += after.dot(&before);
                 count += 3.0;
             }
         }
         // 8,400 innovations: 4 standard errors of their variance and of a correlation.
         let mean = squares / (2.0 * count);
-        assert!((mean - 1.0f64).abs() < 4.0 * f64::sqrt(1.0 / count), "{beside:?}: {mean}");
-        assert!((tied / count).abs() < 4.0 / f64::sqrt(count), "{beside:?}: {}", tied / count);
+        assert!((mean - 1.0f64).abs() < 4.0 * f64::sqrt(1.0 / count), "{relaxation:?}: {mean}");
+        assert!(
+            (correlated / count).abs() < 4.0 / f64::sqrt(count),
+            "{relaxation:?}: {}",
+            correlated / count
+        );
     }
 }
 

@@ -7,12 +7,12 @@
 )]
 
 use dough_mbrl::dough::{DoughError, View};
-use dough_mbrl::dynamics::{Action, State};
 use dough_mbrl::fake::{DoughKind, Effects, Eye, FakeRig};
 use dough_mbrl::goal::{Goal, GoalError};
+use dough_mbrl::handling::{Motion, RigError, Side};
 use dough_mbrl::policy::{Explore, Heuristic, Policy};
 use dough_mbrl::predictor::PlanError;
-use dough_mbrl::roll::{Limits, Motion, RigError, Side};
+use dough_mbrl::roll::{Action, Limits, State};
 use dough_mbrl::rollout::{End, RolloutError, Setup};
 use dough_mbrl::stiffness::{BandForce, Palpation, Press, StiffnessError};
 use hw_traits::camera::DepthCamera;

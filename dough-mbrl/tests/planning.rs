@@ -7,19 +7,19 @@
 )]
 
 use argmin::core::{CostFunction, Error, Executor, State as _};
-use dough_mbrl::cem::{Cem, CemSettings};
-use dough_mbrl::dynamics::{Action, LearnError, Prediction, Roll, State};
+use dough_mbrl::gaussian_process::GaussianProcess;
 use dough_mbrl::goal::Goal;
-use dough_mbrl::matching::{MatchError, Matched};
+use dough_mbrl::matching::{Known, MatchError, Matched};
 use dough_mbrl::mpc::{Mpc, MpcSettings};
 use dough_mbrl::network::Ensemble;
-use dough_mbrl::objective::{Planner, Task, Worth};
+use dough_mbrl::planner::cem::{Cem, CemSettings};
+use dough_mbrl::planner::powell::PowellPlanner;
+use dough_mbrl::planner::{Objective, Planner, Task};
 use dough_mbrl::policy::{Explore, Heuristic, Policy};
-use dough_mbrl::powell::{Powell, PowellPlanner};
-use dough_mbrl::predictor::{PlanError, Predictor, Refit};
-use dough_mbrl::process::Process;
+use dough_mbrl::powell::Powell;
+use dough_mbrl::predictor::{LearnError, PlanError, Prediction, Predictor, Refit};
 use dough_mbrl::ridge::Ridge;
-use dough_mbrl::roll::Limits;
+use dough_mbrl::roll::{Action, Limits, Roll, State};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -130,7 +130,7 @@ fn every_peer_learns_the_law_and_holds_its_intervals() {
     let peers: [(&str, Box<dyn Predictor>, f64); 4] = [
         ("degree 2", Box::new(Ridge::learn(&rolls, 2, 1e-3).unwrap()), 1.6),
         ("degree 4", Box::new(Ridge::learn(&rolls, 4, 1.0).unwrap()), 1.4),
-        ("process", Box::new(Process::learn(&rolls).unwrap()), 1.3),
+        ("process", Box::new(GaussianProcess::learn(&rolls).unwrap()), 1.3),
         ("networks", Box::new(Ensemble::learn(&rolls, 1).unwrap()), 1.6),
     ];
     for (name, peer, most) in peers {
@@ -153,13 +153,13 @@ fn nothing_is_learned_from_too_little_or_from_no_numbers() {
     let rolls = drawn(60, 1e-4, 8);
     let few = LearnError::TooFew { rolls: 20, coefficients: 21, least: 21 };
     assert_eq!(Ridge::learn(&rolls[..20], 2, 0.0).unwrap_err(), few);
-    assert!(matches!(Process::learn(&rolls[..3]), Err(LearnError::TooFew { .. })));
+    assert!(matches!(GaussianProcess::learn(&rolls[..3]), Err(LearnError::TooFew { .. })));
     assert!(matches!(Ensemble::learn(&[], 1), Err(LearnError::TooFew { .. })));
     let mut bad = rolls.clone();
     bad[7].next[1] = f64::NAN;
     assert!(
         Ridge::learn(&bad, 2, 0.0).is_err()
-            && Process::learn(&bad).is_err()
+            && GaussianProcess::learn(&bad).is_err()
             && Ensemble::learn(&bad, 1).is_err()
     );
     assert!(Ridge::learn(&vec![rolls[0]; 60], 2, 0.0).is_err(), "one roll, sixty times");
@@ -171,11 +171,11 @@ fn nothing_is_learned_from_too_little_or_from_no_numbers() {
     assert_eq!(before, ridge.next(&rolls[0].state, &rolls[0].action));
 }
 
-/// A predictor as it is told.
+/// A predictor with a given law.
 #[derive(Clone)]
-struct Told(fn(&State, &Action) -> State);
+struct Given(fn(&State, &Action) -> State);
 
-impl Predictor for Told {
+impl Predictor for Given {
     fn next(&self, state: &State, action: &Action) -> State {
         self.0(state, action)
     }
@@ -187,16 +187,16 @@ impl Predictor for Told {
 
 fn task(dynamics: &dyn Predictor, caution: f64) -> Task<'_> {
     let goal = Goal::cylinder(0.15, 4e-5).unwrap();
-    let worth = Worth { caution, ..Worth::default() };
-    Task { dynamics, state: [0.05, 0.034, 0.032], goal, limits: Limits::default(), worth }
+    let objective = Objective { caution, ..Objective::default() };
+    Task { dynamics, state: [0.05, 0.034, 0.032], goal, limits: Limits::default(), objective }
 }
 
 #[test]
 fn matching_interpolates_between_the_neighbours() {
     let known = [
-        (500.0, Told(|s, _| s.map(|v| v + 0.001))),
-        (1500.0, Told(|s, _| s.map(|v| v + 0.003))),
-        (1000.0, Told(|s, _| s.map(|v| v + 0.010))),
+        Known { stiffness_n_m: 500.0, dynamics: Given(|s, _| s.map(|v| v + 0.001)) },
+        Known { stiffness_n_m: 1500.0, dynamics: Given(|s, _| s.map(|v| v + 0.003)) },
+        Known { stiffness_n_m: 1000.0, dynamics: Given(|s, _| s.map(|v| v + 0.010)) },
     ];
     let at = |k: f64| Matched::new(&known, k).unwrap().next(&[0.1; 3], &[0.1; 2])[0] - 0.1;
     for (stiffness, change) in
@@ -259,7 +259,7 @@ fn powell_finds_known_minima_and_stays_in_its_box() {
 
 #[test]
 fn plans_are_better_than_chance_and_repeat_with_the_seed() {
-    let dynamics = Told(law);
+    let dynamics = Given(law);
     let task = task(&dynamics, 0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut chance: Vec<f64> =
@@ -282,7 +282,7 @@ fn plans_are_better_than_chance_and_repeat_with_the_seed() {
 
 #[test]
 fn caution_keeps_away_from_what_is_unsure() {
-    let dynamics = Told(law);
+    let dynamics = Given(law);
     let depth = |caution| {
         let task = task(&dynamics, caution);
         let mut plan = Vec::new();
@@ -295,7 +295,7 @@ fn caution_keeps_away_from_what_is_unsure() {
 /// A dough 20 mm short of its goal, and dynamics that may do more than they say: no roll shortens what became too long.
 #[test]
 fn plans_leave_room_for_what_a_roll_may_do_beyond_its_prediction() {
-    let eager = Told(|s, a| {
+    let eager = Given(|s, a| {
         let grown = 1.0 + 10.0 * a[1];
         [s[0] * grown, s[1] / grown.sqrt(), s[2] / grown.sqrt()]
     });
@@ -303,7 +303,7 @@ fn plans_leave_room_for_what_a_roll_may_do_beyond_its_prediction() {
     let cost = |too_long: f64, rolls: [f64; 2]| {
         let mut task = task(&eager, 0.0);
         task.state = [0.13, 0.02, 0.02];
-        task.worth.too_long = too_long;
+        task.objective.too_long = too_long;
         let mut plan = vec![0.5; 20];
         (plan[1], plan[3]) = (rolls[0], rolls[1]);
         task.cost(&plan)
@@ -312,15 +312,15 @@ fn plans_leave_room_for_what_a_roll_may_do_beyond_its_prediction() {
     assert!(cost(0.0, bold) < cost(0.0, gentle));
     assert!(cost(5.0, gentle) < 0.5 * cost(5.0, bold), "{} of {}", cost(5.0, gentle), cost(5.0, bold));
     // What is predicted to shorten stays as long as it is.
-    let shrinks = Told(|s, _| [0.9 * s[0], s[1], s[2]]);
-    let still = Told(|s, _| *s);
-    let cost = |dynamics: &Told| task(dynamics, 0.0).cost(&[0.5; 20]);
+    let shrinks = Given(|s, _| [0.9 * s[0], s[1], s[2]]);
+    let still = Given(|s, _| *s);
+    let cost = |dynamics: &Given| task(dynamics, 0.0).cost(&[0.5; 20]);
     assert_eq!(cost(&shrinks), cost(&still));
 }
 
 #[test]
 fn what_cannot_be_planned_is_said() {
-    let (good, bad) = (Told(law), Told(|_, _| [f64::NAN; 3]));
+    let (good, bad) = (Given(law), Given(|_, _| [f64::NAN; 3]));
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut plan = vec![0.3; 4];
     let refused = Cem::default().plan(&task(&bad, 0.0), &mut plan, &mut rng);
@@ -332,7 +332,7 @@ fn what_cannot_be_planned_is_said() {
         Err(PlanError::State { .. })
     ));
     let mut blind = task(&good, 0.0);
-    blind.worth.horizon = 0;
+    blind.objective.horizon = 0;
     assert!(matches!(
         Cem::default().plan(&blind, &mut plan, &mut rng),
         Err(PlanError::Setting { name: "horizon", .. })

@@ -1,11 +1,11 @@
 //! Rolled doughs for examples and benches: exploration, rollouts of a policy, many at a time.
 
 use dough_mbrl::dough::DoughError;
-use dough_mbrl::dynamics::Roll;
 use dough_mbrl::fake::{DoughKind, Effects, FakeRig};
 use dough_mbrl::goal::Goal;
+use dough_mbrl::handling::RigError;
 use dough_mbrl::policy::{Explore, Policy};
-use dough_mbrl::roll::RigError;
+use dough_mbrl::roll::Roll;
 use dough_mbrl::rollout::{End, Rolled, Rollout, RolloutError, Setup};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -93,6 +93,9 @@ pub fn mean_and_half(values: &[f64]) -> (f64, f64) {
 /// Rolls of each rollout that was neither rolled past its goal nor stopped (one that never reached it counts all its rolls), and how
 /// many missed it.
 pub fn counts(rollouts: &[Rollout]) -> (Vec<f64>, usize) {
-    let kept = rollouts.iter().filter(|r| matches!(r.end, End::Reached | End::OutOfRolls));
-    (kept.map(|r| r.rolls.len() as f64).collect(), rollouts.iter().filter(|r| r.end != End::Reached).count())
+    let unstopped = rollouts.iter().filter(|r| matches!(r.end, End::Reached | End::OutOfRolls));
+    (
+        unstopped.map(|r| r.rolls.len() as f64).collect(),
+        rollouts.iter().filter(|r| r.end != End::Reached).count(),
+    )
 }

@@ -7,7 +7,7 @@
 )]
 
 use approx::assert_relative_eq;
-use hertz_contact::fit::{Baseline, Curve, Fit, FitError, Loss, Noise, Range, Report, Workspace};
+use hertz_contact::fit::{Baseline, Curve, Fit, FitError, LayerBelow, Loss, Noise, Range, Report, Workspace};
 use hertz_contact::indenter::Indenter;
 use hertz_contact::law::{Base, Elastic, Law, Layer, Layered, SneddonSphere};
 use proptest::prelude::*;
@@ -115,7 +115,7 @@ fn without_noise_all_is_found() {
                 assert_relative_eq!(curve.offset_n, world.offset_n, epsilon = 1e-7);
                 assert_relative_eq!(curve.tilt_n_m, world.tilt_n_m, epsilon = 1e-3);
                 assert!(!curve.flags.contact_unseen && !curve.flags.contact_undetermined);
-                assert_eq!(curve.samples.0, 300);
+                assert_eq!(curve.samples.used, 300);
             }
         }
     }
@@ -159,7 +159,7 @@ fn outliers() {
     let (_, _, square) = coverage(&world, &Fit { loss: Loss::Square, ..Fit::new(SPHERE, 0.5) }, 100);
     assert!(square > 5.0 * error, "{square} {error}");
     let report = world.run(&Fit::new(SPHERE, 0.5), 3).unwrap();
-    assert!((15..50).contains(&report.curves[0].samples.2), "{:?}", report.curves[0].samples);
+    assert!((15..50).contains(&report.curves[0].samples.outliers), "{:?}", report.curves[0].samples);
 }
 
 /// Noise that grows with the force: known, estimated, and taken for white.
@@ -169,10 +169,10 @@ fn noise_that_grows() {
     let white = Fit { loss: Loss::Square, ..Fit::new(SPHERE, 0.5) };
     let grows = Fit { noise: Noise::Proportional, ..white };
     let (modulus, contact, error) = coverage(&world, &grows, 300);
-    let (_, _, plain) = coverage(&world, &white, 300);
-    println!("modulus {modulus}, contact {contact}, median error {error:.4}, white {plain:.4}");
+    let (_, _, unweighted) = coverage(&world, &white, 300);
+    println!("modulus {modulus}, contact {contact}, median error {error:.4}, white {unweighted:.4}");
     assert!((modulus - 0.95).abs() < 0.045 && (contact - 0.95).abs() < 0.045, "{modulus} {contact}");
-    assert!(error < 0.8 * plain, "{error} {plain}");
+    assert!(error < 0.8 * unweighted, "{error} {unweighted}");
     let report = world.run(&grows, 1).unwrap();
     assert!((report.curves[0].proportional - 0.05).abs() < 0.015);
     assert!((report.curves[0].sigma_n - 1e-4).abs() < 4e-5);
@@ -239,7 +239,7 @@ fn a_layer() {
     };
     let (d, f) = WORLD.with(|d| law.force(d), &mut ChaCha8Rng::seed_from_u64(5));
     let without = Fit::new(SPHERE, 0.5);
-    let with = Fit { layer: Some((layer, 1.0 / 0.006)), ..without };
+    let with = Fit { layer: Some(LayerBelow { layer, inverse_thickness_per_m: 1.0 / 0.006 }), ..without };
     let (low, high) = run(&with, &d, &f).unwrap().modulus_interval_pa;
     assert!(low < 1e4 && 1e4 < high && high - low < 0.1e4, "{low} {high}");
     assert!(run(&without, &d, &f).unwrap().modulus_pa > 1.5e4);
@@ -261,17 +261,17 @@ fn the_range_is_chosen() {
     assert!((chosen.modulus_pa / 1e4 - 1.0).abs() < 0.06, "{}", chosen.modulus_pa);
     assert!(curve.depth_m <= 1.0e-3 && curve.depth_m > 2e-4, "{}", curve.depth_m);
     assert!(!curve.flags.misfit && !curve.flags.beyond_law);
-    assert!(curve.samples.0 < 1000);
+    assert!(curve.samples.used < 1000);
     let shallow = run(&Fit { range: Range::UpTo(7e-4), ..Fit::new(SPHERE, 0.5) }, &d, &f).unwrap();
     assert!((shallow.curves[0].depth_m - 7e-4).abs() < 1e-5, "{}", shallow.curves[0].depth_m);
     // What the law describes is not cut for its noise.
     let fine = World { last_m: 1.3e-3, n: 600, ..WORLD };
-    let mut kept = 0;
+    let mut whole = 0;
     for seed in 0..100 {
         let report = fine.run(&Fit { range: Range::Automatic, ..Fit::new(SPHERE, 0.5) }, seed).unwrap();
-        kept += u32::from(report.curves[0].depth_m > 9e-4);
+        whole += u32::from(report.curves[0].depth_m > 9e-4);
     }
-    assert!(kept >= 97, "{kept}");
+    assert!(whole >= 97, "{whole}");
 }
 
 /// The ball itself lies up to 1 % below its parabola at 0.1 R, and so does the modulus.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::DoughError;
+use super::error::DoughError;
 
 /// A plane z = a + b x + c y.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,5 +1,6 @@
-//! Dough as a camera sees it: a cloud of points to length, width, height and highest point (thesis, section 7.4).
+//! Dough as a camera sees it: a cloud of points to length, width, height and highest point ([Matl 2021], section 7.4).
 
+mod error;
 mod grid;
 mod ground;
 pub mod rectangle;
@@ -8,9 +9,10 @@ use hw_traits::arm::Pose;
 use hw_traits::picture::{Intrinsics, Picture};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+pub use self::error::DoughError;
 use self::grid::Grid;
 pub use self::ground::Plane;
-use crate::dynamics::State;
+use crate::roll::State;
 
 /// A dough, in the frame of its cloud (z up).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,61 +74,6 @@ impl Default for View {
     fn default() -> Self {
         Self { tallest_m: 0.1, clearance_m: 2e-3, cell_m: 3e-3, least_points: 50 }
     }
-}
-
-/// Why a cloud shows no dough.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DoughError {
-    /// Nothing was seen at all: no points, or none that is a number.
-    #[error("none of the {points} points is a place: is the lens covered, or the depth picture all holes?")]
-    Empty {
-        /// Points that came.
-        points: usize,
-    },
-    /// A setting of the view is no length above zero.
-    #[error("{name} is {value}: expected above 0 and finite")]
-    View {
-        /// The setting.
-        name: &'static str,
-        /// What it is.
-        value: f64,
-    },
-    /// The pose of the camera is none.
-    #[error(
-        "the camera's pose is none: its rotation has the size {size}, expected 1, and its position is to be finite"
-    )]
-    Pose {
-        /// Size of the quaternion.
-        size: f64,
-    },
-    /// The ground cannot be found.
-    #[error("only {share:.0}% of the points lie on one level plane: expected at least {least:.0}%; is z up?", share = 100.0 * share, least = 100.0 * least)]
-    NoGround {
-        /// Share of the points in the best plane.
-        share: f64,
-        /// Share needed.
-        least: f64,
-    },
-    /// Nothing stands on the ground.
-    #[error(
-        "{points} points stand on the ground together, at least {least} are needed: there is no dough in view"
-    )]
-    NoDough {
-        /// Points of the largest thing on the ground.
-        points: usize,
-        /// Points needed.
-        least: usize,
-    },
-    /// The dough goes on beyond the picture.
-    #[error(
-        "the dough lies at the edge of the picture, at column {column:.0} and row {row:.0}: what lies beyond is not seen"
-    )]
-    CutOff {
-        /// Column of a corner of the box around it.
-        column: f64,
-        /// Its row.
-        row: f64,
-    },
 }
 
 /// Pixels at the edge of a picture in which a dough is held to go on beyond it.

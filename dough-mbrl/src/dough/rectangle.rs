@@ -97,8 +97,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Slow and plain: every edge, all points.
-    fn plain(hull: &[[f64; 2]]) -> f64 {
+    /// The slow reference: every edge, all points.
+    fn reference(hull: &[[f64; 2]]) -> f64 {
         let mut least = f64::INFINITY;
         for k in 0..hull.len() {
             let (a, b) = (hull[k], hull[(k + 1) % hull.len()]);
@@ -151,7 +151,7 @@ mod tests {
                 prop_assert!(points.iter().all(|p| cross(a, b, *p) >= -1e-12));
             }
             if let Some(found) = around(&corners) {
-                let least = plain(&corners);
+                let least = reference(&corners);
                 prop_assert!((found.length_m * found.width_m - least).abs() <= 1e-9 * least.max(1e-3));
             }
         }

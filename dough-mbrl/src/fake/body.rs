@@ -70,12 +70,12 @@ impl Slice {
         let contact = 2.0 * self.flat_half_width_m(squeeze_m);
         let along = contact / (contact + breadth_m);
         let height = self.height_m();
-        let kept = (plastic / height).min(0.3);
+        let squeezed = (plastic / height).min(0.3);
         let before = self.radius_m();
-        self.length_m *= 1.0 + along * kept;
+        self.length_m *= 1.0 + along * squeezed;
         let after = self.radius_m();
-        self.oval_m[0] += 0.5 * kept * height + after - before;
-        self.flat_m += kept * height;
+        self.oval_m[0] += 0.5 * squeezed * height + after - before;
+        self.flat_m += squeezed * height;
         self.bound();
     }
 

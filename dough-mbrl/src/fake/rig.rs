@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use super::body::{Body, Material};
 use super::camera::Eye;
 use super::hand::{Elastic, Fingers, knead, press};
-use super::{DoughKind, Effects, hardness_pa};
+use super::kind::{DoughKind, Effects, hardness_pa};
 
 /// Why the fake did not do something.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! One curve: what a contact point leaves of it once modulus and baseline are eliminated.
 
-use super::{Baseline, Fit};
+use super::settings::{Baseline, Fit, LayerBelow};
 use crate::indenter::Indenter;
 
 /// A sample in the curve's own units: indentation over its span from the middle, force over its largest from the mean.
@@ -102,10 +102,10 @@ impl<'a> Shape<'a> {
             Indenter::Cylinder { .. } => (x, 1.0),
             Indenter::Cone { .. } => (x * x, 2.0 * x),
         };
-        let Some((layer, per_m)) = &self.fit.layer else {
+        let Some(LayerBelow { layer, inverse_thickness_per_m }) = &self.fit.layer else {
             return (phi, slope);
         };
-        let chi = self.fit.indenter.reach_m(x * self.span_m) * per_m;
+        let chi = self.fit.indenter.reach_m(x * self.span_m) * inverse_thickness_per_m;
         let (factor, log_slope) = layer.factor(chi);
         let more = log_slope * self.fit.indenter.reach_exponent() / self.exponent;
         (phi * factor, slope * factor * (1.0 + more))

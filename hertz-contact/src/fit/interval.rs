@@ -3,9 +3,10 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::curve::Shape;
+use super::report::{CurveReport, Flags, Report, SampleCounts};
+use super::settings::Fit;
 use super::solve::{Settled, Workspace, best_modulus};
 use super::state::{State, rising_to};
-use super::{CurveReport, Fit, Flags, Report};
 use crate::law::{Elastic, Law, Validity};
 
 pub(super) fn report(fit: &Fit, work: &mut Workspace, settled: Settled) -> Report {
@@ -158,8 +159,9 @@ fn curve_report(fit: &Fit, s: &State, modulus: f64, others: f64, room: f64) -> C
     }
     let depth_m = (deepest - s.at) * ready.span_m;
     let law = Elastic { indenter: fit.indenter, modulus_pa: modulus, poisson_ratio: fit.poisson_ratio };
-    let beyond_layer = fit.layer.is_some_and(|(layer, per_m)| {
-        depth_m * per_m > 0.1 || fit.indenter.reach_m(depth_m) * per_m > layer.chi_end()
+    let beyond_layer = fit.layer.is_some_and(|below| {
+        let per_m = below.inverse_thickness_per_m;
+        depth_m * per_m > 0.1 || fit.indenter.reach_m(depth_m) * per_m > below.layer.chi_end()
     });
     let width = contact_interval_m.1 - contact_interval_m.0;
     CurveReport {
@@ -170,7 +172,7 @@ fn curve_report(fit: &Fit, s: &State, modulus: f64, others: f64, room: f64) -> C
         sigma_n: s.sigma * ready.unit_n,
         proportional: s.sigma * s.ratio,
         depth_m,
-        samples: (used, touching, outliers),
+        samples: SampleCounts { used, in_contact: touching, outliers },
         autocorrelation: s.autocorrelation,
         flags: Flags {
             contact_unseen: used - touching < 3,

@@ -1,6 +1,6 @@
 //! Weights and scales that outliers do not move.
 
-use super::Loss;
+use super::settings::Loss;
 
 /// Weight of a residual of u standard deviations, and the derivative of `u weight(u)`.
 pub(super) fn weight(loss: Loss, u: f64) -> (f64, f64) {
@@ -47,9 +47,9 @@ mod tests {
     #[test]
     fn outliers_do_not_move_the_scale() {
         let mut room = Vec::new();
-        let plain: Vec<f64> = (1..100).map(|i| f64::from(i) / 50.0 - 1.0).collect();
-        let wild = plain.iter().map(|x| if *x > 0.9 { 1e9 } else { *x });
-        let ratio = scale(wild, &mut room) / scale(plain.iter().copied(), &mut room);
+        let regular: Vec<f64> = (1..100).map(|i| f64::from(i) / 50.0 - 1.0).collect();
+        let wild = regular.iter().map(|x| if *x > 0.9 { 1e9 } else { *x });
+        let ratio = scale(wild, &mut room) / scale(regular.iter().copied(), &mut room);
         assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
         assert_eq!(scale(std::iter::empty(), &mut room), 0.0);
     }

@@ -1,9 +1,8 @@
-//! The search: contact points within a modulus, weights around both, intervals at the end.
+//! The search: contact points within a modulus, weights around both.
 
-use super::interval::report;
 use super::robust::weight;
+use super::settings::{Baseline, Fit, FitError, Loss, Noise};
 use super::state::{State, parameters, rising_to};
-use super::{Baseline, Curve, Fit, FitError, Loss, Noise, Range, Report};
 
 /// Room for curves, to be used again.
 #[derive(Debug, Clone, Default)]
@@ -26,68 +25,6 @@ const SEEN: f64 = 25.0;
 /// Rounds of weights.
 const ROUNDS: usize = 30;
 
-pub(super) fn run(fit: &Fit, curves: &[Curve<'_>], work: &mut Workspace) -> Result<Report, FitError> {
-    fit.check()?;
-    if curves.is_empty() {
-        return Err(FitError::Empty);
-    }
-    work.curves.resize_with(curves.len(), State::default);
-    for (index, (curve, state)) in curves.iter().zip(&mut work.curves).enumerate() {
-        state.load(fit, index, curve)?;
-        state.step = state.ready.step(&mut work.room);
-    }
-    let mut settled = settle(fit, work)?;
-    match fit.range {
-        Range::All => {}
-        Range::UpTo(depth_m) => {
-            for _ in 0..4 {
-                let mut moved = false;
-                for (index, state) in work.curves.iter_mut().enumerate() {
-                    moved |= state.cut(fit, index, depth_m / state.ready.span_m)?;
-                }
-                if !moved {
-                    break;
-                }
-                settled = settle(fit, work)?;
-            }
-        }
-        Range::Automatic => settled = shorten(fit, work)?,
-    }
-    Ok(report(fit, work, settled))
-}
-
-/// Shortens curves until their residuals have no trend.
-fn shorten(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitError> {
-    let limit_m = fit
-        .indenter
-        .radius_m()
-        .map_or(f64::INFINITY, |r| 0.1 * r)
-        .min(fit.layer.map_or(f64::INFINITY, |(_, per_m)| 0.1 / per_m));
-    let mut depths = Vec::with_capacity(work.curves.len());
-    for (index, state) in work.curves.iter_mut().enumerate() {
-        let depth = (0.5 - state.at).min(limit_m / state.ready.span_m);
-        // A range so short that it has too few samples is an error of the data, not of the law.
-        state.cut(fit, index, depth)?;
-        depths.push((depth, depth));
-    }
-    let mut settled = settle(fit, work)?;
-    for _ in 0..8 {
-        let mut moved = false;
-        for (index, (state, (whole, depth))) in work.curves.iter_mut().zip(&mut depths).enumerate() {
-            let shorter = 0.8 * *depth;
-            if state.trend() > 3.0 && shorter > 0.2 * *whole && state.in_contact(state.at + shorter) >= 20 {
-                *depth = shorter;
-                moved |= state.cut(fit, index, shorter)?;
-            }
-        }
-        if !moved {
-            break;
-        }
-        settled = settle(fit, work)?;
-    }
-    Ok(settled)
-}
-
 /// What the weights came to rest at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Settled {
@@ -99,7 +36,99 @@ pub(super) struct Settled {
     pub(super) widened: f64,
 }
 
-fn settle(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitError> {
+/// Sums over the weighted residuals of all curves.
+#[derive(Debug, Clone, Copy, Default)]
+struct Influence {
+    /// Samples.
+    used: f64,
+    /// Squares of the residuals' influence `weight u`.
+    squares: f64,
+    weights: f64,
+    /// Derivatives of the influence.
+    slopes: f64,
+    /// Products of the influences of neighbours.
+    lagged: f64,
+}
+
+impl Influence {
+    /// Weighs a curve's samples by their residuals.
+    fn weigh(&mut self, state: &mut State, loss: Loss, pairs: &[(f64, f64)]) {
+        let (s, ratio, cut) = (state.sigma, state.ratio, state.ready.cut);
+        let (mut lagged, mut squares, mut last) = (0.0, 0.0, None);
+        for (p, (e, contact)) in state.ready.samples.iter_mut().filter(|p| p.u <= cut).zip(pairs) {
+            let variance = s * s * (1.0 + (ratio * contact).powi(2));
+            let u = e / variance.sqrt();
+            let (w, derivative) = weight(loss, u);
+            p.weight = p.known * w / variance;
+            self.used += 1.0;
+            self.squares += (w * u) * (w * u);
+            self.weights += w;
+            self.slopes += derivative;
+            squares += (w * u) * (w * u);
+            lagged += last.map_or(0.0, |last: f64| last * w * u);
+            last = Some(w * u);
+        }
+        state.autocorrelation = if squares > 0.0 { lagged / squares } else { 0.0 };
+        self.lagged += lagged;
+    }
+
+    /// How sure a modulus is that settled with these residuals.
+    fn settled(&self, fit: &Fit, curves: usize, modulus: f64) -> Settled {
+        let free = self.used - 1.0 - curves as f64 * (parameters(fit) - 1) as f64;
+        let freedom = free.max(1.0);
+        let mean = self.slopes / self.used;
+        let inflation = self.squares / freedom * (self.weights / self.used) / (mean * mean).max(1e-3);
+        let correlation = if self.squares > 0.0 { self.lagged / self.squares } else { 0.0 };
+        let widened = if correlation > 2.0 / self.used.sqrt() {
+            let r = correlation.min(0.98);
+            ((1.0 + r) / (1.0 - r)).sqrt()
+        } else {
+            1.0
+        };
+        Settled { modulus, converged: false, inflation, freedom, widened }
+    }
+}
+/// Modulus, contact points and weights that agree with each other.
+///
+/// # Errors
+/// [`FitError::NoContact`].
+pub(super) fn settle(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitError> {
+    begin(fit, work);
+    let mut pairs = std::mem::take(&mut work.pairs);
+    let modulus = best_modulus(fit, &mut work.curves);
+    let mut settled = Settled { modulus, converged: false, inflation: 1.0, freedom: 1.0, widened: 1.0 };
+    for round in 0..ROUNDS {
+        let old = settled.modulus;
+        let mut influence = Influence::default();
+        let loss = if round < 3 && fit.loss == Loss::Tukey { Loss::Huber } else { fit.loss };
+        for state in &mut work.curves {
+            state.residuals(fit, old * state.per_pa, &mut pairs);
+            state.measure_noise(fit, round, &pairs, &mut work.room);
+            influence.weigh(state, loss, &pairs);
+            state.ready.renew(fit.baseline);
+            if round == 1 {
+                state.scan(fit);
+            }
+        }
+        let reach = |curves: &[State]| curves.iter().map(|s| s.at.abs()).sum::<f64>();
+        let before = reach(&work.curves);
+        let modulus = best_modulus(fit, &mut work.curves);
+        settled = influence.settled(fit, work.curves.len(), modulus);
+        let moved = (reach(&work.curves) - before).abs();
+        let still = (modulus - old).abs() <= 1e-6 * modulus.abs() && moved <= 1e-6 * work.curves.len() as f64;
+        let weights_move = fit.loss != Loss::Square || fit.noise == Noise::Proportional;
+        if (still && round > 3) || (!weights_move && round > 1) {
+            settled.converged = modulus.is_finite();
+            break;
+        }
+    }
+    work.pairs = pairs;
+    check_contact(fit, &work.curves, &settled)?;
+    Ok(settled)
+}
+
+/// First weights, without spikes, and first contact points.
+fn begin(fit: &Fit, work: &mut Workspace) {
     for state in &mut work.curves {
         state.sigma = 0.0;
         for p in &mut state.ready.samples {
@@ -111,67 +140,13 @@ fn settle(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitError> {
         state.ready.renew(fit.baseline);
         state.scan(fit);
     }
-    let mut pairs = std::mem::take(&mut work.pairs);
-    let mut modulus = best_modulus(fit, &mut work.curves);
-    let mut settled = Settled { modulus, converged: false, inflation: 1.0, freedom: 1.0, widened: 1.0 };
-    for round in 0..ROUNDS {
-        let loss = if round < 3 && fit.loss == Loss::Tukey { Loss::Huber } else { fit.loss };
-        let (mut used, mut influence, mut sum, mut slope, mut lag, mut lagged) =
-            (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        let mut before = 0.0;
-        for state in &mut work.curves {
-            state.residuals(fit, modulus * state.per_pa, &mut pairs);
-            state.measure_noise(fit, round, &pairs, &mut work.room);
-            let (s, ratio, cut) = (state.sigma, state.ratio, state.ready.cut);
-            let (mut own_lag, mut own, mut last) = (0.0, 0.0, None);
-            for (p, (e, contact)) in state.ready.samples.iter_mut().filter(|p| p.u <= cut).zip(&pairs) {
-                let variance = s * s * (1.0 + (ratio * contact).powi(2));
-                let u = e / variance.sqrt();
-                let (w, derivative) = weight(loss, u);
-                p.weight = p.known * w / variance;
-                used += 1.0;
-                influence += (w * u) * (w * u);
-                sum += w;
-                slope += derivative;
-                own += (w * u) * (w * u);
-                own_lag += last.map_or(0.0, |last: f64| last * w * u);
-                last = Some(w * u);
-            }
-            state.autocorrelation = if own > 0.0 { own_lag / own } else { 0.0 };
-            lag += own_lag;
-            lagged += own;
-            state.ready.renew(fit.baseline);
-            if round == 1 {
-                state.scan(fit);
-            }
-            before += state.at.abs();
-        }
-        let old: f64 = modulus;
-        modulus = best_modulus(fit, &mut work.curves);
-        let after: f64 = work.curves.iter().map(|s| s.at.abs()).sum();
-        let count = work.curves.len() as f64;
-        let free = used - 1.0 - count * (parameters(fit) - 1) as f64;
-        let (mean, correlation) = (slope / used, if lagged > 0.0 { lag / lagged } else { 0.0 });
-        settled.modulus = modulus;
-        settled.freedom = free.max(1.0);
-        settled.inflation = influence / settled.freedom * (sum / used) / (mean * mean).max(1e-3);
-        settled.widened = if correlation > 2.0 / used.sqrt() {
-            let r = correlation.min(0.98);
-            ((1.0 + r) / (1.0 - r)).sqrt()
-        } else {
-            1.0
-        };
-        let still = (modulus - old).abs() <= 1e-6 * modulus.abs() && (after - before).abs() <= 1e-6 * count;
-        let weights_move = fit.loss != Loss::Square || fit.noise == Noise::Proportional;
-        if (still && round > 3) || (!weights_move && round > 1) {
-            settled.converged = modulus.is_finite();
-            break;
-        }
-    }
-    work.pairs = pairs;
-    for (curve, state) in work.curves.iter().enumerate() {
+}
+
+/// Refuses curves that a contact explains hardly better than none does.
+fn check_contact(fit: &Fit, curves: &[State], settled: &Settled) -> Result<(), FitError> {
+    for (curve, state) in curves.iter().enumerate() {
         let p = state.ready.project(fit, state.at, 1);
-        let stiffness = modulus * state.per_pa;
+        let stiffness = settled.modulus * state.per_pa;
         // A straight line is what drift looks like; under a cylinder it is what contact looks like.
         let line = fit.baseline != Baseline::Zero && fit.indenter.exponent() != 1.0;
         let rest = if line { state.ready.rest_of_line() } else { p.rest };
@@ -181,7 +156,7 @@ fn settle(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitError> {
             return Err(FitError::NoContact { curve, improvement });
         }
     }
-    Ok(settled)
+    Ok(())
 }
 
 /// The modulus in Pa with the smallest misfit over all curves; their contact points come along.

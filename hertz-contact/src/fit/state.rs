@@ -2,7 +2,7 @@
 
 use super::curve::{Projected, Ready, Sample, Shape};
 use super::robust::{scale, weight};
-use super::{Baseline, Curve, Fit, FitError, Loss, Noise};
+use super::settings::{Baseline, Curve, Fit, FitError, Loss, Noise};
 use crate::root::rising;
 
 /// Samples that a contact needs beyond its parameters, and at least in contact.

@@ -5,11 +5,12 @@ use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
 
 use dough_mbrl::band::Band;
-use dough_mbrl::dynamics::{Dynamics, Roll};
-use dough_mbrl::filter::{Beside, Fresh, Step as Followed, follow};
+use dough_mbrl::dynamics::Dynamics;
+use dough_mbrl::filter::{InitialState, Relaxation, Step as Followed, follow};
 use dough_mbrl::repair::answered;
-use dough_mbrl::sensitivity::{PER_ROLL, surprise, white};
-use dough_mbrl::tie::Tie;
+use dough_mbrl::roll::Roll;
+use dough_mbrl::sensitivity::{PER_ROLL, negative_log_likelihood, whitened};
+use dough_mbrl::whitener::CommonModeWhitener;
 use missing_physics::data::Run;
 use missing_physics::model::{
     CoupledRows, ErrorModel, Extensions, Model, MultimodalModel, PredictError, Spec,
@@ -26,8 +27,8 @@ use crate::memo::{Memo, bits};
 #[derive(Debug)]
 struct Block {
     doughs: Vec<Dough>,
-    fresh: Fresh,
-    tie: Tie,
+    initial: InitialState,
+    whitener: CommonModeWhitener,
     /// Errors where every effect is off.
     off: DVector<f64>,
 }
@@ -90,22 +91,22 @@ impl DoughModel {
             doughs.push(Dough { steps: steps.clone(), rolls: steps.iter().map(|s| s.roll).collect(), first });
             first += PER_ROLL * steps.len();
         }
-        let fresh: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
-        let fresh = Fresh::of(&fresh, self.dynamics.noise());
-        let shown = self.first_estimate.unwrap_or_else(|| self.estimate_at_first(&doughs, &fresh));
+        let first_states: Vec<_> = doughs.iter().filter_map(|d| Some(d.rolls.first()?.state)).collect();
+        let initial = InitialState::of(&first_states, self.dynamics.noise());
+        let shown = self.first_estimate.unwrap_or_else(|| self.estimate_at_first(&doughs, &initial));
         self.first_estimate = Some(shown);
-        let tie = self.tie(&doughs, &fresh, &shown);
-        let mut block = Block { doughs, fresh, tie, off: DVector::zeros(first) };
+        let whitener = self.whitener(&doughs, &initial, &shown);
+        let mut block = Block { doughs, initial, whitener, off: DVector::zeros(first) };
         block.off = self.errors(&block, &Effects::OFF);
         self.blocks.push(block);
         runs.iter().enumerate().map(|(k, (label, _))| self.run(label, k)).collect()
     }
 
     /// The common response, springback and loss that are most likely, one after the other.
-    fn estimate_at_first(&self, doughs: &[Dough], fresh: &Fresh) -> Effects {
+    fn estimate_at_first(&self, doughs: &[Dough], initial: &InitialState) -> Effects {
         let cost = |effects: &Effects| -> f64 {
-            let off = |d| surprise(&self.follow(d, fresh, effects, &|_| 0.0));
-            doughs.iter().map(off).map(|s| s.spread + s.square).sum()
+            let off = |d| negative_log_likelihood(&self.follow(d, initial, effects, &|_| 0.0));
+            doughs.iter().map(off).map(|likelihood| likelihood.twice()).sum()
         };
         let mut shown = Effects::OFF;
         for _ in 0..2 {
@@ -119,26 +120,27 @@ impl DoughModel {
         shown
     }
 
-    /// How the uncertainty of what was learned ties the errors of doughs.
-    fn tie(&self, doughs: &[Dough], fresh: &Fresh, shown: &Effects) -> Tie {
+    /// A whitener of what was not learned of the dynamics: a mode that all doughs have in common.
+    fn whitener(&self, doughs: &[Dough], initial: &InitialState, shown: &Effects) -> CommonModeWhitener {
         let answers = |dough: &Dough| {
-            let steps = self.follow(dough, fresh, shown, &|_| 0.0);
+            let steps = self.follow(dough, initial, shown, &|_| 0.0);
             self.dynamics
                 .unlearned(&steps, &dough.rolls, |i| self.response(dough, i, shown, steps[i].state[0]))
         };
-        Tie::new(&doughs.iter().map(answers).collect::<Vec<_>>())
+        CommonModeWhitener::new(&doughs.iter().map(answers).collect::<Vec<_>>())
     }
 
     /// Follows a dough under some effects, the response of each roll larger by a part of itself.
     fn follow(
         &self,
         dough: &Dough,
-        fresh: &Fresh,
+        initial: &InitialState,
         effects: &Effects,
         larger: &dyn Fn(usize) -> f64,
     ) -> Vec<Followed> {
-        let beside = Beside { undone: effects.springback, left: (1.0 - effects.volume_loss).max(0.0).cbrt() };
-        follow(&dough.rolls, fresh, self.dynamics.noise(), beside, |i, x| {
+        let loss_factor = (1.0 - effects.volume_loss).max(0.0).cbrt();
+        let relaxation = Relaxation { springback: effects.springback, loss_factor };
+        follow(&dough.rolls, initial, self.dynamics.noise(), relaxation, |i, x| {
             let response = (1.0 + larger(i)) * self.response(dough, i, effects, x[0]);
             let learned = x + self.dynamics.change(x, &dough.steps[i].roll.action);
             Vector3::from(answered(&(*x).into(), &learned.into(), response))
@@ -170,10 +172,10 @@ impl DoughModel {
     ) -> DVector<f64> {
         let mut errors = DVector::zeros(block.off.len());
         for (at, dough) in block.doughs.iter().enumerate() {
-            let of_dough = white(&self.follow(dough, &block.fresh, effects, &|roll| larger(at, roll)));
+            let of_dough = whitened(&self.follow(dough, &block.initial, effects, &|roll| larger(at, roll)));
             errors.rows_mut(dough.first, of_dough.len()).copy_from(&of_dough);
         }
-        block.tie.untie(&errors)
+        block.whitener.whiten(&errors)
     }
 
     /// What slips change, by the force below which the band slips: halfway between the forces of two rolls.
@@ -227,9 +229,9 @@ impl DoughModel {
         let dough = &block.doughs[dough];
         let of = |f: &dyn Fn(&Step) -> f64| dough.steps.iter().map(f).collect::<Vec<f64>>();
         // The state that was expected: a measured one shares its noise with the error that is to be a function of it.
-        let followed = self.follow(dough, &block.fresh, &Effects::OFF, &|_| 0.0);
+        let followed = self.follow(dough, &block.initial, &Effects::OFF, &|_| 0.0);
         let expected = |k: usize| -> Vec<f64> {
-            dough.steps.iter().zip(&followed).map(|(s, f)| s.roll.state[k] - f.before.off[k]).collect()
+            dough.steps.iter().zip(&followed).map(|(s, f)| s.roll.state[k] - f.before.residual[k]).collect()
         };
         let inputs = vec![
             expected(0),

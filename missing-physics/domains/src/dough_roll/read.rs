@@ -1,7 +1,7 @@
 //! What the files of a recording say: the rig, and the rolls.
 
 use dough_mbrl::band::Band;
-use dough_mbrl::dynamics::Roll;
+use dough_mbrl::roll::Roll;
 
 use super::rolls::{CHANNELS, RunOfRolls, Step};
 use crate::reading::{check_runs, number};

@@ -1,13 +1,12 @@
 //! What a plan is worth: the discounted objective of eq. 7.1 over predicted states.
 
-use crate::dynamics::{Action, State};
 use crate::goal::Goal;
 use crate::predictor::{PlanError, Predictor};
-use crate::roll::Limits;
+use crate::roll::{Action, Limits, State};
 
 /// The objective of a planner.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Worth {
+pub struct Objective {
     /// Rolls that are looked ahead: H.
     pub horizon: usize,
     /// Discount of each further roll: gamma, in (0, 1].
@@ -23,7 +22,7 @@ pub struct Worth {
     pub doubt: f64,
 }
 
-impl Default for Worth {
+impl Default for Objective {
     /// Ten rolls, 0.9, certain; a third of the tolerance; too long is dear, and a roll may do two and a half times what is
     /// predicted: deep rolls of a long dough do, on the fake.
     fn default() -> Self {
@@ -34,7 +33,7 @@ impl Default for Worth {
 /// Most rolls that are looked ahead.
 pub const MOST_HORIZON: usize = 50;
 
-impl Worth {
+impl Objective {
     pub(crate) fn check(&self) -> Result<(), PlanError> {
         let h = self.horizon as f64;
         PlanError::setting("horizon", h, (1..=MOST_HORIZON).contains(&self.horizon), "1 to 50 rolls")?;
@@ -65,7 +64,7 @@ pub struct Task<'a> {
     /// What is allowed.
     pub limits: Limits,
     /// What counts.
-    pub worth: Worth,
+    pub objective: Objective,
 }
 
 impl Task<'_> {
@@ -74,7 +73,7 @@ impl Task<'_> {
     /// # Errors
     /// [`PlanError`].
     pub fn check(&self) -> Result<(), PlanError> {
-        self.worth.check()?;
+        self.objective.check()?;
         PlanError::check(&self.state)?;
         let middle = self.limits.at(&self.state).place([0.5; 2]);
         let good = self.dynamics.next(&self.state, &middle).iter().all(|v| v.is_finite());
@@ -83,12 +82,12 @@ impl Task<'_> {
 
     /// Length of a plan: two numbers a roll.
     pub fn len(&self) -> usize {
-        2 * self.worth.horizon
+        2 * self.objective.horizon
     }
 
     /// Whether there is nothing to plan; never for a task that was checked.
     pub fn is_empty(&self) -> bool {
-        self.worth.horizon == 0
+        self.objective.horizon == 0
     }
 
     /// The cost of a plan, m: the sum of the discounted distances from the goal after each roll; the reward of eq. 7.1 with the sign
@@ -96,13 +95,13 @@ impl Task<'_> {
     pub fn cost(&self, plan: &[f64]) -> f64 {
         let mut state = self.state;
         let (mut cost, mut discount) = (0.0, 1.0);
-        for unit in plan.chunks_exact(2).take(self.worth.horizon) {
-            if self.goal.distance_m(&state) < self.worth.aim * self.goal.within_m {
+        for unit in plan.chunks_exact(2).take(self.objective.horizon) {
+            if self.goal.distance_m(&state) < self.objective.aim * self.goal.within_m {
                 break;
             }
             let action = self.limits.at(&state).place([unit[0], unit[1]]);
             let mut unsure = 0.0;
-            let next = if self.worth.caution > 0.0 {
+            let next = if self.objective.caution > 0.0 {
                 let predicted = self.dynamics.predict(&state, &action);
                 unsure = predicted.iter().map(|p| p.sigma * p.sigma).sum::<f64>().sqrt();
                 predicted.map(|p| p.mean)
@@ -112,12 +111,12 @@ impl Task<'_> {
             // Dynamics that predict no dough predict nothing good; and no roll shortens it.
             let mut next = next.map(|v| if v.is_nan() { 10.0 } else { v.clamp(1e-3, 10.0) });
             next[0] = next[0].max(state[0]);
-            let longest = next[0] + self.worth.doubt * (next[0] - state[0]);
+            let longest = next[0] + self.objective.doubt * (next[0] - state[0]);
             let too_long = (longest - self.goal.state[0] - 0.5 * self.goal.within_m).max(0.0);
             state = next;
-            let off = self.goal.distance_m(&state) + self.worth.caution * unsure;
-            cost += discount * (off + self.worth.too_long * too_long);
-            discount *= self.worth.discount;
+            let off = self.goal.distance_m(&state) + self.objective.caution * unsure;
+            cost += discount * (off + self.objective.too_long * too_long);
+            discount *= self.objective.discount;
         }
         cost
     }

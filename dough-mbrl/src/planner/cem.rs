@@ -4,10 +4,10 @@
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::objective::{Planner, Task};
+use super::objective::{Planner, Task};
 use crate::predictor::PlanError;
 
-/// Settings; the defaults are [Matl 2021]'s.
+/// Settings; the defaults are those of [Matl 2021].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CemSettings {
     /// Plans that are drawn each time: K.
