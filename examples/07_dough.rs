@@ -1,4 +1,4 @@
-//! Rolling dough to a length: the experiments of chapter 7 on a dough that is physics, our numbers beside the thesis's.
+//! Rolling dough to a length: the experiments of [Matl 2021], chapter 7, on a dough that is physics, our numbers beside its.
 //!
 //! `cargo run --release -p examples --example 07_dough` (`--small`: two goals, two rollouts each; `--seed N`: other rollouts;
 //! `--picture FILE.svg` draws)
@@ -33,7 +33,7 @@ const INCH_M: f64 = 0.0254;
 const NONE: Effects =
     Effects { drying_per_s: 0.0, slip_n: 0.0, springback: 0.0, sticking: 0.0, softening: 0.0 };
 
-/// Random rolls on each dough C: the thesis's model of it was learned from data that were "very sparse" where it is long. Those on
+/// Random rolls on each dough C: the model of it in [Matl 2021] was learned from data that were "very sparse" where it is long. Those on
 /// dough A go on until it is 26 cm long.
 const EACH_C: usize = 25;
 
@@ -93,7 +93,7 @@ fn held_out(a: &[Roll], unseen: &[Roll]) -> Result<(), Failure> {
         println!("{name:44} {l:>9.2} {w:>9.2} {h:>9.2} {:>6.1} %", 100.0 * held as f64 / (3.0 * n));
     };
     show("polynomial of degree 1", &Ridge::learn(a, 1, 1e-3)?);
-    show("polynomial of degree 2 (the thesis's)", &Ridge::learn(a, 2, 1e-3)?);
+    show("polynomial of degree 2, as [Matl 2021]", &Ridge::learn(a, 2, 1e-3)?);
     show("polynomial of degree 3, ridge 1", &Ridge::learn(a, 3, 1.0)?);
     show(
         "polynomial with remainder, doughs followed",
@@ -167,7 +167,7 @@ fn figure_7_4(size: &Size, a: &[Roll], model: &Ridge) -> Result<Vec<Bars>, Failu
             parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (parts.len() as f64 - 1.0).max(1.0);
         format!("{mean:.1} +- {:.1} %", spread.sqrt())
     };
-    println!("fewer rolls (mean over the goals +- their standard deviation)        here           thesis");
+    println!("fewer rolls (mean over the goals +- their standard deviation)        here      [Matl 2021]");
     println!("  heuristic than random              {:>38}  27.6 +- 6.1 %", fewer(0, &all[1].values));
     println!("  CEM than heuristic                 {:>38}    33.4 +- 18 %", fewer(1, &all[2].values));
     println!("  direct optimisation than heuristic {:>38}  63.1 +- 18.3 %", fewer(1, &all[3].values));
@@ -246,7 +246,7 @@ fn table_7_1() -> Result<[f64; 3], Failure> {
             })
             .collect();
         let (mean, half) = mean_and_half(&felt?);
-        println!("  dough {name}: {:.2} +- {:.2} (thesis {table})", 1e-3 * mean, 1e-3 * half);
+        println!("  dough {name}: {:.2} +- {:.2} ([Matl 2021] {table})", 1e-3 * mean, 1e-3 * half);
         found[k] = mean;
     }
     Ok(found)
@@ -288,7 +288,7 @@ fn figure_7_5(
         show("dough C to 4 in, model A, fixed", &fixed_c),
         show("dough C to 4 in, model A, refined", &refined_c),
     );
-    println!("  refined: {} fewer rolls on average (thesis 45.8 %)", average(&[at_a, at_c]));
+    println!("  refined: {} fewer rolls on average ([Matl 2021]: 45.8 %)", average(&[at_a, at_c]));
     println!("  were model C learned from doughs of up to 26 cm too:");
     show(
         "dough A to 6 in, model C, fixed",
@@ -319,7 +319,7 @@ fn figure_7_5(
             lines.push(picture::Lines::of("stiffness-matched", &with_right));
         }
     }
-    println!("  matched: {} fewer rolls on average (thesis 39.6 %)", average(&gains));
+    println!("  matched: {} fewer rolls on average ([Matl 2021]: 39.6 %)", average(&gains));
     lines.insert(0, picture::Lines::of("wrong, refined", &refined_a));
     lines.insert(0, picture::Lines::of("wrong, fixed", &fixed_a));
     println!("figure 7.6: actions over the progress of dough A (throw / depth, mm, by fifths of a rollout)");

@@ -13,7 +13,7 @@ use softcell::markers::{MarkerSettings, find};
 use softcell::shear::{MotionSettings, Moved, motion};
 
 fn softcell(c: &mut Criterion) {
-    let mut bench = Bench::thesis(1);
+    let mut bench = Bench::matl_2021(1);
     bench.holds_box = false;
     bench.touch.indentation_m = 3e-3;
     bench.dome.cover(0.0036, 1.1);

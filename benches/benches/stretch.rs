@@ -14,7 +14,7 @@ use stretch::segment::{SegmentSettings, Segmenter};
 
 fn stretch(c: &mut Criterion) {
     // A sheet that fills the picture: 340 x 250 mm at 0.25 m.
-    let sheet = Sheet { length_m: 0.36, breadth_m: 0.27, ..Sheet::thesis() };
+    let sheet = Sheet { length_m: 0.36, breadth_m: 0.27, ..Sheet::matl_2021() };
     let mut membrane = Membrane::new(sheet, 0.0);
     membrane.press(&Shape::Ball { radius_m: 0.03 }, [0.0; 2], 0.02);
     let eye = DepthEye::sr305();

@@ -1,8 +1,7 @@
 //! The dynamics of [Matl 2021]: ridge regression on polynomial features, refitted roll by roll.
 //!
 //! Rolls go into sums (normal equations) as they come, so that a refit costs the same however many rolls there were, and equals the
-//! fit to all of them at once. The sums are of 21 terms for degree 2: nalgebra's Cholesky factor of them takes microseconds, and
-//! a second linear algebra (faer) would have nothing to win.
+//! fit to all of them at once. The sums are of 21 terms for degree 2: nalgebra's Cholesky factor of them takes microseconds.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

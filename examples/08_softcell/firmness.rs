@@ -17,7 +17,7 @@ const NOISE_N: f64 = 2e-3;
 
 /// Figure 5.5: force over depth under the ball (a) and a plate (c), and the moduli behind them (d).
 pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
-    println!("Effective modulus (figure 5.5 d; the thesis: 4.4 to 46.1 kPa over its pressures)");
+    println!("Effective modulus (figure 5.5 d; [Matl 2021]: 4.4 to 46.1 kPa over its pressures)");
     println!(
         "{:>9} {:>9} {:>19} {:>8} {:>11}",
         "p (kPa)", "E (kPa)", "95 % interval", "misfit", "plate (kPa)"
@@ -29,7 +29,7 @@ pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
     let mut drawn = probes.map(|(title, _)| Panel::new(title, "depth (mm)", ""));
     for (k, p) in PRESSURES_PA.into_iter().enumerate() {
         let colour = hue(k, PRESSURES_PA.len());
-        let tip_m = Dome::thesis().radius_at_m(p);
+        let tip_m = Dome::matl_2021().radius_at_m(p);
         let mut found = Vec::new();
         for (panel, (_, probe_m)) in drawn.iter_mut().zip(probes) {
             let (stage, force) = pressed(p, probe_m, &mut rng);
@@ -61,7 +61,7 @@ pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
 
 /// A curve of 8 mm with the load cell's noise; contact a millimetre in.
 fn pressed(pressure_pa: f64, probe_m: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>) {
-    let dome = Dome::thesis();
+    let dome = Dome::matl_2021();
     let mut noise = || -> f64 { NOISE_N * Distribution::<f64>::sample(&StandardNormal, rng) };
     let force = |d: f64| dome.force_n(pressure_pa, probe_m, d - 1e-3);
     (0..80).map(|k| 0.1e-3 * f64::from(k)).map(|d| (d, force(d) + noise())).unzip()
@@ -69,12 +69,12 @@ fn pressed(pressure_pa: f64, probe_m: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, V
 
 /// Figure 5.6: the valve's duty goes up and down; the force on a probe that just touches without pressure. Then 222 cycles at 1 Hz.
 pub(crate) fn cycles() -> Panel {
-    let dome = Dome::thesis();
+    let dome = Dome::matl_2021();
     // The valve's largest opening in both programmes, by which the pressure gets to about 6 kPa.
     let (slow, fast) = (0.29, 0.48);
     let force = |air: &Air| dome.force_n(air.pressure_pa, PROBE_M, dome.growth_m_pa * air.pressure_pa);
     let mut panel = Panel::new("5.6: force (mN) and pressure (kPa / 0.1)", "time (s)", "");
-    let (mut air, mut pressure, mut felt) = (Air::thesis(), Vec::new(), Vec::new());
+    let (mut air, mut pressure, mut felt) = (Air::matl_2021(), Vec::new(), Vec::new());
     for k in 0..525 {
         let t = f64::from(k) / 10.0;
         air.command = slow * triangle(t / 17.5);
@@ -83,7 +83,7 @@ pub(crate) fn cycles() -> Panel {
         felt.push([t, 1e3 * force(&air)]);
     }
     panel.line(pressure, "grey").name("pressure", "grey").line(felt, "steelblue").name("force", "steelblue");
-    let (mut air, mut peaks) = (Air::thesis(), Vec::new());
+    let (mut air, mut peaks) = (Air::matl_2021(), Vec::new());
     for _ in 0..222 {
         let mut peak = 0f64;
         for k in 0..100 {
@@ -97,7 +97,7 @@ pub(crate) fn cycles() -> Panel {
     let mean = steady.iter().sum::<f64>() / steady.len() as f64;
     let spread = (steady.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / steady.len() as f64).sqrt();
     println!(
-        "\n222 cycles at 1 Hz (section 5.4): peaks of {:.3} +- {:.1e} N (the thesis: 1.17 +- 1.66e-4 N)",
+        "\n222 cycles at 1 Hz (section 5.4): peaks of {:.3} +- {:.1e} N ([Matl 2021]: 1.17 +- 1.66e-4 N)",
         mean, spread
     );
     panel
@@ -110,7 +110,9 @@ fn triangle(phase: f64) -> f64 {
 
 /// Figure 5.7: the smallest indentation that the camera shows, and the force that it takes.
 pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
-    println!("\nSmallest force that shows (figure 5.7), by the camera's noise and by the thesis's 0.6 mm");
+    println!(
+        "\nSmallest force that shows (figure 5.7), by the camera's noise and by the 0.6 mm of [Matl 2021]"
+    );
     println!(
         "{:>9} {:>10} {:>8} {:>16} {:>14}",
         "p (kPa)", "gain", "markers", "delta_min (um)", "F_min (mN)"
@@ -121,7 +123,7 @@ pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
         let (sigma_px, gain_px_m, markers) = sight(p)?;
         let least_m = smallest_indentation_m(sigma_px, gain_px_m, markers)?;
         let force = |depth_m: f64| stiffness.smallest_force_n(p, depth_m, PROBE_M).map(|f| 1e3 * f.value);
-        let (ours, thesis) = (force(least_m)?, force(0.6e-3)?);
+        let (ours, in_matl) = (force(least_m)?, force(0.6e-3)?);
         println!(
             "{:>9.2} {:>7.1}/mm {:>8} {:>16.1} {:>7.3} {:>6.1}",
             1e-3 * p,
@@ -129,10 +131,10 @@ pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
             markers,
             1e6 * least_m,
             ours,
-            thesis
+            in_matl
         );
         seen.push([1e-3 * p, 100.0 * ours]);
-        printed.push([1e-3 * p, thesis]);
+        printed.push([1e-3 * p, in_matl]);
     }
     panel
         .line(seen.clone(), "steelblue")
@@ -141,13 +143,13 @@ pub(crate) fn smallest(stiffness: &Stiffness) -> Outcome<Panel> {
     panel
         .line(printed.clone(), "crimson")
         .dots(printed, "crimson")
-        .name("0.6 mm, as in the thesis", "crimson");
+        .name("0.6 mm, as in [Matl 2021]", "crimson");
     Ok(panel)
 }
 
 /// Noise of a marker (px), its movement for a metre of indentation (px/m, root mean square), and the number of markers.
 fn sight(pressure_pa: f64) -> Outcome<(f64, f64, usize)> {
-    let mut bench = Bench::thesis(7);
+    let mut bench = Bench::matl_2021(7);
     bench.holds_box = false;
     (bench.air.leak, bench.air.pressure_pa) = (0.0, pressure_pa);
     bench.touch = Touch::none();

@@ -31,7 +31,7 @@ pub(crate) fn slips(stiffness: &Stiffness, panels: &mut Vec<Panel>) -> Outcome<(
     for &pressure_pa in pressures {
         let trial = |k: u64| mass_at_slip_kg(pressure_pa, 1000 + k).map_err(|e| e.to_string());
         let masses_kg: Vec<f64> = (0..trials).into_par_iter().map(trial).collect::<Result<_, String>>()?;
-        let mut bench = Bench::thesis(0);
+        let mut bench = Bench::matl_2021(0);
         bench.air.pressure_pa = pressure_pa;
         let (depth_m, normal_n) = (bench.indentation_now_m(), bench.normal_n());
         let corrected_n = stiffness.force_n(pressure_pa, depth_m, 0.0, f64::INFINITY)?.value;
@@ -72,7 +72,7 @@ pub(crate) fn slips(stiffness: &Stiffness, panels: &mut Vec<Panel>) -> Outcome<(
 /// Pressure held by hand of the simulation; friction differs a little from trial to trial.
 fn mass_at_slip_kg(pressure_pa: f64, seed: u64) -> Outcome<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut bench = Bench::thesis(seed);
+    let mut bench = Bench::matl_2021(seed);
     let scatter: f64 = StandardNormal.sample(&mut rng);
     bench.wall_friction *= 1.0 + 0.03 * scatter;
     let settings = GraspSettings {
@@ -97,10 +97,10 @@ fn mass_at_slip_kg(pressure_pa: f64, seed: u64) -> Outcome<f64> {
 
 /// The task of section 5.5.
 pub(crate) fn demonstration() -> Outcome<Panel> {
-    let mut bench = Bench::thesis(9);
+    let mut bench = Bench::matl_2021(9);
     bench.pour_kg_s = 10e-3;
     let mut grasp = Grasp::new::<FakeError>(GraspSettings::default())?;
-    println!("\nA grasp that answers shear: beads up to 210.2 g, as in the thesis");
+    println!("\nA grasp that answers shear: beads up to 210.2 g, as in [Matl 2021]");
     println!("{:>7} {:>9} {:>14} {:>13}", "t (s)", "mass (g)", "wanted (kPa)", "slid (mm)");
     let mut panel = Panel::new("5.5: a grasp that answers shear", "time (s)", "");
     let (mut pressure, mut mass, mut slid) = (Vec::new(), Vec::new(), Vec::new());

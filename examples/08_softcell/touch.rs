@@ -12,7 +12,7 @@ use super::Outcome;
 
 /// A tip at a pressure, pressed by the box but not loaded.
 fn bench(pressure_pa: f64, seed: u64) -> Bench {
-    let mut bench = Bench::thesis(seed);
+    let mut bench = Bench::matl_2021(seed);
     bench.holds_box = false;
     (bench.air.leak, bench.air.pressure_pa) = (0.0, pressure_pa);
     bench.touch.indentation_m = bench.indentation_now_m();

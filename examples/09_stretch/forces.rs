@@ -19,7 +19,7 @@ fn depths() -> Vec<f64> {
 
 /// Forces (N) of presses into a membrane, ever deeper.
 fn presses(shape: Shape, stretch_m: f64) -> Vec<(f64, f64)> {
-    let mut membrane = Membrane::new(Sheet::thesis(), stretch_m);
+    let mut membrane = Membrane::new(Sheet::matl_2021(), stretch_m);
     let press = |d: f64| {
         membrane.press(&shape, [0.0; 2], d);
         (d, membrane.force_n)
@@ -134,7 +134,7 @@ fn moduli(surface: &Surface, balls: &[Press], stretches: &[f64], panels: &mut Ve
     let (mean, spread) = surface.left_out_error_n();
     let range = balls.iter().map(|p| p.force_n).fold(0.0, f64::max);
     println!(
-        "left out: {mean:.3} +- {spread:.3} N of {range:.2} N (the thesis, on its own hand: 0.023 +- 0.011 N)"
+        "left out: {mean:.3} +- {spread:.3} N of {range:.2} N ([Matl 2021], on another hand: 0.023 +- 0.011 N)"
     );
     Ok(())
 }

@@ -47,7 +47,7 @@ fn face(diameter_m: f64, stretch_m: f64, depth_m: f64) -> Errors {
     let mut rig = Rig::new(Shape::Cylinder { radius_m: 0.5 * diameter_m }, Filling::Rigid, 64);
     let (cloud, segmenter) = look(&mut rig, stretch_m, at(0.0, -depth_m)).ok()?;
     let d = diameters(&cloud, &segmenter.states).ok()?;
-    Some([d.i_m.0 - diameter_m, d.j_m.0 - diameter_m])
+    Some([d.i.value_m - diameter_m, d.j.value_m - diameter_m])
 }
 
 /// Figure 6.4: errors of cylinders' diameters over depth and stretch, and those of a ball with their intervals.

@@ -27,7 +27,7 @@ const OBJECTS: [(&str, Shape, [f64; 2], &[f64]); 3] = [
 
 /// Figure 6.6: touches at no stretch, merged in the world.
 pub(crate) fn reconstructed(panels: &mut Vec<Panel>) -> Outcome<()> {
-    println!("\nObjects from touches at no stretch (figure 6.6; the thesis: dimensions within 2 mm)");
+    println!("\nObjects from touches at no stretch (figure 6.6; [Matl 2021]: dimensions within 2 mm)");
     println!("{:>18} {:>8} {:>24} {:>14}", "", "points", "off the surface: median", "95 % (mm)");
     let objects = if examples::small() { &OBJECTS[..1] } else { &OBJECTS[..] };
     for (name, shape, half_m, places) in objects.iter().copied() {
@@ -93,7 +93,7 @@ const SIDE_M: f64 = 0.02;
 /// Figure 6.8: a cube of dough rolled in circles until its height settles, then pressed flat; and one that is only pressed.
 pub(crate) fn cookies(panels: &mut Vec<Panel>) -> Outcome<()> {
     println!(
-        "\nCookies from a cube of 20 mm (figure 6.8; the thesis: circularity 0.888 on average, a square 0.785)"
+        "\nCookies from a cube of 20 mm (figure 6.8; [Matl 2021]: circularity 0.888 on average, a square 0.785)"
     );
     println!("{:>10} {:>8} {:>8} {:>18} {:>12}", "", "circles", "settled", "height (mm)", "circularity");
     let ways = [("rolled", true), ("not rolled", false)];
@@ -137,9 +137,10 @@ fn cookie(rolls: bool) -> Outcome<Cookie> {
     if rolls {
         // Medium firmness; half a circle's way to each side.
         rig.open_to(0.13, 0.05)?;
-        let rolling = Rolling { middle: at(0.0, SIDE_M - 6e-3), circle_m: 8e-3, moves: (6, 0.17), most: 60 };
+        let rolling =
+            Rolling { middle: at(0.0, SIDE_M - 6e-3), circle_m: 8e-3, moves: 6, move_s: 0.17, most: 60 };
         let height = |rig: &mut Rig| top_m(rig);
-        let done = roll(&mut rig, &rolling, Settling::thesis(), height).map_err(|e| e.to_string())?;
+        let done = roll(&mut rig, &rolling, Settling::matl_2021(), height).map_err(|e| e.to_string())?;
         settled = done.settled;
         heights_mm = done.heights_m.iter().map(|h| 1e3 * h).collect();
     }

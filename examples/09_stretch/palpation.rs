@@ -27,7 +27,8 @@ pub(crate) fn balloons(surface: &Surface, panels: &mut Vec<Panel>) -> Outcome<()
             let mut rig =
                 Rig::new(Shape::Ball { radius_m: 0.02 }, Filling::Springy(FILLINGS[k].1), 100 + seed);
             let stretches_m = vec![0.0, 0.02, 0.04, 0.06];
-            let programme = Programme { stretches_m, pictures: 2, ..Programme::thesis(at(0.0, 0.03), 0.0) };
+            let programme =
+                Programme { stretches_m, pictures: 2, ..Programme::matl_2021(at(0.0, 0.03), 0.0) };
             Ok((k, palpate(&mut rig, &programme, surface).map_err(|e| e.to_string())?))
         })
         .collect::<Outcome<_>>()?;
@@ -44,7 +45,7 @@ pub(crate) fn balloons(surface: &Surface, panels: &mut Vec<Panel>) -> Outcome<()
         known.dedup();
         for (l, x) in known.iter().enumerate() {
             let fine: Vec<f64> = (0..=30).map(|i| 5e-4 * f64::from(i)).collect();
-            let line = curve(surface, p.radius_m.0, *x, &fine)?;
+            let line = curve(surface, p.radius.value_m, *x, &fine)?;
             panel.line(fine.iter().zip(line).map(|(d, f)| [1e3 * d, f]), &hue(l, 4));
             panel.name(format!("{:.0} mm", 1e3 * x), &hue(l, 4));
         }

@@ -97,7 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "\nmean and spread of what is inferred less the truth, root mean square, over {} unseen pours",
         tests.len()
     );
-    row("thesis", &[(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148)]);
+    row("[Matl 2021]", &[(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148)]);
     row("here", &errors(&posterior, &tests)?);
     row("of the prior", &of_prior(&posterior, &tests));
     again(&posterior, &scene, &view, &tests)?;
@@ -167,7 +167,7 @@ fn learn_heights(results: &Results, scene: &Scene, view: &View, out: &Path) -> R
     let (mean, sd) = mean_sd(errors.iter().copied());
     let within = scores.iter().filter(|z| z.abs() < 1.96).count();
     println!(
-        "height for a ring: error {mean:+.4} +- {sd:.4} cm over {} unseen pours (thesis: 0.0530 +- 0.2221), {within} of them within 1.96 sigma",
+        "height for a ring: error {mean:+.4} +- {sd:.4} cm over {} unseen pours ([Matl 2021]: 0.0530 +- 0.2221), {within} of them within 1.96 sigma",
         errors.len()
     );
     Ok(())
@@ -266,7 +266,7 @@ fn again(
     let found: Vec<(f64, f64)> = both.into_iter().flatten().collect();
     let (inferred, truth) = (mean_sd(found.iter().map(|d| d.0)), mean_sd(found.iter().map(|d| d.1)));
     println!(
-        "L2 of statistics over {} heaps: {:.3} +- {:.3} poured again as inferred (thesis: 1.582 +- 0.336), {:.3} +- {:.3} with the truth and another seed",
+        "L2 of statistics over {} heaps: {:.3} +- {:.3} poured again as inferred ([Matl 2021]: 1.582 +- 0.336), {:.3} +- {:.3} with the truth and another seed",
         found.len(),
         inferred.0,
         inferred.1,

@@ -7,6 +7,7 @@ pub mod dem;
 pub mod emulator;
 #[cfg(feature = "fake")]
 pub mod fake;
+mod order;
 pub mod posterior;
 pub mod scene;
 pub mod seeing;

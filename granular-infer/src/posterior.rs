@@ -45,7 +45,7 @@ pub struct Inferred {
     pub resemblance: Resemblance,
 }
 
-/// Settings that learn chapter 3's posterior: Matern 5/2, as the thesis; few frequencies and two components, with weights that
+/// Settings that learn the posterior of [Matl 2021], chapter 3: Matern 5/2 as there; few frequencies and two components, with weights that
 /// decay, since a thousand pictures of 16 numbers are soon learned by heart.
 pub fn settings() -> MdrffSettings {
     let training =
@@ -157,7 +157,7 @@ impl GrainPosterior {
         Posterior::new(prior.clone(), Mixture::new(&mixture.weights(), &means, &covariances)?)
     }
 
-    /// Distance of two pictures' statistics, each in standard deviations of the training's: the thesis's L2 error.
+    /// Distance of two pictures' statistics, each in standard deviations of the training's: the L2 error of [Matl 2021].
     pub fn distance(&self, a: &[f64; COUNT], b: &[f64; COUNT]) -> f64 {
         a.iter().zip(b).zip(&self.sd).map(|((a, b), sd)| ((a - b) / sd).powi(2)).sum::<f64>().sqrt()
     }
@@ -187,7 +187,7 @@ impl ConditionalDensity for GrainPosterior {
 }
 
 impl Inferred {
-    /// The posterior's mean in `(mu_s, ln mu_r, e)`, from 4,000 draws of a generator of its own: the estimate whose squared
+    /// The posterior's mean in `(mu_s, ln mu_r, e)`, from 4,000 draws of a separate generator: the estimate whose squared
     /// error is expected to be least.
     pub fn estimate(&self) -> Grain {
         let draws = self.posterior.sample(DRAWS, &mut ChaCha8Rng::seed_from_u64(0)).theta;

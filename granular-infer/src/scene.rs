@@ -26,7 +26,7 @@ pub struct Grain {
     pub restitution: f64,
 }
 
-/// Grains that pour as couscous does. The thesis has `mu_s = 0.67` and e = 0.77; its `mu_r = 8e-7` is its solver's own.
+/// Grains that pour as couscous does. [Matl 2021] has `mu_s = 0.67` and e = 0.77; its `mu_r = 8e-7` means something in its solver alone.
 pub const COUSCOUS: Grain = Grain { sliding_friction: 0.6687, rolling_friction: 0.05, restitution: 0.5 };
 
 impl Grain {

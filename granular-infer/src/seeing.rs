@@ -1,6 +1,7 @@
 //! From a depth picture to heights above the ground.
 
 use crate::camera::Camera;
+use crate::order::median;
 
 /// A depth picture as heights above a plane that was fitted to its ground.
 #[derive(Debug, Clone, PartialEq)]
@@ -236,13 +237,4 @@ fn commonest(camera: &Camera, depths: &[f64]) -> f64 {
     let middle = (most as f64 + 0.5) * bin;
     // A little wider than the bin: a ground without noise may lie on its very edge.
     median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.6 * bin).collect())
-}
-
-/// The median, NaN of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

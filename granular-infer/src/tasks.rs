@@ -17,7 +17,7 @@ use crate::scene::{Grain, Scene};
 use crate::shipped::{self, ShippedError};
 use crate::view::View;
 
-/// A ring, as the thesis measures one: the 5th and the 50th percentile of the distances at which grains are seen.
+/// A ring, as [Matl 2021] measures one: the 5th and the 50th percentile of the distances at which grains are seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ring {
     /// 5th percentile in m: about the inner radius.

@@ -60,7 +60,7 @@ impl Indenter {
 
     /// Factor c of `F = c E/(1 - nu^2) delta^n` on an elastic half-space, in m^(2 - n).
     ///
-    /// Sphere `4/3 sqrt(R)`, cylinder `2 R`, cone `2 / (pi tan(angle))` (eqs 6.2 to 6.4 of the thesis, corrected).
+    /// Sphere `4/3 sqrt(R)`, cylinder `2 R`, cone `2 / (pi tan(angle))` ([Matl 2021], eqs 6.2 to 6.4, corrected).
     pub fn factor(&self) -> f64 {
         match *self {
             Self::Sphere { radius_m } => 4.0 / 3.0 * radius_m.sqrt(),

@@ -58,7 +58,7 @@ pub enum FieldError {
 pub enum Kernel {
     /// `r^2 ln r`: the least bent field, without a width to choose.
     ThinPlate,
-    /// `sqrt(1 + (r/width)^2)`: SciPy's default, and the thesis's.
+    /// `sqrt(1 + (r/width)^2)`: the default of SciPy and of [Matl 2021].
     Multiquadric {
         /// Width, above 0.
         width: f64,

@@ -70,8 +70,10 @@ pub struct GraspSettings {
     pub settled_pa: f64,
     /// ... for this long, s.
     pub settle_s: f64,
-    /// Valve's opening for each Pa that is missing, and for each Pa s.
-    pub gains: (f64, f64),
+    /// Proportional gain: the valve's opening for each Pa that is missing, 1/Pa.
+    pub proportional_per_pa: f64,
+    /// Integral gain: the valve's opening for each missing Pa and second, 1/(Pa s).
+    pub integral_per_pa_s: f64,
 }
 
 impl Default for GraspSettings {
@@ -86,7 +88,8 @@ impl Default for GraspSettings {
             margin_pa: 400.0,
             settled_pa: 60.0,
             settle_s: 0.3,
-            gains: (4e-4, 1.2e-3),
+            proportional_per_pa: 4e-4,
+            integral_per_pa_s: 1.2e-3,
         }
     }
 }
@@ -138,7 +141,7 @@ impl Grasp {
             ("the limit", s.limit_pa),
             ("the margin", s.margin_pa),
             ("the settled band", s.settled_pa),
-            ("the proportional gain", s.gains.0),
+            ("the proportional gain", s.proportional_per_pa),
         ] {
             if !(got > 0.0 && got.is_finite()) {
                 return Err(GraspError::Setting { what, expected: "a finite number above 0", got });
@@ -257,7 +260,7 @@ impl Grasp {
         let error = self.wanted_pa - turn.pressure_pa;
         let dt_s = self.last_s.map_or(0.0, |last| (turn.t_s - last).clamp(0.0, 0.2));
         self.last_s = Some(turn.t_s);
-        let (p, i) = self.settings.gains;
+        let GraspSettings { proportional_per_pa: p, integral_per_pa_s: i, .. } = self.settings;
         let missing = self.missing + error * dt_s;
         let wanted = p * error + i * missing;
         if wanted.abs() < 1.0 {

@@ -9,6 +9,7 @@ use hw_traits::picture::Picture;
 use nalgebra::{Matrix2, SymmetricEigen};
 
 use crate::image::{ImageError, ImageSettings, Regions, regions};
+use crate::median::median;
 
 /// Why there are no markers.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -33,15 +34,17 @@ pub enum MarkerError {
 pub struct MarkerSettings {
     /// How the picture is taken apart.
     pub image: ImageSettings,
-    /// Smallest and largest area of a region, in pixels, both included.
-    pub area_px: (usize, usize),
+    /// Smallest area of a region, pixels.
+    pub least_area_px: usize,
+    /// Largest area of a region, pixels.
+    pub most_area_px: usize,
     /// A region whose area is above this many typical ones (the median) is looked at as several markers.
     pub merged: f64,
 }
 
 impl Default for MarkerSettings {
     fn default() -> Self {
-        Self { image: ImageSettings::default(), area_px: (12, 4000), merged: 1.6 }
+        Self { image: ImageSettings::default(), least_area_px: 12, most_area_px: 4000, merged: 1.6 }
     }
 }
 
@@ -63,15 +66,14 @@ pub struct Marker {
 pub fn find(picture: &Picture<u8>, settings: &MarkerSettings) -> Result<Vec<Marker>, MarkerError> {
     let regions = regions(picture, &settings.image)?;
     let members = members(&regions);
-    let (least, most) = settings.area_px;
-    let kept: Vec<&Vec<usize>> = members.iter().filter(|m| (least..=most).contains(&m.len())).collect();
-    let mut areas: Vec<usize> = kept.iter().map(|m| m.len()).collect();
-    areas.sort_unstable();
-    let Some(&typical) = areas.get(areas.len() / 2) else {
+    let (least, most) = (settings.least_area_px, settings.most_area_px);
+    let sized: Vec<&Vec<usize>> = members.iter().filter(|m| (least..=most).contains(&m.len())).collect();
+    let mut areas: Vec<usize> = sized.iter().map(|m| m.len()).collect();
+    let Some(typical) = median(&mut areas, usize::cmp) else {
         return Err(MarkerError::NoMarkers { regions: regions.count, least, most });
     };
-    let mut found = Vec::with_capacity(kept.len());
-    for pixels in kept {
+    let mut found = Vec::with_capacity(sized.len());
+    for pixels in sized {
         let parts = parts(pixels, regions.width, typical as f64, settings.merged);
         if parts > 1 {
             found.extend(take_apart(pixels, regions.width, parts));

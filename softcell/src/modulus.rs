@@ -228,7 +228,7 @@ impl Stiffness {
     }
 }
 
-/// Eq. 5.3 as printed, by whose factor of 4/6 the thesis's figure 5.11 was drawn: `F = 4/6 sqrt(R) E* delta^(3/2)`. It is 3/8 of the
+/// Eq. 5.3 of [Matl 2021] as printed, by whose factor of 4/6 its figure 5.11 was drawn: `F = 4/6 sqrt(R) E* delta^(3/2)`. It is 3/8 of the
 /// corrected one with nu = 1/2.
 pub fn printed_force_n(modulus_pa: f64, tip_m: f64, indentation_m: f64) -> f64 {
     4.0 / 6.0 * tip_m.sqrt() * modulus_pa * indentation_m.max(0.0).powf(1.5)

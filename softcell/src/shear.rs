@@ -1,6 +1,6 @@
 //! Shear, indentation and torsion told apart.
 //!
-//! The thesis calls a motion shear where the displacements' directions spread less than a hand-set threshold (section 5.5). Here
+//! [Matl 2021] calls a motion shear where the displacements' directions spread less than a hand-set threshold (section 5.5). Here
 //! all three are fitted at once, `d_i = w(r_i) [t + a (r_i - c)] + w(r_i)^3 b J (r_i - c) + e_i`, where t is shear, a indentation
 //! (outward), b torsion (J turns by a right angle). The weight `w = (1 + (|r - c|/s)^4)^(-1/4)` is flat over the contact at c and
 //! fades like 1/r, as what is pushed does far away; what is twisted fades like 1/r^3. A part is there

@@ -108,7 +108,7 @@ fn fields_that_cannot_be_are_refused() {
 /// Loads that the fake's skin (Mindlin) carries, learned at four pressures, asked for between them.
 #[test]
 fn loads_are_read_off_the_shear() {
-    let mut bench = Bench::thesis(1);
+    let mut bench = Bench::matl_2021(1);
     let mut carried = |pressure_pa: f64, shear_m: f64| {
         bench.air.pressure_pa = pressure_pa;
         bench.touch.indentation_m = bench.indentation_now_m();
@@ -155,7 +155,7 @@ fn pressed(dome: &Dome, pressure_pa: f64, noise_n: f64, rng: &mut ChaCha8Rng) ->
 #[test]
 fn moduli_rise_with_pressure_and_give_the_force_back() {
     let mut rng = ChaCha8Rng::seed_from_u64(21);
-    let dome = Dome::thesis();
+    let dome = Dome::matl_2021();
     let pressures = [0.0, 1500.0, 3000.0, 5000.0, 8000.0, 12000.0];
     let mut states = Vec::new();
     for p in pressures {

@@ -19,7 +19,7 @@ fn grasp(settings: GraspSettings) -> Grasp {
 
 #[test]
 fn the_pressure_goes_where_it_is_wanted_and_stays() {
-    let mut bench = Bench::thesis(3);
+    let mut bench = Bench::matl_2021(3);
     let mut grasp = grasp(GraspSettings { start_pa: 2000.0, ..GraspSettings::default() });
     let turns: Vec<_> = (0..150).map(|_| grasp.turn(&mut bench).unwrap()).collect();
     for t in &turns[90..] {
@@ -32,7 +32,7 @@ fn the_pressure_goes_where_it_is_wanted_and_stays() {
 #[test]
 fn a_box_that_grows_heavier_is_held() {
     let run = |step_pa: f64| {
-        let mut bench = Bench::thesis(4);
+        let mut bench = Bench::matl_2021(4);
         bench.pour_kg_s = 12e-3;
         let mut grasp = grasp(GraspSettings { step_pa, ..GraspSettings::default() });
         let mut shears = 0;
@@ -97,7 +97,7 @@ impl Valve for Faulty {
 
 #[test]
 fn a_failure_closes_the_valve_and_too_much_pressure_lets_air_out() {
-    let mut rig = Faulty { bench: Bench::thesis(5), camera: true, pressure_pa: None, last: 9.0 };
+    let mut rig = Faulty { bench: Bench::matl_2021(5), camera: true, pressure_pa: None, last: 9.0 };
     let settings = GraspSettings { start_pa: 3000.0, ..GraspSettings::default() };
     let mut grasp = Grasp::new::<Broken>(settings).unwrap();
     grasp.turn(&mut rig).unwrap();

@@ -17,7 +17,7 @@ const SIGMA: f64 = 0.1;
 
 /// Markers seen before and after, with noise.
 fn seen(before: &Touch, after: &Touch, rng: &mut ChaCha8Rng) -> Vec<Moved> {
-    let (dome, eye) = (Dome::thesis(), Eye::thesis());
+    let (dome, eye) = (Dome::matl_2021(), Eye::matl_2021());
     let mut noise = || -> f64 { SIGMA * Distribution::<f64>::sample(&StandardNormal, rng) };
     let mut moved = Vec::new();
     for m in &dome.markers {

@@ -16,7 +16,7 @@ use softcell::image::{ImageError, ImageSettings, regions};
 use softcell::markers::{MarkerError, MarkerSettings, find};
 
 fn still() -> Bench {
-    let mut bench = Bench::thesis(7);
+    let mut bench = Bench::matl_2021(7);
     bench.holds_box = false;
     bench
 }
@@ -41,7 +41,7 @@ fn every_marker_is_found_within_a_tenth_of_a_pixel() {
 
 #[test]
 fn two_markers_that_touch_are_two_and_say_so() {
-    let eye = Eye::thesis();
+    let eye = Eye::matl_2021();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     // Twelve far apart and a pair 1.5 mm apart (radius 1 mm).
     let mut points: Vec<[f64; 3]> = (0..12)
@@ -67,7 +67,7 @@ fn pictures_without_markers_are_refused_with_the_reason() {
     }
     // Noise has a threshold too, but no two classes.
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let noise = Eye::thesis().picture(&[], &mut rng).unwrap();
+    let noise = Eye::matl_2021().picture(&[], &mut rng).unwrap();
     assert!(matches!(
         find(&noise, &MarkerSettings::default()),
         Err(MarkerError::Image(ImageError::NoContrast { .. }))
@@ -155,7 +155,7 @@ fn a_covered_marker_is_lost_and_found_again() {
 /// Two markers run into each other and part again; neither takes the other's place.
 #[test]
 fn markers_that_meet_keep_their_names() {
-    let eye = Eye { noise: 1.0, ..Eye::thesis() };
+    let eye = Eye { noise: 1.0, ..Eye::matl_2021() };
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let points = |apart: f64| {
         let mut p: Vec<[f64; 3]> = (0..15)

@@ -1,5 +1,6 @@
 //! Load from what is seen: radius, stretch, indentation (section 6.5).
 
+use crate::measured::MeasuredLength;
 use crate::modulus::{ModulusError, Surface, per_modulus};
 
 /// Why there is no force.
@@ -18,15 +19,15 @@ pub enum ForceError {
     },
 }
 
-/// What was seen of a contact with a ball; each number with its standard deviation.
+/// What was seen of a contact with a ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
     /// Stretch of the membrane, m.
     pub stretch_m: f64,
-    /// Radius of the contact, m.
-    pub radius_m: (f64, f64),
-    /// Indentation, m.
-    pub indentation_m: (f64, f64),
+    /// Radius of the contact.
+    pub radius: MeasuredLength,
+    /// Indentation.
+    pub indentation: MeasuredLength,
 }
 
 /// A force and its 95 % interval, N.
@@ -44,8 +45,8 @@ pub struct Load {
 /// # Errors
 /// [`ForceError`].
 pub fn load(surface: &Surface, seen: &Seen) -> Result<Load, ForceError> {
-    let (radius, radius_sigma) = seen.radius_m;
-    let (depth, depth_sigma) = seen.indentation_m;
+    let MeasuredLength { value_m: radius, sigma_m: radius_sigma } = seen.radius;
+    let MeasuredLength { value_m: depth, sigma_m: depth_sigma } = seen.indentation;
     for (what, got) in [
         ("the indentation", depth),
         ("the indentation's standard deviation", depth_sigma),

@@ -6,6 +6,8 @@ pub mod curvature;
 #[cfg(feature = "fake")]
 pub mod fake;
 pub mod force;
+pub mod measured;
+mod median;
 pub mod modulus;
 pub mod palpate;
 pub mod reconstruct;

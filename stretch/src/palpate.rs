@@ -13,6 +13,7 @@ use hw_traits::{Error, ErrorKind};
 use crate::cloud::{Cloud, CloudError, CloudSettings, Rest, Window};
 use crate::contact::{Ball, ContactError, cap};
 use crate::force::{ForceError, Load, Seen, indentation_m, load};
+use crate::measured::MeasuredLength;
 use crate::modulus::Surface;
 use crate::segment::{SegmentSettings, Segmenter};
 
@@ -56,42 +57,54 @@ pub struct Programme {
     pub above: Pose,
     /// Height of the object's top in the base frame, roughly (from a camera, within a few millimetres), m.
     pub top_m: f64,
-    /// Gripper's width without stretch and the membrane's breadth, m.
-    pub sheet_m: (f64, f64),
+    /// Gripper's width without stretch, m.
+    pub sheet_length_m: f64,
+    /// Membrane's breadth, m.
+    pub sheet_breadth_m: f64,
     /// Border of the membrane that is not looked at, m.
     pub margin_m: f64,
     /// Stretches, rising, m.
     pub stretches_m: Vec<f64>,
     /// Indentation of the first touch, m.
     pub touch_m: f64,
-    /// Step of the indentation and its end, m.
-    pub depth_m: (f64, f64),
+    /// Step of the indentation, m.
+    pub depth_step_m: f64,
+    /// Greatest indentation, m.
+    pub deepest_m: f64,
     /// Sinking at which the object has yielded, m.
     pub yield_m: f64,
     /// Pictures that are looked at at each step.
     pub pictures: usize,
-    /// Speed of the gripper, m/s; time for each of the arm's moves, s; pictures to wait for rest at most.
-    pub motion: (f64, f64, usize),
-    /// How clouds are smoothed and segmented.
+    /// Speed of the gripper, m/s.
+    pub gripper_m_s: f64,
+    /// Time for each of the arm's moves, s.
+    pub move_s: f64,
+    /// Most pictures to wait for rest.
+    pub patience_pictures: usize,
+    /// How clouds are smoothed.
     pub cloud: CloudSettings,
     /// How they are segmented.
     pub segment: SegmentSettings,
 }
 
 impl Programme {
-    /// The thesis's hand: 100 x 90 mm, stretches to 60 mm, depths of 1 mm to 15 mm, yielded at 1.5 mm.
-    pub fn thesis(above: Pose, top_m: f64) -> Self {
+    /// The hand of [Matl 2021]: 100 x 90 mm, stretches to 60 mm, depths of 1 mm to 15 mm, yielded at 1.5 mm.
+    pub fn matl_2021(above: Pose, top_m: f64) -> Self {
         Self {
             above,
             top_m,
-            sheet_m: (0.1, 0.09),
+            sheet_length_m: 0.1,
+            sheet_breadth_m: 0.09,
             margin_m: 6e-3,
             stretches_m: (0..=6).map(|k| 0.01 * f64::from(k)).collect(),
             touch_m: 6e-3,
-            depth_m: (1e-3, 15e-3),
+            depth_step_m: 1e-3,
+            deepest_m: 15e-3,
             yield_m: 1.5e-3,
             pictures: 3,
-            motion: (0.05, 1.0, 300),
+            gripper_m_s: 0.05,
+            move_s: 1.0,
+            patience_pictures: 300,
             cloud: CloudSettings::default(),
             segment: SegmentSettings::default(),
         }
@@ -109,8 +122,8 @@ impl Programme {
         }
         for (what, got) in [
             ("the first touch", self.touch_m),
-            ("the step", self.depth_m.0),
-            ("the greatest depth less the first touch", self.depth_m.1 - self.touch_m),
+            ("the step", self.depth_step_m),
+            ("the greatest depth less the first touch", self.deepest_m - self.touch_m),
             ("the sinking", self.yield_m),
             ("the number of pictures", self.pictures as f64),
         ] {
@@ -142,8 +155,8 @@ pub struct Step {
 /// What was felt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Palpation {
-    /// Radius of the object where it was touched, m, and its standard deviation.
-    pub radius_m: (f64, f64),
+    /// Radius of the object where it was touched.
+    pub radius: MeasuredLength,
     /// All steps, in order.
     pub steps: Vec<Step>,
     /// Stiffness, N/m; none where the object did not yield: it is at least as stiff as the last step says.
@@ -158,8 +171,7 @@ struct Look {
     /// Highest point of the ball over the membrane at rest, m.
     apex_m: f64,
     apex_sigma_m: f64,
-    radius_m: f64,
-    radius_sigma_m: f64,
+    radius: MeasuredLength,
 }
 
 /// Palpates an object.
@@ -183,11 +195,11 @@ where
     let first = eyes.look(rig, programme)?;
     // The light touch tells where the top is when nothing presses.
     let top_m = programme.top_m - programme.touch_m + first.apex_m;
-    let deeper = first.apex_m + 0.5 * (programme.depth_m.1 - first.apex_m).max(0.0);
+    let deeper = first.apex_m + 0.5 * (programme.deepest_m - first.apex_m).max(0.0);
     lower(rig, programme, top_m - deeper)?;
     let shape = eyes.look(rig, programme)?;
     let mut out = Palpation {
-        radius_m: (shape.radius_m, shape.radius_sigma_m),
+        radius: shape.radius,
         steps: Vec::new(),
         stiffness_n_m: None,
         interval_n_m: (0.0, f64::INFINITY),
@@ -195,8 +207,8 @@ where
     let force_of = |stretch_m: f64, look: &Look| {
         let seen = Seen {
             stretch_m,
-            radius_m: (shape.radius_m, shape.radius_sigma_m),
-            indentation_m: (look.apex_m.max(0.0), look.apex_sigma_m),
+            radius: shape.radius,
+            indentation: MeasuredLength { value_m: look.apex_m.max(0.0), sigma_m: look.apex_sigma_m },
         };
         load(surface, &seen).map_err(PalpateError::Force)
     };
@@ -206,9 +218,10 @@ where
         lower(rig, programme, programme.above.position_m[2])?;
         open(rig, programme, stretch_m)?;
         eyes.learn_rest(rig, programme, stretch_m)?;
-        let start = indentation_m(surface, shape.radius_m, stretch_m, force).map_err(PalpateError::Force)?;
-        let mut depth = start.max(programme.touch_m) + programme.depth_m.0;
-        while depth <= programme.depth_m.1 {
+        let start =
+            indentation_m(surface, shape.radius.value_m, stretch_m, force).map_err(PalpateError::Force)?;
+        let mut depth = start.max(programme.touch_m) + programme.depth_step_m;
+        while depth <= programme.deepest_m {
             let tool_m = top_m - depth;
             lower(rig, programme, tool_m)?;
             let now = eyes.look(rig, programme)?;
@@ -224,7 +237,7 @@ where
                 return Ok(out);
             }
             force = load.force_n.max(force);
-            depth += programme.depth_m.0;
+            depth += programme.depth_step_m;
         }
     }
     Ok(out)
@@ -252,7 +265,7 @@ fn open<R>(rig: &mut R, programme: &Programme, stretch_m: f64) -> Result<(), Pal
 where
     R: DepthCamera + Gripper + Arm,
 {
-    rig.open_to(programme.sheet_m.0 + stretch_m, programme.motion.0).map_err(device)?;
+    rig.open_to(programme.sheet_length_m + stretch_m, programme.gripper_m_s).map_err(device)?;
     rest(rig, programme)
 }
 
@@ -261,7 +274,7 @@ where
     R: DepthCamera + Gripper + Arm,
 {
     let [x, y, _] = programme.above.position_m;
-    rig.move_to(Pose { position_m: [x, y, z_m], ..programme.above }, programme.motion.1).map_err(device)?;
+    rig.move_to(Pose { position_m: [x, y, z_m], ..programme.above }, programme.move_s).map_err(device)?;
     rest(rig, programme)
 }
 
@@ -270,13 +283,13 @@ fn rest<R>(rig: &mut R, programme: &Programme) -> Result<(), PalpateError<R::Err
 where
     R: DepthCamera + Gripper + Arm,
 {
-    for _ in 0..programme.motion.2.max(1) {
+    for _ in 0..programme.patience_pictures.max(1) {
         if Arm::settled(rig).map_err(device)? && Gripper::settled(rig).map_err(device)? {
             return Ok(());
         }
         rig.depth_m().map_err(device)?;
     }
-    Err(PalpateError::Restless { pictures: programme.motion.2 })
+    Err(PalpateError::Restless { pictures: programme.patience_pictures })
 }
 
 /// The camera's side: the membrane's plane, and room that is used again.
@@ -309,7 +322,7 @@ impl Eyes {
         };
         let rough = Rest::fit(&picture, &intrinsics, &middle).map_err(PalpateError::Cloud)?;
         let size = (picture.width(), picture.height());
-        let sheet = (programme.sheet_m.0 + stretch_m, programme.sheet_m.1);
+        let sheet = (programme.sheet_length_m + stretch_m, programme.sheet_breadth_m);
         let window = Window::of_membrane(size, &intrinsics, &rough, sheet, programme.margin_m)
             .map_err(PalpateError::Cloud)?;
         let rest = Rest::fit(&picture, &intrinsics, &window).map_err(PalpateError::Cloud)?;
@@ -349,10 +362,14 @@ impl Eyes {
         let about = |values: &mut dyn Iterator<Item = f64>, middle: f64| {
             (values.map(|v| (v - middle).powi(2)).sum::<f64>() / (n - 1.0).max(1.0) / n).sqrt()
         };
-        // Smoothing ties neighbours together, which one picture's own scatter does not show; a twentieth of a millimetre is the floor.
+        // Smoothing correlates neighbours, which the scatter of one picture does not show; a twentieth of a millimetre is the floor.
         let apex_sigma_m = about(&mut apexes.iter().copied(), apex_m).max(5e-5);
         let scatter = about(&mut balls.iter().map(|b| b.radius_m), radius_m);
-        let own = balls.iter().map(|b| b.radius_sigma_m).fold(0.0, f64::max);
-        Ok(Look { apex_m, apex_sigma_m, radius_m, radius_sigma_m: scatter.max(own) })
+        let of_one = balls.iter().map(|b| b.radius_sigma_m).fold(0.0, f64::max);
+        Ok(Look {
+            apex_m,
+            apex_sigma_m,
+            radius: MeasuredLength { value_m: radius_m, sigma_m: scatter.max(of_one) },
+        })
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A membrane under tensions `T_j` and `T_i` carries the load `T_j k_j + T_i k_i` per area, and none where nothing touches:
 //! beside the contact it curves one way along a radius and the other way across. So contact is where `k_j + r k_i` (r the ratio
-//! of the tensions) is above its noise. The thesis's rule, convex along either axis, calls part of the free membrane contact (a
+//! of the tensions) is above its noise. The rule of [Matl 2021], convex along either axis, calls part of the free membrane contact (a
 //! cone's flank is convex around the cone); it is there by name. A flat face carries its load on its rim alone: points above the plane of
 //! the curved points, inside the curved region, are in contact too.
 
@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::cloud::Cloud;
 use crate::curvature::Curvature;
+use crate::median::median;
 
 /// State of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -140,8 +141,8 @@ impl Segmenter {
             }
         }
         let total = |left_out: usize| {
-            let kept = sectors.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, s)| s);
-            slope(kept.fold([0.0; 3], |t, s| [t[0] + s[0], t[1] + s[1], t[2] + s[2]]))
+            let others = sectors.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, s)| s);
+            slope(others.fold([0.0; 3], |t, s| [t[0] + s[0], t[1] + s[1], t[2] + s[2]]))
         };
         let ratio = total(8)?;
         let parts: Option<Vec<f64>> = (0..8).map(total).collect();
@@ -156,11 +157,8 @@ impl Segmenter {
         let at = |k: usize| settings.rule.signal(self.curvature.i[k], self.curvature.j[k]);
         self.signals.clear();
         self.signals.extend((0..self.states.len()).filter(|k| self.states[*k] == State::Contact).map(at));
-        if self.signals.is_empty() {
-            return;
-        }
-        let middle = self.signals.len() / 2;
-        let half = 0.5 * *self.signals.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let Some(middle) = median(&mut self.signals, f32::total_cmp) else { return };
+        let half = 0.5 * middle;
         for (state, (i, j)) in self.states.iter_mut().zip(self.curvature.i.iter().zip(&self.curvature.j)) {
             if *state == State::Contact && settings.rule.signal(*i, *j) < half {
                 *state = State::Deformed;

@@ -47,18 +47,18 @@ pub struct Settling {
 }
 
 impl Settling {
-    /// The thesis's rule: ten heights at 1 Hz, 1 mm.
-    pub fn thesis() -> Self {
+    /// The rule of [Matl 2021]: ten heights at 1 Hz, 1 mm.
+    pub fn matl_2021() -> Self {
         Self { heights: Vec::new(), next: 0, window: 10, spread_m: 1e-3 }
     }
 
-    /// A rule of one's own.
+    /// Another window and spread.
     ///
     /// # Errors
     /// [`ShapeError::Settings`].
     pub fn new(window: usize, spread_m: f64) -> Result<Self, ShapeError> {
         if window >= 3 && spread_m > 0.0 && spread_m.is_finite() {
-            return Ok(Self { window, spread_m, ..Self::thesis() });
+            return Ok(Self { window, spread_m, ..Self::matl_2021() });
         }
         Err(ShapeError::Settings { window, spread_m })
     }
@@ -90,8 +90,10 @@ pub struct Rolling {
     pub middle: Pose,
     /// Radius of the circles, m.
     pub circle_m: f64,
-    /// Moves a circle (3 or more), and the time for each, s.
-    pub moves: (usize, f64),
+    /// Moves a circle, 3 or more.
+    pub moves: usize,
+    /// Time for each move, s.
+    pub move_s: f64,
     /// Circles after which rolling ends in any case.
     pub most: usize,
 }
@@ -134,10 +136,10 @@ pub fn roll<R: Arm>(
     mut settling: Settling,
     mut height_m: impl FnMut(&mut R) -> Result<f64, R::Error>,
 ) -> Result<Rolled, RollError<R::Error>> {
-    let (moves, time_s) = rolling.moves;
+    let Rolling { moves, move_s, .. } = *rolling;
     for (what, expected, got, least) in [
         ("the circle's radius", "a finite number above 0", rolling.circle_m, f64::MIN_POSITIVE),
-        ("the time for a move", "a finite number above 0", time_s, f64::MIN_POSITIVE),
+        ("the time for a move", "a finite number above 0", move_s, f64::MIN_POSITIVE),
         ("the number of moves", "3 or more", moves as f64, 3.0),
     ] {
         if !(got >= least && got.is_finite()) {
@@ -155,7 +157,7 @@ pub fn roll<R: Arm>(
             let mut pose = rolling.middle;
             pose.position_m[0] += rolling.circle_m * around.cos();
             pose.position_m[1] += rolling.circle_m * around.sin();
-            rig.move_to(pose, time_s).map_err(device)?;
+            rig.move_to(pose, move_s).map_err(device)?;
         }
         let height = height_m(rig).map_err(device)?;
         heights_m.push(height);

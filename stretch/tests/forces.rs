@@ -11,13 +11,14 @@ use hw_traits::arm::Pose;
 use proptest::prelude::*;
 use stretch::fake::{Filling, Membrane, Rig, Shape, Sheet};
 use stretch::force::{ForceError, Seen, curve, indentation_m, load};
+use stretch::measured::MeasuredLength;
 use stretch::modulus::{ModulusError, Press, Surface, effective_pa};
 use stretch::palpate::{PalpateError, Programme, palpate};
 use stretch::reconstruct::{Merged, ReconstructError};
 use stretch::shape::{RollError, Rolling, Settling, ShapeError, circularity, roll};
 
 fn pressed(radius_m: f64, stretch_m: f64, indentation_m: f64) -> Press {
-    let mut membrane = Membrane::new(Sheet::thesis(), stretch_m);
+    let mut membrane = Membrane::new(Sheet::matl_2021(), stretch_m);
     membrane.press(&Shape::Ball { radius_m }, [0.0; 2], indentation_m);
     Press { stretch_m, radius_m, indentation_m, force_n: membrane.force_n }
 }
@@ -46,7 +47,7 @@ fn the_fake_s_membrane_pushes_back_as_one() {
     assert!(0.0 < at(0.0, 0.003) && at(0.0, 0.003) < at(0.0, 0.006) && at(0.0, 0.006) < at(0.0, 0.012));
     assert!(at(0.0, 0.01) < at(0.03, 0.01) && at(0.03, 0.01) < at(0.06, 0.01));
     // What pushes up pulls at the fingers: half of the force each, by the slope there.
-    let mut m = Membrane::new(Sheet::thesis(), 0.0);
+    let mut m = Membrane::new(Sheet::matl_2021(), 0.0);
     m.press(&Shape::Ball { radius_m: 0.012 }, [0.0; 2], 0.008);
     let (half, h, n) = (0.5 * m.length_m(), 1e-3, 450);
     let pull: f64 = (0..n)
@@ -63,7 +64,7 @@ fn forces_come_back_from_radius_stretch_and_depth() {
     let (mean, spread) = surface.left_out_error_n();
     let range = presses.iter().map(|p| p.force_n).fold(0.0, f64::max);
     println!(
-        "left out: {mean:.4} +- {spread:.4} N of {range:.2} N (the thesis: 0.023 +- 0.011), {:.1} % rms",
+        "left out: {mean:.4} +- {spread:.4} N of {range:.2} N ([Matl 2021]: 0.023 +- 0.011), {:.1} % rms",
         100.0 * surface.left_out_relative()
     );
     // Stretched is firmer; small contacts look firmer.
@@ -81,7 +82,7 @@ fn forces_come_back_from_radius_stretch_and_depth() {
     ];
     for (r, x, d) in unseen {
         let truth = pressed(r, x, d).force_n;
-        let seen = Seen { stretch_m: x, radius_m: (r, 0.2e-3), indentation_m: (d, 0.1e-3) };
+        let seen = Seen { stretch_m: x, radius: length(r, 0.2e-3), indentation: length(d, 0.1e-3) };
         let l = load(&surface, &seen).unwrap();
         println!(
             "R {r} x {x} d {d}: {:.3} in [{:.3}, {:.3}], true {truth:.3}",
@@ -113,14 +114,14 @@ fn calibrations_that_determine_nothing_are_refused() {
     assert!(matches!(Surface::fit(&none), Err(ModulusError::NoForce { .. })));
     // Three radii: no inner one can be left out with three to stay; the interval says that nothing is known.
     let surface = Surface::fit(&grid(3, 3)).unwrap();
-    let seen = Seen { stretch_m: 0.01, radius_m: (0.02, 1e-4), indentation_m: (0.01, 1e-4) };
+    let seen = Seen { stretch_m: 0.01, radius: length(0.02, 1e-4), indentation: length(0.01, 1e-4) };
     assert_eq!(load(&surface, &seen).unwrap().interval_n.1, f64::INFINITY);
     assert!(matches!(
         load(&surface, &Seen { stretch_m: 0.5, ..seen }),
         Err(ForceError::Modulus(ModulusError::Beyond(_)))
     ));
     assert!(matches!(
-        load(&surface, &Seen { indentation_m: (f64::NAN, 0.0), ..seen }),
+        load(&surface, &Seen { indentation: length(f64::NAN, 0.0), ..seen }),
         Err(ForceError::Value { .. })
     ));
 }
@@ -151,12 +152,17 @@ fn above() -> Pose {
     Pose { position_m: [0.0, 0.0, 0.03], rotation_xyzw: [0.0, 0.0, 0.0, 1.0] }
 }
 
+fn length(value_m: f64, sigma_m: f64) -> MeasuredLength {
+    MeasuredLength { value_m, sigma_m }
+}
+
 fn quick() -> Programme {
     Programme {
         stretches_m: vec![0.0, 0.03, 0.06],
-        depth_m: (2e-3, 12e-3),
+        depth_step_m: 2e-3,
+        deepest_m: 12e-3,
         pictures: 2,
-        ..Programme::thesis(above(), 0.0)
+        ..Programme::matl_2021(above(), 0.0)
     }
 }
 
@@ -175,7 +181,7 @@ fn fillings_are_told_apart_by_palpation() {
                 "{stiffness} N/m: {:?} in {:?}, R {:.1} mm, {} steps",
                 p.stiffness_n_m,
                 p.interval_n_m,
-                1e3 * p.radius_m.0,
+                1e3 * p.radius.value_m,
                 p.steps.len()
             );
             assert!(p.interval_n_m.0 <= stiffness && stiffness <= p.interval_n_m.1, "{p:?}");
@@ -206,7 +212,7 @@ fn a_stone_does_not_yield_and_senseless_programmes_are_refused() {
         Programme { stretches_m: vec![0.02, 0.01], ..quick() },
         Programme { stretches_m: vec![], ..quick() },
         Programme { pictures: 0, ..quick() },
-        Programme { depth_m: (0.0, 0.01), ..quick() },
+        Programme { depth_step_m: 0.0, deepest_m: 0.01, ..quick() },
     ] {
         assert!(matches!(palpate(&mut rig, &programme, &surface), Err(PalpateError::Setting { .. })));
     }
@@ -262,14 +268,14 @@ fn discs_are_round_and_squares_less() {
 
 #[test]
 fn rolling_ends_when_the_height_settles() {
-    let mut settling = Settling::thesis();
+    let mut settling = Settling::matl_2021();
     let height = |k: i32| 0.03 - 0.01 * (-f64::from(k) / 8.0).exp() + 2e-4 * f64::from(k).sin();
     let end = (0..200).find(|&k| settling.push(height(k))).unwrap();
     // Over ten heights the exponential's own spread is below 1 mm once k is about 20.
     assert!((10..40).contains(&end), "{end}");
-    let mut never = Settling::thesis();
+    let mut never = Settling::matl_2021();
     assert!((0..200).all(|k| !never.push(if k % 2 == 0 { 0.03 } else { 0.034 })));
-    let mut blind = Settling::thesis();
+    let mut blind = Settling::matl_2021();
     assert!((0..50).all(|_| !blind.push(f64::NAN)));
     assert!(Settling::new(2, 1e-3).is_err() && Settling::new(10, 0.0).is_err());
 }
@@ -277,25 +283,28 @@ fn rolling_ends_when_the_height_settles() {
 #[test]
 fn dough_is_rolled_until_it_is_a_ball_or_the_circles_are_used_up() {
     let mut rig = Rig::new(Shape::Ball { radius_m: 0.02 }, Filling::Rigid, 1);
-    let rolling = Rolling { middle: above(), circle_m: 0.01, moves: (8, 0.1), most: 60 };
+    let rolling = Rolling { middle: above(), circle_m: 0.01, moves: 8, move_s: 0.1, most: 60 };
     // A cube that becomes a ball, a twentieth of the way each circle.
     let mut height = 0.03;
-    let done = roll(&mut rig, &rolling, Settling::thesis(), |_| {
+    let done = roll(&mut rig, &rolling, Settling::matl_2021(), |_| {
         height += 0.05 * (0.037 - height);
         Ok(height)
     });
     let done = done.unwrap();
     assert!(done.settled && (10..40).contains(&done.heights_m.len()), "{done:?}");
     let mut side = 1.0;
-    let never = roll(&mut rig, &rolling, Settling::thesis(), |_| {
+    let never = roll(&mut rig, &rolling, Settling::matl_2021(), |_| {
         side = -side;
         Ok(0.03 + 0.003 * side)
     });
     assert!(never.is_ok_and(|r| !r.settled && r.heights_m.len() == 60));
-    let two = Rolling { moves: (2, 0.1), ..rolling };
-    assert!(matches!(roll(&mut rig, &two, Settling::thesis(), |_| Ok(0.0)), Err(RollError::Setting { .. })));
+    let two = Rolling { moves: 2, ..rolling };
+    assert!(matches!(
+        roll(&mut rig, &two, Settling::matl_2021(), |_| Ok(0.0)),
+        Err(RollError::Setting { .. })
+    ));
     let far = Rolling { circle_m: 5.0, ..rolling };
-    let refused = roll(&mut rig, &far, Settling::thesis(), |_| Ok(0.0));
+    let refused = roll(&mut rig, &far, Settling::matl_2021(), |_| Ok(0.0));
     assert!(matches!(refused, Err(RollError::Device(_, hw_traits::ErrorKind::OutOfRange))));
 }
 

@@ -80,7 +80,7 @@ fn a_ball_s_radius_and_height_are_right_and_so_is_their_interval() {
 /// come in.
 #[test]
 fn a_shallow_ball_s_interval_is_wide_or_open() {
-    let (mut told, mut held, mut all) = (0, 0, 0);
+    let (mut known, mut held, mut all) = (0, 0, 0);
     for (radius_m, stretch_m) in [(0.01, 0.0), (0.015, 0.04), (0.02, 0.0), (0.02, 0.06)] {
         for depth_m in [0.003, 0.004, 0.006, 0.009] {
             let mut line = String::new();
@@ -90,7 +90,7 @@ fn a_shallow_ball_s_interval_is_wide_or_open() {
                 match cap(&cloud, &segmenter.states) {
                     Ok(b) => {
                         let off = b.radius_m - radius_m;
-                        told += 1;
+                        known += 1;
                         held += usize::from(off.abs() < 1.96 * b.radius_sigma_m);
                         line += &format!(" {:+.1}+-{:.1}", 1e3 * off, 1.96e3 * b.radius_sigma_m);
                     }
@@ -103,8 +103,8 @@ fn a_shallow_ball_s_interval_is_wide_or_open() {
             println!("R {radius_m} stretch {stretch_m} depth {depth_m}:{line}");
         }
     }
-    println!("{held} of {told} intervals hold the radius, {all} looks");
-    assert!(held as f64 >= 0.9 * told as f64, "{held} of {told}");
+    println!("{held} of {known} intervals hold the radius, {all} looks");
+    assert!(held as f64 >= 0.9 * known as f64, "{held} of {known}");
 }
 
 /// The free membrane beside a contact shows the ratio of its tensions, at every stretch.
@@ -141,13 +141,13 @@ fn a_face_s_diameters_are_right_to_a_millimetre_in_the_good_region() {
             let d = diameters(&cloud, &segmenter.states).unwrap();
             println!(
                 "D {diameter} x {stretch_m} depth {depth}: i {:.2} +- {:.2}, j {:.2} +- {:.2} mm",
-                1e3 * (d.i_m.0 - diameter),
-                1e3 * d.i_m.1,
-                1e3 * (d.j_m.0 - diameter),
-                1e3 * d.j_m.1
+                1e3 * (d.i.value_m - diameter),
+                1e3 * d.i.sigma_m,
+                1e3 * (d.j.value_m - diameter),
+                1e3 * d.j.sigma_m
             );
             assert!((d.height_m - depth).abs() < 0.2e-3);
-            worst = worst.max((d.i_m.0 - diameter).abs()).max((d.j_m.0 - diameter).abs());
+            worst = worst.max((d.i.value_m - diameter).abs()).max((d.j.value_m - diameter).abs());
         }
     }
     assert!(worst < 1e-3, "{worst}");
@@ -172,7 +172,7 @@ fn segments_are_where_they_should_be() {
     println!("face: {core:.3} of its core, {far:.4} of the free membrane");
     assert!(core > 0.95 && far < 0.02, "{core} {far}");
     assert!(segmenter.states.contains(&State::Undeformed) && segmenter.states.contains(&State::Deformed));
-    // The thesis's rule calls more of the free membrane contact.
+    // The rule of [Matl 2021] calls more of the free membrane contact.
     segmenter.segment(&cloud, &SegmentSettings { rule: Rule::EitherAxis, ..SegmentSettings::default() });
     let either = share(&segmenter, &|r| r > 1.6 * radius);
     println!("either axis: {either:.4} of the free membrane");
@@ -249,7 +249,7 @@ fn pictures_that_show_no_membrane_are_refused() {
 
 /// Averages by running sums against sums over each square.
 #[test]
-fn averages_agree_with_plain_sums() {
+fn averages_agree_with_sums() {
     let (width, height) = (60usize, 48usize);
     let value = |i: usize| 0.25 + 1e-3 * ((i * 7919) % 101) as f32 / 101.0;
     let data: Vec<f32> = (0..width * height).map(|i| if i % 17 == 3 { f32::NAN } else { value(i) }).collect();

@@ -1,6 +1,7 @@
 //! A heap in a few numbers.
 
 use super::error::DemError;
+use crate::order::quantile;
 
 /// A heap on the plane z = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,11 +27,10 @@ pub fn heap(positions_m: &[[f64; 3]], radii_m: &[f64], axis_m: [f64; 2]) -> Resu
     }
     let mut from_axis: Vec<f64> =
         positions_m.iter().map(|p| (p[0] - axis_m[0]).hypot(p[1] - axis_m[1])).collect();
-    from_axis.sort_unstable_by(f64::total_cmp);
     let tops = positions_m.iter().zip(radii_m).map(|(p, r)| p[2] + r);
     Ok(Heap {
         mean_radius_m: from_axis.iter().sum::<f64>() / n as f64,
-        median_radius_m: 0.5 * (from_axis[(n - 1) / 2] + from_axis[n / 2]),
+        median_radius_m: quantile(&mut from_axis, 0.5),
         height_m: tops.fold(f64::NEG_INFINITY, f64::max),
         mean_height_m: positions_m.iter().map(|p| p[2]).sum::<f64>() / n as f64,
     })

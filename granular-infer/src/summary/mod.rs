@@ -1,4 +1,4 @@
-//! The 16 summary statistics of section 3.4 of one depth picture.
+//! The 16 summary statistics of one depth picture ([Matl 2021], section 3.4).
 //!
 //! `[max(z), mean(z), sd(z), max(r), mean(r), sd(x), sd(y), sd(r), IQR(x), IQR(y), IQR(r), KURT(r), dCor(r, z), df, b, A]` of the
 //! points at which grains are seen: x, y along the ground from the points' centroid, `r = sqrt(x^2 + y^2)`, z above the ground.
@@ -11,12 +11,13 @@ mod distance;
 pub use chi::{Bound, ChiFit, fit_chi};
 pub use distance::distance_correlation;
 
+use crate::order::quantile;
 use crate::seeing::HeightMap;
 
 /// Number of statistics.
 pub const COUNT: usize = 16;
 
-/// Their names, in the thesis's order.
+/// Their names, in the order of [Matl 2021].
 pub const NAMES: [&str; COUNT] = [
     "max_z_m",
     "mean_z_m",
@@ -200,17 +201,8 @@ fn moments(values: &[f64]) -> (f64, f64, f64) {
     (mean, variance.sqrt(), power(4) / (variance * variance) - 3.0)
 }
 
-/// Third less first quartile, each interpolated linearly between the values about rank `q (n - 1)`.
+/// Third less first quartile.
 fn interquartile_range(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
-    let last = (values.len() - 1) as f64;
-    let mut quantile = |q: f64| {
-        let rank = q * last;
-        let low = rank as usize;
-        let (_, &mut at, above) = values.select_nth_unstable_by(low, f64::total_cmp);
-        let next = above.iter().copied().fold(f64::INFINITY, f64::min);
-        let share = rank - low as f64;
-        if share > 0.0 { at + share * (next - at) } else { at }
-    };
-    quantile(0.75) - quantile(0.25)
+    quantile(&mut values, 0.75) - quantile(&mut values, 0.25)
 }

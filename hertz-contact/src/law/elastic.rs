@@ -8,7 +8,7 @@ use crate::{Number, indenter::Indenter};
 /// Hertz's sphere, the flat punch or the cone on an elastic half-space without friction or adhesion.
 ///
 /// `F = c E/(1 - nu^2) delta^n` with [`Indenter::factor`] c and [`Indenter::exponent`] n. Hertz 1882
-/// (doi:10.1515/crll.1882.92.156), Sneddon 1965 (doi:10.1016/0020-7225(65)90019-4); the thesis's eqs 6.2 to 6.4, corrected.
+/// (doi:10.1515/crll.1882.92.156), Sneddon 1965 (doi:10.1016/0020-7225(65)90019-4); [Matl 2021], eqs 6.2 to 6.4, corrected.
 /// Small strains: `delta <= 0.1 R` (the parabola that stands for the ball is then 1 % off in force), a cone's angle up to
 /// 0.35 rad.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,7 +22,7 @@ pub struct Air {
 
 impl Air {
     /// A compressor of 410 kPa, pulses of 50 Hz.
-    pub fn thesis() -> Self {
+    pub fn matl_2021() -> Self {
         Self {
             supply_pa: 410e3,
             inlet: 40.0,

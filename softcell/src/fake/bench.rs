@@ -1,4 +1,4 @@
-//! The box of figure 5.8: the tip holds it against a wall while beads are poured in.
+//! The box of [Matl 2021], figure 5.8: the tip holds it against a wall while beads are poured in.
 
 use hw_traits::camera::Camera;
 use hw_traits::clock::{Clock, Stamped};
@@ -76,12 +76,12 @@ const GRAVITY: f64 = 9.80665;
 const FULL_SCALE_PA: f64 = 1.3e6;
 
 impl Bench {
-    /// The thesis's box of 31.6 g, pressed in by 8.12 mm, not poured into.
-    pub fn thesis(seed: u64) -> Self {
+    /// The box of [Matl 2021] of 31.6 g, pressed in by 8.12 mm, not poured into.
+    pub fn matl_2021(seed: u64) -> Self {
         Self {
-            dome: Dome::thesis(),
-            air: Air::thesis(),
-            eye: Eye::thesis(),
+            dome: Dome::matl_2021(),
+            air: Air::matl_2021(),
+            eye: Eye::matl_2021(),
             touch: Touch { friction: 1.2, ..Touch::none() },
             holds_box: true,
             indentation_m: 8.12e-3,

@@ -23,8 +23,8 @@ pub struct Dome {
 }
 
 impl Dome {
-    /// The thesis's tip: 21.23 mm, markers about 7 mm apart up to 60 degrees off the axis.
-    pub fn thesis() -> Self {
+    /// The tip of [Matl 2021]: 21.23 mm, markers about 7 mm apart up to 60 degrees off the axis.
+    pub fn matl_2021() -> Self {
         let mut dome = Self {
             radius_m: 0.02123,
             growth_m_pa: 7e-7,

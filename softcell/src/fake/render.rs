@@ -7,8 +7,10 @@ use rand_distr::{Distribution, StandardNormal};
 /// A camera on the axis, looking at the dome from inside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Eye {
-    /// Columns and rows.
-    pub size: (usize, usize),
+    /// Columns.
+    pub width_px: usize,
+    /// Rows.
+    pub height_px: usize,
     /// Pinhole.
     pub intrinsics: Intrinsics,
     /// Distance of the lens from the dome's centre, m.
@@ -17,22 +19,26 @@ pub struct Eye {
     pub marker_m: f64,
     /// Standard deviation of a pixel's noise, grey levels.
     pub noise: f64,
-    /// Grey of skin and marker at the middle.
-    pub grey: (f64, f64),
+    /// Grey level of the skin at the middle.
+    pub skin_grey: f64,
+    /// Grey level of a marker at the middle.
+    pub marker_grey: f64,
     /// What is left of the light in the corners.
     pub vignette: f64,
 }
 
 impl Eye {
     /// 640 x 480 pixels, 67 mm behind the rim.
-    pub fn thesis() -> Self {
+    pub fn matl_2021() -> Self {
         Self {
-            size: (640, 480),
+            width_px: 640,
+            height_px: 480,
             intrinsics: Intrinsics { fx: 640.0, fy: 640.0, cx: 319.5, cy: 239.5 },
             behind_m: 0.067,
             marker_m: 0.001,
             noise: 2.0,
-            grey: (30.0, 210.0),
+            skin_grey: 30.0,
+            marker_grey: 210.0,
             vignette: 0.75,
         }
     }
@@ -47,7 +53,7 @@ impl Eye {
     /// # Errors
     /// [`NotRows`] for a camera without pixels.
     pub fn picture(&self, points: &[[f64; 3]], rng: &mut impl Rng) -> Result<Picture<u8>, NotRows> {
-        let (width, height) = self.size;
+        let (width, height) = (self.width_px, self.height_px);
         let mut cover = vec![0f32; width * height];
         for p in points {
             let Some([u, v]) = self.pixel(*p) else { continue };
@@ -60,7 +66,7 @@ impl Eye {
         for (i, &c) in cover.iter().enumerate() {
             let out = ((i % width) as f64 - middle[0]).hypot((i / width) as f64 - middle[1]) / corner;
             let light = 1.0 - (1.0 - self.vignette) * out * out;
-            let (skin, marker) = self.grey;
+            let (skin, marker) = (self.skin_grey, self.marker_grey);
             let noise: f64 = StandardNormal.sample(rng);
             let value = light * (skin + (marker - skin) * f64::from(c)) + self.noise * noise;
             grey.push(value.round().clamp(0.0, 255.0) as u8);
@@ -69,7 +75,7 @@ impl Eye {
     }
 
     fn disc(&self, cover: &mut [f32], [u, v]: [f64; 2], radius: f64) {
-        let (width, height) = self.size;
+        let (width, height) = (self.width_px, self.height_px);
         let clamp = |x: f64, end: usize| x.clamp(0.0, end as f64) as usize;
         let reach = radius + 2.0;
         for row in clamp(v - reach, height)..clamp(v + reach + 1.0, height) {

@@ -5,6 +5,7 @@ use hw_traits::picture::Picture;
 use super::pyramid::Pyramid;
 use super::step::LucasKanade;
 use crate::markers::{Marker, MarkerError, MarkerSettings, find};
+use crate::median::median;
 
 /// Why a picture could not be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -121,8 +122,8 @@ impl Tracker {
     pub fn new(picture: &Picture<u8>, settings: TrackerSettings) -> Result<Self, TrackError> {
         let markers = find(picture, &settings.markers)?;
         let mut areas: Vec<f64> = markers.iter().map(|m| m.area_px).collect();
-        areas.sort_by(f64::total_cmp);
-        let radius_px = (areas[areas.len() / 2] / std::f64::consts::PI).sqrt();
+        let area_px = median(&mut areas, f64::total_cmp).unwrap_or(f64::NAN);
+        let radius_px = (area_px / std::f64::consts::PI).sqrt();
         let half = settings.half_px.unwrap_or((1.4 * radius_px).ceil() as usize + 2);
         let mut before = Pyramid::default();
         before.fill(picture, settings.levels);

@@ -4,15 +4,17 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{ContactError, spread};
 use crate::cloud::Cloud;
+use crate::measured::MeasuredLength;
+use crate::median::median;
 use crate::segment::State;
 
 /// Diameters of a flat round face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Diameters {
-    /// Along i, from row to row, m, and its standard deviation.
-    pub i_m: (f64, f64),
-    /// Along j, along the stretch, m, and its standard deviation.
-    pub j_m: (f64, f64),
+    /// Along i, from row to row.
+    pub i: MeasuredLength,
+    /// Along j, along the stretch.
+    pub j: MeasuredLength,
     /// Height of the face over the plane at rest, m.
     pub height_m: f64,
 }
@@ -53,8 +55,7 @@ pub fn diameters(cloud: &Cloud, states: &[State]) -> Result<Diameters, ContactEr
     if core.len() < 10 {
         return Err(ContactError::TooFew { expected: 10, got: core.len() });
     }
-    let half = core.len() / 2;
-    let height_m = *core.select_nth_unstable_by(half, f64::total_cmp).1;
+    let height_m = median(&mut core, f64::total_cmp).unwrap_or(f64::NAN);
     let off: Vec<f64> = core.iter().map(|h| h - height_m).collect();
     let noise = spread(&off).max(1e-6);
     // Metres a pixel on the face.
@@ -65,11 +66,11 @@ pub fn diameters(cloud: &Cloud, states: &[State]) -> Result<Diameters, ContactEr
     };
     let pitches = [pitch(columns, 1), pitch(1, 0)];
     let face = Edge { cloud, middle, rough, height_m, noise };
-    let along = |axis: &'static str, rows: bool, pitch: f64| -> Result<(f64, f64), ContactError> {
+    let along = |axis: &'static str, rows: bool, pitch: f64| -> Result<MeasuredLength, ContactError> {
         let (a, b) = (face.find(axis, rows, 1.0)?, face.find(axis, rows, -1.0)?);
-        Ok(((a.0 + b.0) * pitch, a.1.hypot(b.1) * pitch))
+        Ok(MeasuredLength { value_m: (a.0 + b.0) * pitch, sigma_m: a.1.hypot(b.1) * pitch })
     };
-    Ok(Diameters { i_m: along("i", true, pitches[0])?, j_m: along("j", false, pitches[1])?, height_m })
+    Ok(Diameters { i: along("i", true, pitches[0])?, j: along("j", false, pitches[1])?, height_m })
 }
 
 struct Edge<'a> {
@@ -87,7 +88,7 @@ impl Edge<'_> {
         let mut edge = self.rough;
         let mut found = (f64::NAN, f64::INFINITY);
         for _ in 0..25 {
-            // The first pixels outside hold the edge's own uncertainty.
+            // The first pixels outside hold the uncertainty of the edge.
             let flank: Vec<(f64, f64, f64)> = profile
                 .iter()
                 .copied()

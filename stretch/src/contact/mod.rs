@@ -7,6 +7,7 @@ pub use diameters::{Diameters, diameters};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector3, Vector4};
 
 use crate::cloud::Cloud;
+use crate::median::median;
 use crate::segment::State;
 
 /// Why there is no geometry.
@@ -54,7 +55,7 @@ pub struct Ball {
     pub centre_m: [f64; 3],
     /// Radius, m.
     pub radius_m: f64,
-    /// Standard deviation of the radius, m, from the points' own scatter, neighbours taken for independent.
+    /// Standard deviation of the radius, m, from the points' scatter, neighbours taken for independent.
     pub radius_sigma_m: f64,
     /// Robust standard deviation of the points about it, m.
     pub scatter_m: f64,
@@ -69,9 +70,9 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
     let n = all.len() as f64;
     let middle = all.iter().sum::<Vector3<f64>>() / n;
     let scale = (all.iter().map(|p| (p - middle).norm_squared()).sum::<f64>() / n).sqrt().max(1e-12);
-    let own: Vec<Vector3<f64>> = all.iter().map(|p| (p - middle) / scale).collect();
+    let scaled: Vec<Vector3<f64>> = all.iter().map(|p| (p - middle) / scale).collect();
     let (mut gram, mut right) = (Matrix4::zeros(), Vector4::zeros());
-    for p in &own {
+    for p in &scaled {
         let x = Vector4::new(2.0 * p[0], 2.0 * p[1], 2.0 * p[2], 1.0);
         gram += x * x.transpose();
         right += x * p.norm_squared();
@@ -82,7 +83,7 @@ pub fn ball(points: &[[f64; 3]]) -> Result<Ball, ContactError> {
     let mut radius = (x[3] + centre.norm_squared()).max(1e-12).sqrt();
     let mut result = (f64::INFINITY, f64::INFINITY);
     for _ in 0..30 {
-        let rows: Vec<(f64, Vector4<f64>)> = own
+        let rows: Vec<(f64, Vector4<f64>)> = scaled
             .iter()
             .map(|p| {
                 let (d, size) = (p - centre, (p - centre).norm());
@@ -185,11 +186,10 @@ fn finite(points: &[[f64; 3]], expected: usize) -> Result<Vec<Vector3<f64>>, Con
     Ok(points.iter().map(|p| Vector3::from(*p)).collect())
 }
 
-/// Median of the absolute values, as a standard deviation.
+/// Robust standard deviation of residuals, from the median of their absolute values; NaN of nothing.
 fn spread(off: &[f64]) -> f64 {
     let mut off: Vec<f64> = off.iter().map(|x| x.abs()).collect();
-    let middle = off.len() / 2;
-    1.4826 * *off.select_nth_unstable_by(middle, f64::total_cmp).1
+    1.4826 * median(&mut off, f64::total_cmp).unwrap_or(f64::NAN)
 }
 
 /// Points of a cloud that touch, m, in the camera's frame; not averaged, which would round off what they show.
@@ -219,7 +219,7 @@ pub fn cap(cloud: &Cloud, states: &[State]) -> Result<Ball, ContactError> {
     match Cap::start(&whole, rough).fit(&near, rough) {
         Some(found) if found.radius_m > 3.0 * found.radius_sigma_m => Ok(found),
         Some(open) => Err(ContactError::Flat { radius_m: open.radius_m, sigma_m: open.radius_sigma_m }),
-        // Far around the ball its own points tell enough.
+        // Far around the ball the points in contact are enough.
         None if rough > WRAPPED * whole.radius_m => Ok(whole),
         None => Err(ContactError::Flat { radius_m: whole.radius_m, sigma_m: f64::INFINITY }),
     }

@@ -9,8 +9,10 @@ use super::membrane::Membrane;
 /// Pinhole, place and noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthEye {
-    /// Columns and rows.
-    pub size: (usize, usize),
+    /// Columns.
+    pub width_px: usize,
+    /// Rows.
+    pub height_px: usize,
     /// Pinhole.
     pub intrinsics: Intrinsics,
     /// Distance from the level membrane, m.
@@ -33,7 +35,8 @@ impl DepthEye {
     /// An SR305 at 0.25 m: 640 x 480 pixels, some 0.5 mm of noise, steps of 0.125 mm, 2 % holes.
     pub fn sr305() -> Self {
         Self {
-            size: (640, 480),
+            width_px: 640,
+            height_px: 480,
             intrinsics: Intrinsics { fx: 474.0, fy: 474.0, cx: 319.5, cy: 239.5 },
             distance_m: 0.25,
             background_m: 0.42,
@@ -50,7 +53,7 @@ impl DepthEye {
     /// # Errors
     /// [`NotRows`] for a camera without pixels.
     pub fn picture(&self, membrane: &Membrane, rng: &mut impl Rng) -> Result<Picture<f32>, NotRows> {
-        let (width, height) = self.size;
+        let (width, height) = (self.width_px, self.height_px);
         let mut depths = Vec::with_capacity(width * height);
         for v in 0..height {
             for u in 0..width {

@@ -19,7 +19,7 @@ pub struct Sheet {
 
 impl Sheet {
     /// 100 x 90 x 2 mm of EcoFlex 50.
-    pub fn thesis() -> Self {
+    pub fn matl_2021() -> Self {
         Self { length_m: 0.1, breadth_m: 0.09, thickness_m: 2e-3, modulus_pa: 83e3, mounted: 0.06 }
     }
 }

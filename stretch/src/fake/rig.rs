@@ -87,7 +87,7 @@ struct Question {
 impl Rig {
     /// A hand 50 mm above an object at the origin.
     pub fn new(shape: Shape, filling: Filling, seed: u64) -> Self {
-        let sheet = Sheet::thesis();
+        let sheet = Sheet::matl_2021();
         Self {
             sheet,
             eye: DepthEye::sr305(),

@@ -1,6 +1,6 @@
 //! A dough's rolls, as files and model know them.
 
-use dough_mbrl::dynamics::Roll;
+use dough_mbrl::roll::Roll;
 
 /// A roll with its place in the recording.
 #[derive(Debug, Clone, Copy)]
