@@ -146,13 +146,13 @@ impl Plan {
             Kernel::Multiquadric { width } => Kernel::Multiquadric { width: width / scale },
             Kernel::Gaussian { width } => Kernel::Gaussian { width: width / scale },
         };
-        let own: Vec<[f64; 2]> =
+        let scaled: Vec<[f64; 2]> =
             places.iter().map(|p| [(p[0] - middle[0]) / scale, (p[1] - middle[1]) / scale]).collect();
         let entry = |i: usize, k: usize| match (i < n, k < n) {
             (true, true) if i == k => kernel.at(0.0) + kernel.sign() * smoothing,
-            (true, true) => kernel.at(square(own[i], own[k])),
-            (true, false) => polynomial(own[i])[k - n],
-            (false, true) => polynomial(own[k])[i - n],
+            (true, true) => kernel.at(square(scaled[i], scaled[k])),
+            (true, false) => polynomial(scaled[i])[k - n],
+            (false, true) => polynomial(scaled[k])[i - n],
             (false, false) => 0.0,
         };
         let solver = DMatrix::from_fn(n + 3, n + 3, entry).lu();
@@ -160,7 +160,7 @@ impl Plan {
         if !(diagonal.amin() > 1e-11 * diagonal.amax()) {
             return Err(FieldError::Degenerate);
         }
-        Ok(Self { kernel, places: own, middle, scale, solver })
+        Ok(Self { kernel, places: scaled, middle, scale, solver })
     }
 
     /// The field of one value a marker, in the order of the places.

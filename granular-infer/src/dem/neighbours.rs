@@ -159,8 +159,8 @@ impl Neighbours {
             let [x, y, z, radius] = grains.place[j as usize];
             [x, y, z, radius + self.margin[j as usize]]
         }));
-        for (own, &i) in cells.entries().iter().enumerate() {
-            let [x, y, z, extent] = self.sorted[own];
+        for (sorted, &i) in cells.entries().iter().enumerate() {
+            let [x, y, z, extent] = self.sorted[sorted];
             let margin = self.margin[i as usize];
             let reach = extent + self.largest + margin;
             let range = |c: f64| cells.along(c - reach)..=cells.along(c + reach);

@@ -29,19 +29,19 @@ impl Design {
     pub(super) fn fit(&self, values: &DVector<f64>, weights: &DVector<f64>) -> Fitted {
         let parts: Vec<(Vec<usize>, Normal)> = (0..FOLDS)
             .map(|fold| {
-                let own: Vec<usize> = (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
-                let rows = self.rows.select_rows(&own);
-                let normal = Normal::new(&rows, &values.select_rows(&own), &weights.select_rows(&own));
-                (own, normal)
+                let of_fold: Vec<usize> = (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
+                let rows = self.rows.select_rows(&of_fold);
+                let normal = Normal::new(&rows, &values.select_rows(&of_fold), &weights.select_rows(&of_fold));
+                (of_fold, normal)
             })
             .collect();
         let mut normal = Normal::nothing(self.degrees.len());
         parts.iter().for_each(|(_, part)| normal.add(part));
         let left_out = |strength: f64| {
             let mut left = vec![0.0; values.len()];
-            for (own, part) in &parts {
+            for (of_fold, part) in &parts {
                 let coefficients = normal.less(part).solve(&self.degrees, strength);
-                for &i in own {
+                for &i in of_fold {
                     left[i] = values[i] - (self.rows.row(i) * &coefficients)[0];
                 }
             }

@@ -71,11 +71,11 @@ fn products(x: &[f64], y: &[f64]) -> f64 {
         }
         // What lies above in y has the other sign.
         sum += 2.0 * signed(&below) - signed(&all);
-        let own = [1.0, a, b, a * b];
-        all = std::array::from_fn(|m| all[m] + own[m]);
+        let of_point = [1.0, a, b, a * b];
+        all = std::array::from_fn(|m| all[m] + of_point[m]);
         let mut k = rank[i] + 1;
         while k < tree.len() {
-            tree[k] = std::array::from_fn(|m| tree[k][m] + own[m]);
+            tree[k] = std::array::from_fn(|m| tree[k][m] + of_point[m]);
             k += k & k.wrapping_neg();
         }
     }

@@ -158,7 +158,7 @@ impl<T: Number, L: Law<T>> Compliant<T, L> {
         self.root_m(measured_m.re()).map_or(measured_m, |root| self.polished_m(root, measured_m))
     }
 
-    /// The true indentation as a plain number; none where nothing touches.
+    /// The true indentation as a real number; none where nothing touches.
     pub(super) fn root_m(&self, m: f64) -> Option<f64> {
         let c = self.compliance_m_n.re();
         if !m.is_finite() {
@@ -178,7 +178,7 @@ impl<T: Number, L: Law<T>> Compliant<T, L> {
         }
     }
 
-    /// The true indentation with its derivatives, from a plain one.
+    /// The true indentation with its derivatives, from a real one.
     pub(super) fn polished_m(&self, root: f64, measured_m: T) -> T {
         polish(T::from(root), |x| {
             let (force, slope) = self.law.both(x);

@@ -62,7 +62,7 @@ impl<T: Number> Indentation<T> {
 
     /// The contact as a law in which only what acts is computed: an effect that is at zero and carries no derivative need not be.
     pub fn contact(&self, acting: Acting) -> Contact<'_, T> {
-        Contact { law: self, plain: acting.compliance.then(|| self.re()), acting }
+        Contact { law: self, real: acting.compliance.then(|| self.re()), acting }
     }
 
     /// What is not off; with numbers that carry derivatives, everything.
@@ -125,7 +125,7 @@ pub struct Acting {
 pub struct Contact<'a, T> {
     law: &'a Indentation<T>,
     /// The same without derivatives, where the load cell gives: there a root is looked for.
-    plain: Option<Indentation<f64>>,
+    real: Option<Indentation<f64>>,
     acting: Acting,
 }
 
@@ -135,8 +135,8 @@ impl<T: Number> Contact<'_, T> {
     }
 
     fn true_indentation_m(&self, measured_m: T) -> T {
-        let Some(plain) = &self.plain else { return measured_m };
-        let cell = Compliant { law: plain.sample(), compliance_m_n: plain.compliance_m_n };
+        let Some(real) = &self.real else { return measured_m };
+        let cell = Compliant { law: real.sample(), compliance_m_n: real.compliance_m_n };
         cell.root_m(measured_m.re()).map_or(measured_m, |root| self.cell().polished_m(root, measured_m))
     }
 }

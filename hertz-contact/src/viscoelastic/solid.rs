@@ -23,11 +23,11 @@ const FACTORIALS: [f64; 15] = {
 
 /// `int_0^1 exp(-x (1 - u)) du` and the same of `u exp(-x (1 - u))`.
 pub(super) fn moments<T: Number>(x: T) -> (T, T) {
-    let (first, second) = plain_moments(x.re());
+    let (first, second) = moments_by_definition(x.re());
     // The first one's slope is the second less the first.
     let of_first = first_order(x, |_| (first, second - first));
     let of_second = first_order(x, |x| (second, second_slope(x, first, second)));
-    of_first.zip(of_second).unwrap_or_else(|| plain_moments(x))
+    of_first.zip(of_second).unwrap_or_else(|| moments_by_definition(x))
 }
 
 /// Slope of the second of [`moments`]: `-int u (1 - u) exp(-x (1 - u)) du`.
@@ -52,7 +52,7 @@ fn terms(x: f64) -> usize {
     }
 }
 
-fn plain_moments<T: Number>(x: T) -> (T, T) {
+fn moments_by_definition<T: Number>(x: T) -> (T, T) {
     if x.re() < 0.3 {
         // Sums of (-x)^k / (k + 1)! and (-x)^k / (k + 2)!, to the last digit.
         let (mut first, mut second) = (T::from(0.0), T::from(0.0));
@@ -174,7 +174,7 @@ impl<T: Number> LinearSolid<T> {
         Relaxation::<T>::check(self)?;
         check_history(times_s, indentations_m, forces_n.len())?;
         let zero = T::from(0.0);
-        let plain = self.re();
+        let real = self.re();
         let grown = &mut scratch.grown;
         grown.clear();
         // The state now, and where on the way of growth the contact's radius was last seen.
@@ -207,7 +207,7 @@ impl<T: Number> LinearSolid<T> {
                 Contact::Fixed => self.here(&point),
                 Contact::Shrinks => {
                     let last = grown.len() - 1;
-                    if plain.moved(&grown[last].place.re(), &point.place.re()) >= 0.0 {
+                    if real.moved(&grown[last].place.re(), &point.place.re()) >= 0.0 {
                         grown.push(point);
                         at = last + 1;
                         self.here(&point)
@@ -255,8 +255,8 @@ impl<T: Number> LinearSolid<T> {
 
     /// The force while the contact is smaller than it was; `at` is the last index at which it was not larger.
     fn shrunk<L: Law<T>>(&self, law: &L, grown: &[Point<T>], at: &mut usize, now: &Point<T>) -> T {
-        let plain = self.re();
-        let smaller = |i: usize| plain.moved(&grown[i].place.re(), &now.place.re()) >= 0.0;
+        let real = self.re();
+        let smaller = |i: usize| real.moved(&grown[i].place.re(), &now.place.re()) >= 0.0;
         *at = (*at).min(grown.len() - 1);
         while *at + 1 < grown.len() && smaller(*at + 1) {
             *at += 1;
@@ -272,8 +272,8 @@ impl<T: Number> LinearSolid<T> {
             return self.sum(from, now);
         };
         let end = (next.time_s, next.depth_m);
-        // The root is looked for in plain numbers; only its last step carries derivatives.
-        let root = plain.parted(&from.place.re(), &next.re(), &now.place.re());
+        // The root is looked for in real numbers; only its last step carries derivatives.
+        let root = real.parted(&from.place.re(), &next.re(), &now.place.re());
         let part = polish(T::from(root), |part| self.part(&from.place, end, part, &now.place));
         self.sum(&from.with(law, from.place.along(self.tau_s, end, part)), now)
     }

@@ -120,7 +120,9 @@ struct Robust<const N: usize> {
     scatter: f64,
 }
 
-/// One step on residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights; `known` is the precision
+/// One step of Gauss-Newton; argmin's has neither weights that follow the residuals' scatter nor a prior.
+///
+/// Takes residuals (measured less predicted) and the slopes of the predictions, with Tukey's weights; `known` is the precision
 /// with which each parameter is known before, and `off` how far it is below that.
 fn robust_step<const N: usize>(
     rows: &[(f64, SVector<f64, N>)],

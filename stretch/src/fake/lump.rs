@@ -45,8 +45,8 @@ impl Lump {
     /// Rolled by a way (m) under a force so many times what it takes.
     pub(super) fn rolled(self, way_m: f64, force: f64) -> Self {
         // A way of two breadths takes a third of what is left of the edges.
-        let kept = (-0.2 * way_m / self.half_m() * (force - 1.0).clamp(0.0, 1.0)).exp();
-        Self { exponent: 2.0 + (self.exponent - 2.0) * kept, ..self }
+        let shrunk = (-0.2 * way_m / self.half_m() * (force - 1.0).clamp(0.0, 1.0)).exp();
+        Self { exponent: 2.0 + (self.exponent - 2.0) * shrunk, ..self }
     }
 
     /// Pressed flatter by a hundredth.
