@@ -1,4 +1,4 @@
-//! Learns chapter 3's posterior from a campaign, measures it on pours it has not seen, and writes what the crate ships.
+//! Learns the posterior of [Matl 2021], chapter 3, from a campaign, measures it on pours it has not seen, and writes what the crate ships.
 //!
 //! ```text
 //! for k in $(seq 0 39); do cargo run --release -p granular-infer --example pours -- grains 2000 $k 40 g$k.txt; done
@@ -15,6 +15,7 @@ use bayes_sim::calibration::{expected_coverage, sbc_ranks};
 use bayes_sim::campaign::Results;
 use bayes_sim::points::Points;
 use bayes_sim::posterior::ConditionalDensity;
+use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
 use granular_infer::camera::Flaws;
 use granular_infer::campaign::Grains;
@@ -103,21 +104,42 @@ fn main() -> Result<(), Box<dyn Error>> {
     again(&posterior, &scene, &view, &tests)?;
     shapes(&posterior, &scene, &view, &tests)?;
 
+    fewer(prior, &simulations, &tests)?;
+    flawed(&posterior, [&training, &unseen], &scene, &view)
+}
+
+/// Errors of posteriors that were learned from fewer simulations.
+fn fewer(prior: &Prior, simulations: &Simulations, tests: &Simulations) -> Result<(), Box<dyn Error>> {
     println!("\nsimulations");
     for share in [8, 2] {
         let rows: Vec<usize> = (0..simulations.len() / share).collect();
         let few = Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))?;
         let less = GrainPosterior::train(prior, &few, &settings(), 1)?;
-        row(&format!("{}", few.len()), &errors(&less, &tests)?);
+        row(&format!("{}", few.len()), &errors(&less, tests)?);
     }
+    Ok(())
+}
+
+/// What noise and blur of the unseen pictures do, grains chosen by height and by colour.
+fn flawed(
+    posterior: &GrainPosterior,
+    [training, unseen]: [&Results; 2],
+    scene: &Scene,
+    view: &View,
+) -> Result<(), Box<dyn Error>> {
     for by_colour in [false, true] {
         println!(
             "\nnoise and blur of the unseen pictures alone, grains chosen by {}",
             if by_colour { "colour" } else { "height" }
         );
-        let base = View { by_colour, ..view };
+        let base = View { by_colour, ..*view };
         let density = if by_colour {
-            GrainPosterior::train(prior, &seen(&training, &scene, &base, 1)?.simulations, &settings(), 1)?
+            GrainPosterior::train(
+                &training.campaign.prior,
+                &seen(training, scene, &base, 1)?.simulations,
+                &settings(),
+                1,
+            )?
         } else {
             posterior.clone()
         };
@@ -126,14 +148,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             sensitivity(
                 &format!("noise {} mm", 1e3 * noise_m),
                 &density,
-                &unseen,
-                &scene,
+                unseen,
+                scene,
                 &View { flaws, ..base },
             )?;
         }
         for blur_px in [1.0, 2.0, 4.0] {
             let flaws = Flaws { blur_px, ..base.flaws };
-            sensitivity(&format!("blur {blur_px} px"), &density, &unseen, &scene, &View { flaws, ..base })?;
+            sensitivity(&format!("blur {blur_px} px"), &density, unseen, scene, &View { flaws, ..base })?;
         }
     }
     Ok(())

@@ -29,9 +29,11 @@ impl Design {
     pub(super) fn fit(&self, values: &DVector<f64>, weights: &DVector<f64>) -> Fitted {
         let parts: Vec<(Vec<usize>, Normal)> = (0..FOLDS)
             .map(|fold| {
-                let of_fold: Vec<usize> = (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
+                let of_fold: Vec<usize> =
+                    (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
                 let rows = self.rows.select_rows(&of_fold);
-                let normal = Normal::new(&rows, &values.select_rows(&of_fold), &weights.select_rows(&of_fold));
+                let normal =
+                    Normal::new(&rows, &values.select_rows(&of_fold), &weights.select_rows(&of_fold));
                 (of_fold, normal)
             })
             .collect();
