@@ -106,7 +106,7 @@ pub struct Mechanism {
     /// above zero).
     pub shape_parameters: Vec<usize>,
     /// Those of [`Self::parameters`] that are whole numbers (the row at which something jumps): no fit moves them,
-    /// [`Model::starts`] proposes their values, and all whole values within their bounds are thought equally likely.
+    /// [`MultimodalModel::starts`](crate::model::MultimodalModel::starts) proposes their values, and all whole values within their bounds are thought equally likely.
     pub integer_parameters: Vec<usize>,
     /// Parameters freed with it because it acts only through them (wind acts through drag), not reported as its own.
     pub companions: Vec<usize>,
