@@ -122,7 +122,7 @@ impl RunContents {
         Self { label: label.to_owned(), rows: variable.len(), from_to }
     }
 
-    fn of(run: &Run) -> Self {
+    pub(crate) fn of(run: &Run) -> Self {
         Self::new(&run.label, run.inputs.first().map_or(&[], Vec::as_slice))
     }
 }

@@ -6,7 +6,7 @@ pub mod custom;
 mod domain;
 #[cfg(feature = "dough-roll")]
 pub mod dough_roll;
-#[cfg(any(feature = "indentation", feature = "trajectory"))]
+#[cfg(any(feature = "indentation", feature = "motion", feature = "trajectory"))]
 mod dual;
 #[cfg(feature = "grain-pour")]
 pub mod grain_pour;
@@ -16,6 +16,8 @@ pub mod indentation;
 pub mod liquid_tilt;
 #[cfg(any(feature = "custom", feature = "dough-roll", feature = "liquid-tilt"))]
 mod memo;
+#[cfg(feature = "motion")]
+pub mod motion;
 #[cfg(any(
     feature = "bounce",
     feature = "custom",
@@ -23,6 +25,7 @@ mod memo;
     feature = "grain-pour",
     feature = "indentation",
     feature = "liquid-tilt",
+    feature = "motion",
     feature = "slosh",
     feature = "trajectory"
 ))]

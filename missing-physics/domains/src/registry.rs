@@ -22,6 +22,8 @@ pub fn all() -> &'static [&'static dyn Domain] {
         &crate::dough_roll::DoughRoll,
         #[cfg(feature = "grain-pour")]
         &crate::grain_pour::GrainPour,
+        #[cfg(feature = "motion")]
+        &crate::motion::Motion,
         #[cfg(feature = "custom")]
         &crate::custom::Custom,
     ]

@@ -3,13 +3,14 @@
 use crate::adequacy::test::Adequacy;
 use crate::data::Run;
 use crate::diagnosis::{
-    ChannelFit, ChannelNoise, Curves, Diagnosis, MechanismReport, NoiseSource, Outlier, SetReport, Verdict,
+    ChannelFit, ChannelNoise, Curves, Diagnosis, Estimate, MechanismReport, NoiseSource, Outlier, SetReport,
+    Verdict,
 };
 use crate::estimate::estimates::{estimates, of_mechanism};
 use crate::estimate::open_noise::with_open_noise;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::predictions;
-use crate::model::PredictError;
+use crate::model::{Mechanism, PredictError};
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::repaired::Repaired;
@@ -216,13 +217,23 @@ impl Answer<'_> {
             equation: mechanism.equation.clone(),
             reference: mechanism.reference.clone(),
             probability: holding.map(|(_, p)| p).sum::<f64>().min(1.0),
-            parameters: of_mechanism(self.problem, holder, mechanism, self.rule, profile),
+            parameters: self
+                .without_open(mechanism, of_mechanism(self.problem, holder, mechanism, self.rule, profile)),
             heldout_log_score_gain: ranking.gain(scored).unwrap_or(f64::NAN),
             heldout_rmse: score.map_or(Vec::new(), |s| {
                 channels.iter().zip(&s.rmse).map(|(c, v)| (c.name.clone(), *v)).collect()
             }),
             ruled_out: alone.and_then(|c| c.ruled_out.clone()),
         })
+    }
+
+    /// Estimates of a mechanism without the parameters that may be open and are.
+    fn without_open(&self, mechanism: &Mechanism, mut estimates: Vec<Estimate>) -> Vec<Estimate> {
+        let may = |name: &str| {
+            mechanism.may_be_open.iter().any(|&p| self.problem.spec().parameters[p].name == name)
+        };
+        estimates.retain(|e| e.ci95.iter().all(|v| v.is_finite()) || !may(&e.name));
+        estimates
     }
 
     /// The leading sets, likeliest first.

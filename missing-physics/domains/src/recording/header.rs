@@ -51,8 +51,14 @@ impl Header {
 
     fn read_with(folder: &Path, gaps: bool) -> Result<Self, ReadError> {
         let path = folder.join("recording.toml");
-        let file = path.display().to_string();
-        let text = read_text(&path)?;
+        Self::parse(folder, path.display().to_string(), &read_text(&path)?, gaps)
+    }
+
+    /// Parses the text of a header of a folder; errors name it `file`.
+    ///
+    /// # Errors
+    /// As [`Header::read`].
+    pub(crate) fn parse(folder: &Path, file: String, text: &str, gaps: bool) -> Result<Self, ReadError> {
         let root: Table = text.parse().map_err(|e: toml::de::Error| {
             let at = e.span().map_or(0, |s| s.start.min(text.len()));
             let row = text.as_bytes()[..at].iter().filter(|b| **b == b'\n').count() + 1;
@@ -73,6 +79,20 @@ impl Header {
     pub fn table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<table::Table<'c>, ReadError> {
         let name = self.root().text(key, "the name of a CSV file")?;
         table::Table::read(&inside(&self.folder, &self.file, key, name)?, known, self.gaps)
+    }
+
+    /// As [`Header::table`], for a table in which a cell of a number may be empty in any recording.
+    ///
+    /// # Errors
+    /// As [`Header::table`].
+    pub fn sparse_table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<super::Table<'c>, ReadError> {
+        let name = self.root().text(key, "the name of a CSV file")?;
+        super::Table::read(&inside(&self.folder, &self.file, key, name)?, known, true)
+    }
+
+    /// Whether cells of what is to be predicted may be empty.
+    pub fn gaps(&self) -> bool {
+        self.gaps
     }
 
     /// The keys outside any section.
@@ -239,6 +259,20 @@ impl<'a> Section<'a> {
                 let expected = format!("a number from {lower} to {upper}");
                 Err(self.header.wrong(&format!("{}{key}", self.path), value, &expected))
             }
+        }
+    }
+
+    /// A number or a text that has to be there.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingKey`], [`ReadError::Value`].
+    pub fn number_or_text(&self, key: &str, expected: &str) -> Result<Result<f64, &'a str>, ReadError> {
+        match self.value(key) {
+            Some(Value::String(text)) => Ok(Err(text)),
+            Some(Value::Float(v)) if v.is_finite() => Ok(Ok(*v)),
+            Some(Value::Integer(v)) => Ok(Ok(*v as f64)),
+            Some(other) => Err(self.header.wrong(&format!("{}{key}", self.path), other, expected)),
+            None => Err(self.header.missing(&format!("{}{key}", self.path), expected)),
         }
     }
 

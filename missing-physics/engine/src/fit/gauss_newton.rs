@@ -9,7 +9,7 @@ use crate::problem::{Problem, Selection};
 
 const MAX_ITERATIONS: usize = 60;
 
-fn linearise(
+pub(crate) fn linearise(
     problem: &Problem<'_>,
     selection: &Selection,
     noise: &NoiseState,

@@ -4,8 +4,10 @@ pub(crate) mod alternate;
 pub(crate) mod bordered;
 pub(crate) mod columns;
 pub(crate) mod gauss_newton;
+mod least_squares;
 pub(crate) mod optimum;
 pub(crate) mod prediction;
-mod step;
+pub(crate) mod step;
 
 pub use crate::model::finite_differences;
+pub use least_squares::{LeastSquares, least_squares};

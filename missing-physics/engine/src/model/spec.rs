@@ -108,6 +108,8 @@ pub struct Mechanism {
     /// Those of [`Self::parameters`] that are whole numbers (the row at which something jumps): no fit moves them,
     /// [`MultimodalModel::starts`](crate::model::MultimodalModel::starts) proposes their values, and all whole values within their bounds are thought equally likely.
     pub integer_parameters: Vec<usize>,
+    /// Those of [`Self::parameters`] that may have no effect while others of them have (either bound of a saturation).
+    pub may_be_open: Vec<usize>,
     /// Parameters freed with it because it acts only through them (wind acts through drag), not reported as its own.
     pub companions: Vec<usize>,
     /// Identifiers of mechanisms that make the companions unnecessary.

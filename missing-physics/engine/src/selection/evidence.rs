@@ -21,6 +21,7 @@ pub(crate) fn evidence(
 ) -> (f64, Option<String>) {
     let covariance = covariance(&fit.information);
     let added: Vec<usize> = (0..selection.shared.len()).filter(|&i| selection.added_shared[i]).collect();
+    let added = without_open(problem, set, selection, &covariance, added);
     if added.iter().any(|&i| !covariance[(i, i)].is_finite()) {
         return (f64::NEG_INFINITY, Some("these data do not determine it".into()));
     }
@@ -40,6 +41,29 @@ pub(crate) fn evidence(
         evidence.pay(&mut left, &[spec.terms[term].parameter], &[]);
     }
     (evidence.value, evidence.ruled_out(set, &added))
+}
+
+/// The added parameters without those that may stay open and do: where others of the same mechanism are determined.
+fn without_open(
+    problem: &Problem<'_>,
+    set: &[usize],
+    selection: &Selection,
+    covariance: &DMatrix<f64>,
+    added: Vec<usize>,
+) -> Vec<usize> {
+    let mechanisms = || set.iter().map(|&m| &problem.spec().mechanisms[m]);
+    if mechanisms().all(|m| m.may_be_open.is_empty()) {
+        return added;
+    }
+    let index = |i: usize| problem.shared.index[selection.shared[i]];
+    let determined = |i: &usize| covariance[(*i, *i)].is_finite();
+    let open = |i: &usize| {
+        mechanisms().any(|m| {
+            m.may_be_open.contains(&index(*i))
+                && added.iter().any(|j| m.parameters.contains(&index(*j)) && determined(j))
+        })
+    };
+    added.iter().copied().filter(|i| determined(i) || !open(i)).collect()
 }
 
 /// An evidence in the making.

@@ -7,4 +7,5 @@ pub(crate) mod held_out;
 mod nuisance_prior;
 mod prior;
 pub(crate) mod ranking;
+mod screening;
 pub(crate) mod search;

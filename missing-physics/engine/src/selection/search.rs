@@ -8,6 +8,7 @@ use crate::fit::prediction::residuals;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
 use crate::selection::candidate::{Candidate, Guess, candidate};
+use crate::selection::screening::{MANY, Screening};
 
 /// How many sets of one size are tried with one more mechanism.
 const BEAM: usize = 3;
@@ -25,11 +26,16 @@ pub(crate) fn search(
     tell: &(dyn Fn(f64) -> bool + Sync),
 ) -> Option<Vec<Candidate>> {
     let mut all = vec![baseline];
+    // Where there are many, most would be fitted for nothing.
+    let mut screening = (allowed.len() > MANY).then(|| Screening::of(problem, allowed));
     let mut layer: Vec<usize> = vec![0];
     for size in 1..=MOST {
-        let wanted = larger(&all, &layer, allowed);
+        let wanted = match &mut screening {
+            Some(screening) => screened(problem, screening, &all, &layer),
+            None => larger(&all, &layer, allowed),
+        };
         let fitted: Vec<Candidate> =
-            wanted.par_iter().filter_map(|(set, parent)| fitted(problem, rule, &all, set, *parent)).collect();
+            wanted.par_iter().filter_map(|wanted| fitted(problem, rule, &all, wanted)).collect();
         if !tell(size as f64 / MOST as f64) {
             return None;
         }
@@ -49,21 +55,49 @@ pub(crate) fn search(
 }
 
 /// The sets of a layer with one more mechanism each, every set once, and where its parent stands.
-fn larger(all: &[Candidate], layer: &[usize], allowed: &[usize]) -> Vec<(Vec<usize>, usize)> {
-    let mut wanted: Vec<(Vec<usize>, usize)> = Vec::new();
+fn larger(all: &[Candidate], layer: &[usize], allowed: &[usize]) -> Vec<Wanted> {
+    let mut wanted = Vec::new();
     for &parent in layer {
         for &m in allowed {
-            let mut set = all[parent].set.clone();
-            if !set.contains(&m) {
-                set.push(m);
-                set.sort_unstable();
-                if !wanted.iter().any(|(s, _)| *s == set) {
-                    wanted.push((set, parent));
-                }
-            }
+            want(&mut wanted, all, parent, m, None);
         }
     }
     wanted
+}
+
+/// The sets of a layer with one more mechanism each that promises anything there.
+fn screened(
+    problem: &Problem<'_>,
+    screening: &mut Screening,
+    all: &[Candidate],
+    layer: &[usize],
+) -> Vec<Wanted> {
+    let mut wanted = Vec::new();
+    for &parent in layer {
+        for promising in screening.promising(problem, &all[parent]) {
+            want(&mut wanted, all, parent, promising.mechanism, Some(promising.start));
+        }
+    }
+    wanted
+}
+
+/// A set that is to be fitted, where its parent stands, and where to begin its new mechanism if that is known.
+struct Wanted {
+    set: Vec<usize>,
+    parent: usize,
+    start: Option<Guess>,
+}
+
+/// Adds a parent's set with one more mechanism, unless it has that or the set is wanted already.
+fn want(wanted: &mut Vec<Wanted>, all: &[Candidate], parent: usize, mechanism: usize, start: Option<Guess>) {
+    let mut set = all[parent].set.clone();
+    if !set.contains(&mechanism) {
+        set.push(mechanism);
+        set.sort_unstable();
+        if !wanted.iter().any(|w| w.set == set) {
+            wanted.push(Wanted { set, parent, start });
+        }
+    }
 }
 
 /// A set fitted from its parent's fit, and where it has several mechanisms from the fits of each of them alone too.
@@ -71,11 +105,10 @@ fn fitted(
     problem: &Problem<'_>,
     rule: &NoiseRule,
     all: &[Candidate],
-    set: &[usize],
-    parent: usize,
+    Wanted { set, parent, start }: &Wanted,
 ) -> Option<Candidate> {
-    let parent = &all[parent];
-    let guesses = guesses(problem, parent, set);
+    let parent = &all[*parent];
+    let guesses = start.clone().map_or_else(|| guesses(problem, parent, set), |start| vec![start]);
     let found = candidate(problem, rule, set, &[], &parent.fit, &guesses).ok();
     if set.len() == 1 {
         return found;

@@ -1,0 +1,30 @@
+//! A spring that yields: dry friction that gives before it slides.
+
+use crate::Number;
+
+/// The rate of the deflection `z` of a Bouc-Wen element (n = 1, beta = gamma) whose end moves with a velocity.
+///
+/// `dz/dt = v - (|v| z + v |z|) / (2 yield)`: `z` follows the motion, saturates at `yield_displacement` (above 0) and relaxes at once
+/// when the motion turns. The element's force is `-stiffness z` (Wen 1976, doi:10.1061/JMCEA3.0002106).
+pub fn bouc_wen_rate<T: Number>(velocity: T, deflection: T, yield_displacement: T) -> T {
+    velocity - (velocity.modulus() * deflection + velocity * deflection.modulus()) * 0.5 / yield_displacement
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Loaded steadily from rest the deflection is `yield (1 - exp(-x / yield))`; unloaded it falls as fast as the end moves.
+    #[test]
+    fn loading_and_unloading() {
+        let (y, n, v) = (0.3, 200_000, 1.0);
+        let (mut z, dt) = (0.0, 0.5 / n as f64);
+        for _ in 0..n {
+            let half = z + 0.5 * dt * bouc_wen_rate(v, z, y);
+            z += dt * bouc_wen_rate(v, half, y);
+        }
+        assert_relative_eq!(z, y * (1.0 - (-0.5_f64 / y).exp()), epsilon = 1e-9);
+        assert_relative_eq!(bouc_wen_rate(-v, z, y), -v);
+    }
+}

@@ -1,0 +1,90 @@
+//! The domain `motion`: any machine whose equations of motion can be written down, with what is usually left out of them.
+
+mod effects;
+mod equations;
+mod expression;
+mod machine;
+mod model;
+mod read;
+mod scales;
+mod start;
+mod tune;
+mod units;
+
+use missing_physics::model::{Model as _, Spec};
+
+use crate::recording::{Header, ReadError};
+use crate::{CheckedRecording, Contents, Domain, Loaded, RunContents, Template};
+pub use model::MotionModel;
+
+/// The domain.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion;
+
+impl Domain for Motion {
+    fn id(&self) -> &'static str {
+        "motion"
+    }
+
+    fn summary(&self) -> &'static str {
+        "a machine whose equations of motion stand in the recording: a joint, a drive, a pendulum, a hull, a tank"
+    }
+
+    fn reads(&self) -> &'static [(&'static str, &'static str)] {
+        &[
+            ("run, t_s and a column for each output and input", "cells of outputs may be empty"),
+            (
+                "[model] states",
+                "each state's derivative, an expression of states, inputs, parameters and t_s",
+            ),
+            ("[model] outputs", "what each measured column should read, an expression"),
+            ("[model] inputs", "columns known exactly: \"hold\" or \"linear\" between rows"),
+            ("[[parameter]] name, unit, start or value", "and optionally lower, upper, scale, per_run"),
+            (
+                "[start]",
+                "a state at a run's first row: a number, or \"measured\"; fitted where it is not listed",
+            ),
+            (
+                "[[joint]] name, position, velocity",
+                "and optionally drive, turns: where a joint's effects may act",
+            ),
+            ("[[level]] state", "a state that holds an amount"),
+            ("[noise] an output's name", "optional: one sigma from a calibration"),
+        ]
+    }
+
+    fn spec(&self) -> Spec {
+        // A machine with one of everything.
+        let all = equations::Equations::example();
+        let scales = scales::Scales::of_example(&all);
+        let starts: Vec<f64> = all.parameters.iter().map(|p| p.value).collect();
+        MotionModel::baseline(all, 0.01).full(scales, &starts).spec().clone()
+    }
+
+    fn template(&self) -> Template {
+        Template { header: include_str!("template.toml"), data: ("data.csv", include_str!("template.csv")) }
+    }
+
+    fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
+        let (equations, recording) = read::read(header)?;
+        let first = MotionModel::baseline(equations.clone(), 1.0);
+        let contents = Contents {
+            channels: recording.channels.clone(),
+            calibration: recording.calibration.clone(),
+            variable: recording.variables[0].clone(),
+            runs: recording.runs.iter().map(RunContents::of).collect(),
+            spec: first.spec().clone(),
+        };
+        let file = header.file.clone();
+        Ok(CheckedRecording::new(contents, move || {
+            let (model, undetermined) =
+                tune::model(equations, &recording).map_err(|why| ReadError::Value {
+                    file,
+                    key: "model".into(),
+                    got: "without an answer".into(),
+                    expected: format!("equations that can be followed from their starts ({why})"),
+                })?;
+            Ok(Loaded::new(recording, model, Vec::new(), undetermined))
+        }))
+    }
+}

@@ -1,0 +1,103 @@
+//! Units, as names end in them.
+
+use crate::recording::{ReadError, Section};
+
+/// Suffixes and their units; the longest that fits counts.
+const SUFFIXES: [(&str, &str); 24] = [
+    ("_m_s2", "m/s^2"),
+    ("_rad_s2", "rad/s^2"),
+    ("_m_s", "m/s"),
+    ("_rad_s", "rad/s"),
+    ("_m3_s", "m^3/s"),
+    ("_kg_s", "kg/s"),
+    ("_n_m", "N m"),
+    ("_m2", "m^2"),
+    ("_m3", "m^3"),
+    ("_per_s2", "1/s^2"),
+    ("_per_s", "1/s"),
+    ("_per_m", "1/m"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_kg", "kg"),
+    ("_pa", "Pa"),
+    ("_hz", "Hz"),
+    ("_ohm", "ohm"),
+    ("_mm", "mm"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_n", "N"),
+    ("_v", "V"),
+    ("_a", "A"),
+];
+
+/// The unit that a name ends in, where it is a known one that is not spelt out by the name itself (`gain_per_rad`).
+pub(super) fn of(name: &str) -> Option<&'static str> {
+    SUFFIXES
+        .iter()
+        .filter(|(suffix, _)| name.len() > suffix.len() && name.ends_with(suffix))
+        .filter(|(suffix, _)| {
+            suffix.starts_with("_per") || !name[..name.len() - suffix.len()].ends_with("_per")
+        })
+        .max_by_key(|(suffix, _)| suffix.len())
+        .map(|(_, unit)| *unit)
+}
+
+/// The unit that a name ends in, or nothing.
+pub(super) fn text(name: &str) -> String {
+    of(name).unwrap_or_default().to_owned()
+}
+
+/// Checks that a name and the quantity that it is have the same unit.
+pub(super) fn check_same(section: &Section<'_>, key: &str, other: &str) -> Result<(), ReadError> {
+    match (of(key), of(other)) {
+        (Some(a), Some(b)) if a != b => Err(section.unfit(
+            key,
+            format!("\"{other}\" (in {b})"),
+            format!("a quantity in {a}, as the name ends in"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Checks that a quantity can be the derivative of another.
+pub(super) fn check_rate(section: &Section<'_>, key: &str, other: &str) -> Result<(), ReadError> {
+    let (Some(a), Some(b)) = (of(key), of(other)) else { return Ok(()) };
+    let expected = match a {
+        "m" => "m/s",
+        "rad" => "rad/s",
+        "m/s" => "m/s^2",
+        "rad/s" => "rad/s^2",
+        "m^3" => "m^3/s",
+        "kg" => "kg/s",
+        _ => return Ok(()),
+    };
+    if b == expected {
+        return Ok(());
+    }
+    Err(section.unfit(
+        key,
+        format!("\"{other}\" (in {b})"),
+        format!("a derivative in {expected}, as {key} is in {a}"),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_end_in_their_units() {
+        for (name, unit) in [
+            ("angle_rad", Some("rad")),
+            ("rate_rad_s", Some("rad/s")),
+            ("supply_v", Some("V")),
+            ("gain_per_rad", None),
+            ("stiffness_per_s2", Some("1/s^2")),
+            ("inflow_m3_s", Some("m^3/s")),
+            ("ratio", None),
+            ("speed_per_volt", None),
+        ] {
+            assert_eq!(of(name), unit, "{name}");
+        }
+    }
+}

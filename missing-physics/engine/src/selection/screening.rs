@@ -1,0 +1,104 @@
+//! Which mechanisms are worth a fit beside others, by what one step of a fit would gain: for models that know so many that fitting each
+//! in every company would take too long.
+
+use rayon::prelude::*;
+
+use crate::fit::gauss_newton::linearise;
+use crate::fit::step::Step;
+use crate::problem::Problem;
+use crate::selection::candidate::{Candidate, Guess};
+
+/// Models with more mechanisms than this are screened.
+pub(crate) const MANY: usize = 20;
+/// Mechanisms that are fitted beside one set.
+const KEPT: usize = 6;
+/// Starts of a mechanism that are looked at again beside others: those that promised most beside nothing.
+const STARTS: usize = 2;
+
+/// A mechanism worth a fit, and where its fit begins.
+pub(crate) struct Promising {
+    pub(crate) mechanism: usize,
+    pub(crate) start: Guess,
+}
+
+/// Mechanisms, each with the starts that are looked at.
+pub(crate) struct Screening(Vec<(usize, Vec<Guess>)>);
+
+impl Screening {
+    /// All mechanisms of a list, each where the model proposes to start it and, unless it proposes anything, near its off value.
+    pub(crate) fn of(problem: &Problem<'_>, allowed: &[usize]) -> Self {
+        Self(allowed.iter().map(|&m| (m, starts(problem, m))).collect())
+    }
+
+    /// The mechanisms whose first step beside a fitted set promises most, most promising first; forgets starts that promise least.
+    pub(crate) fn promising(&mut self, problem: &Problem<'_>, parent: &Candidate) -> Vec<Promising> {
+        let tried: Vec<(usize, usize)> = (0..self.0.len())
+            .filter(|&k| !parent.set.contains(&self.0[k].0))
+            .flat_map(|k| (0..self.0[k].1.len()).map(move |start| (k, start)))
+            .collect();
+        let mut scored: Vec<(f64, usize, usize)> = tried
+            .into_par_iter()
+            .map(|(k, start)| {
+                let left = after_one_step(problem, parent, self.0[k].0, &self.0[k].1[start]);
+                (left.unwrap_or(f64::INFINITY), k, start)
+            })
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut kept: Vec<Promising> = Vec::new();
+        for &(chi2, k, start) in &scored {
+            let (mechanism, starts) = &self.0[k];
+            if chi2 > parent.fit.chi2 - 1.0 || kept.len() == KEPT {
+                break;
+            }
+            if kept.iter().all(|p| p.mechanism != *mechanism) {
+                kept.push(Promising { mechanism: *mechanism, start: starts[start].clone() });
+            }
+        }
+        self.forget(&scored);
+        kept
+    }
+
+    fn forget(&mut self, scored: &[(f64, usize, usize)]) {
+        for (k, (_, starts)) in self.0.iter_mut().enumerate().filter(|(_, (_, starts))| starts.len() > STARTS)
+        {
+            let best = scored.iter().filter(|s| s.1 == k).take(STARTS);
+            let best: Vec<Guess> = best.map(|s| starts[s.2].clone()).collect();
+            if !best.is_empty() {
+                *starts = best;
+            }
+        }
+    }
+}
+
+/// Where to begin a mechanism.
+fn starts(problem: &Problem<'_>, mechanism: usize) -> Vec<Guess> {
+    let slot = |p: usize| problem.shared.index.iter().position(|&i| i == p);
+    let proposed: Vec<Guess> = problem
+        .model
+        .extensions()
+        .modes
+        .map_or(Vec::new(), |modes| modes.starts(mechanism, &problem.recording.runs, &[]))
+        .into_iter()
+        .map(|start| start.into_iter().filter_map(|(p, value)| Some((slot(p)?, value))).collect())
+        .collect();
+    if proposed.is_empty() { vec![Vec::new()] } else { proposed }
+}
+
+/// The sum of squares that is left after one step from a start, as the linearised model has it.
+fn after_one_step(
+    problem: &Problem<'_>,
+    parent: &Candidate,
+    mechanism: usize,
+    start: &[(usize, f64)],
+) -> Option<f64> {
+    let set: Vec<usize> = parent.set.iter().copied().chain([mechanism]).collect();
+    let selection = problem.select(&set, &[]);
+    let mut shared = parent.fit.shared.clone();
+    for &(slot, value) in start {
+        shared[slot] = value;
+    }
+    let linear = linearise(problem, &selection, &parent.fit.noise, &shared, &parent.fit.nuisance).ok()?;
+    let step = Step::new(problem, &selection, &linear, (&shared, &parent.fit.nuisance), 0.0);
+    let left = linear.chi2 - step.predicted;
+    left.is_finite().then_some(left)
+}
