@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use crate::data::{Recording, Run};
 use crate::model::{Model, Scope, Spec};
 use crate::noise::family::Family;
-use crate::noise::process::Whitener;
+use crate::noise::process::{Whitener, rough_sigma};
 use crate::statistics::median;
 
 /// A model and a recording, with everything about the rows that no fit changes.
@@ -142,6 +142,16 @@ impl<'a> Problem<'a> {
     /// Measured values of a channel.
     pub(crate) fn count(&self, channel: usize) -> usize {
         self.rows.iter().map(|r| r.valid[channel].len()).sum()
+    }
+
+    /// Sigma of a channel's rough part in each run that is long enough to show it: what is left once everything smooth is taken away.
+    pub(crate) fn rough_sigmas(&self, channel: usize) -> Vec<f64> {
+        let of_run = |(rows, run): (&RunRows, &Run)| {
+            let column = &run.outputs[channel];
+            let values: Vec<f64> = rows.valid[channel].iter().map(|&i| column[i]).collect();
+            rough_sigma(&rows.positions[channel], &values)
+        };
+        self.rows.iter().zip(&self.recording.runs).filter_map(of_run).collect()
     }
 
     /// Measured values, and unknowns of the baseline and its noise.

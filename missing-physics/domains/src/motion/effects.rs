@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::equations::Equations;
 use super::scales::Scales;
-use missing_physics::model::{ParameterRef, SpecBuilder, UNBOUNDED};
+use missing_physics::model::{Mechanism, ParameterRef, SpecBuilder, UNBOUNDED};
 
 /// What a shared parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,15 +152,23 @@ impl<'a> Effects<'a> {
         self.builder.mechanism("clock-rate", &[rate], text, &["inertia", "sensor-gain", "input-gain"]);
     }
 
-    fn at(kind: &str, name: &str, several: bool) -> String {
-        if several { format!("{kind}@{name}") } else { kind.to_owned() }
+    /// A mechanism, of a carrier that is named where there are several of its kind: its parameters, its name, what it is, its equation and
+    /// its source, what it is easily confused with.
+    fn mechanism(
+        &mut self,
+        kind: &str,
+        of: Option<&str>,
+        own: &[ParameterRef],
+        text: [&str; 4],
+        confused: &[&str],
+    ) -> &mut Mechanism {
+        let (id, name) = match of {
+            Some(of) => (format!("{kind}@{of}"), format!("{} of {of}", text[0])),
+            None => (kind.to_owned(), text[0].to_owned()),
+        };
+        self.builder.mechanism(&id, own, [&name, text[1], text[2], text[3]], confused)
     }
 
-    fn of_joint(&self, joint: usize, kind: &str) -> String {
-        Self::at(kind, &self.equations.joints[joint].name, self.equations.joints.len() > 1)
-    }
-
-    /// A mechanism of a joint: its parameters, its name, what it is, its equation, its source, what it is easily confused with.
     fn joint_mechanism(
         &mut self,
         joint: usize,
@@ -168,15 +176,10 @@ impl<'a> Effects<'a> {
         own: &[ParameterRef],
         text: [&str; 4],
         confused: &[&str],
-    ) -> &mut missing_physics::model::Mechanism {
-        let id = self.of_joint(joint, kind);
-        let several = self.equations.joints.len() > 1;
-        let name = if several {
-            format!("{} of {}", text[0], self.equations.joints[joint].name)
-        } else {
-            text[0].to_owned()
-        };
-        self.builder.mechanism(&id, own, [&name, text[1], text[2], text[3]], confused)
+    ) -> &mut Mechanism {
+        let equations = self.equations;
+        let of = (equations.joints.len() > 1).then_some(equations.joints[joint].name.as_str());
+        self.mechanism(kind, of, own, text, confused)
     }
 
     fn friction(&mut self, joint: usize) {
@@ -234,7 +237,7 @@ impl<'a> Effects<'a> {
         .shape_parameters = vec![speed.index];
         for (power, (kind, name, unit, what, equation)) in [
             ("viscous-friction", "rate_per_s", "1/s".to_owned(), "viscous friction", "-rate v"),
-            ("quadratic-damping", "coefficient", per(&s.position_unit, 1), "quadratic damping", "-c |v| v"),
+            ("quadratic-damping", "coefficient", per(&s.position_unit), "quadratic damping", "-c |v| v"),
             ("cubic-damping", "coefficient", format!("s/({})^2", s.position_unit), "cubic damping", "-c v^3"),
         ]
         .into_iter()
@@ -475,38 +478,32 @@ impl<'a> Effects<'a> {
         );
         let most = low.abs().max(high.abs());
         let zone = self.add(role(OfInput::DeadZone), "width", &unit, 0.0, [0.0, most], 0.05 * most);
-        let mut mechanism = |kind: &str, own: &[ParameterRef], text: [&str; 4], confused: &[&str]| {
-            let title = if several { format!("{} of {name}", text[0]) } else { text[0].to_owned() };
-            let m = self.builder.mechanism(
-                &Self::at(kind, &name, several),
-                own,
-                [&title, text[1], text[2], text[3]],
-                confused,
-            );
-            if kind.ends_with("saturation") {
-                m.may_be_open = own.iter().map(|p| p.index).collect();
-            }
-        };
-        mechanism(
+        let of = several.then_some(name.as_str());
+        self.mechanism(
             "input-gain",
+            of,
             &[gain],
             ["the input's gain", "What acts is the command times a factor.", "(1 + gain) u", CONTROL],
             &["sensor-gain", "inertia"],
-        );
-        mechanism(
+        )
+        .may_be_open = vec![upper.index, lower.index];
+        self.mechanism(
             "input-offset",
+            of,
             &[offset],
             ["the input's offset", "What acts is the command and a constant.", "u + offset", CONTROL],
             &["constant-force", "asymmetric-friction"],
         );
-        mechanism(
+        self.mechanism(
             "input-delay",
+            of,
             &[delay],
             ["the input's delay", "The command acts later than it is given.", "u(t - delay)", CONTROL],
             &["sensor-delay", "input-lag"],
         );
-        mechanism(
+        self.mechanism(
             "input-lag",
+            of,
             &[lag],
             [
                 "the input's lag",
@@ -516,8 +513,9 @@ impl<'a> Effects<'a> {
             ],
             &["input-delay", "sensor-lag"],
         );
-        mechanism(
+        self.mechanism(
             "input-saturation",
+            of,
             &[upper, lower],
             [
                 "the input's saturation",
@@ -526,10 +524,12 @@ impl<'a> Effects<'a> {
                 CONTROL,
             ],
             &["quadratic-damping", "input-gain"],
-        );
+        )
+        .may_be_open = vec![upper.index, lower.index];
         if low < 0.0 || high > 0.0 {
-            mechanism(
+            self.mechanism(
                 "input-dead-zone",
+                of,
                 &[zone],
                 [
                     "the input's dead zone",
@@ -579,32 +579,24 @@ impl<'a> Effects<'a> {
             [low - 0.2 * span, high],
             0.1 * span,
         );
-        let mut mechanism = |kind: &str, own: &[ParameterRef], text: [&str; 4], confused: &[&str]| {
-            let title = if several { format!("{} of {name}", text[0]) } else { text[0].to_owned() };
-            let m = self.builder.mechanism(
-                &Self::at(kind, &name, several),
-                own,
-                [&title, text[1], text[2], text[3]],
-                confused,
-            );
-            if kind.ends_with("saturation") {
-                m.may_be_open = own.iter().map(|p| p.index).collect();
-            }
-        };
-        mechanism(
+        let of = several.then_some(name.as_str());
+        self.mechanism(
             "sensor-gain",
+            of,
             &[gain],
             ["the sensor's gain", "Readings are the quantity times a factor.", "(1 + gain) y", CONTROL],
             &["input-gain"],
         );
-        mechanism(
+        self.mechanism(
             "sensor-offset",
+            of,
             &[offset],
             ["the sensor's offset", "Readings are the quantity and a constant.", "y + offset", CONTROL],
             &["input-offset", "constant-force"],
         );
-        mechanism(
+        self.mechanism(
             "sensor-drift",
+            of,
             &[drift],
             [
                 "the sensor's drift",
@@ -614,14 +606,16 @@ impl<'a> Effects<'a> {
             ],
             &["constant-force"],
         );
-        mechanism(
+        self.mechanism(
             "sensor-delay",
+            of,
             &[delay],
             ["the sensor's delay", "Readings are old when they come.", "y(t - delay)", CONTROL],
             &["input-delay", "sensor-lag"],
         );
-        mechanism(
+        self.mechanism(
             "sensor-lag",
+            of,
             &[lag],
             [
                 "the sensor's lag",
@@ -631,8 +625,9 @@ impl<'a> Effects<'a> {
             ],
             &["sensor-delay", "input-lag"],
         );
-        mechanism(
+        self.mechanism(
             "sensor-saturation",
+            of,
             &[upper, lower],
             [
                 "the sensor's saturation",
@@ -660,26 +655,17 @@ impl<'a> Effects<'a> {
         );
         let rate =
             self.add(Role::Leak(level), "rate_per_s", "1/s", 0.0, POSITIVE, 0.1 / self.scales.duration_s);
-        let mut mechanism = |kind: &str, own: &[ParameterRef], text: [&str; 4], confused: &[&str]| {
-            let title = if several { format!("{} of {name}", text[0]) } else { text[0].to_owned() };
-            let m = self.builder.mechanism(
-                &Self::at(kind, &name, several),
-                own,
-                [&title, text[1], text[2], text[3]],
-                confused,
-            );
-            if kind.ends_with("saturation") {
-                m.may_be_open = own.iter().map(|p| p.index).collect();
-            }
-        };
-        mechanism(
+        let of = several.then_some(name.as_str());
+        self.mechanism(
             "overflow",
+            of,
             &[height],
             ["an overflow", "What comes above a height is lost.", "level <= height", TEXTBOOK],
             &["sensor-saturation", "input-saturation"],
         );
-        mechanism(
+        self.mechanism(
             "leak",
+            of,
             &[rate],
             ["a leak", "The level falls in proportion to its height.", "-rate level", TEXTBOOK],
             &["sensor-gain"],
@@ -688,10 +674,6 @@ impl<'a> Effects<'a> {
 }
 
 /// One over a unit.
-fn per(unit: &str, power: u32) -> String {
-    match (unit.is_empty(), power) {
-        (true, _) => String::new(),
-        (false, 1) => format!("1/{unit}"),
-        (false, n) => format!("1/{unit}^{n}"),
-    }
+fn per(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!("1/{unit}") }
 }

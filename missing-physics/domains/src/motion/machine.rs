@@ -184,13 +184,8 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         let Some(dry) = laws.dry else { return T::from(0.0) };
         let equations = self.equations;
         let joint = &equations.joints[k];
-        let needs_load = dry.load_fraction.re() != 0.0 || self.equations.joints[k].drive.is_some();
-        let load = if needs_load {
-            self.look(t, x);
-            self.load(joint)
-        } else {
-            T::from(0.0)
-        };
+        self.look(t, x);
+        let load = self.load(joint);
         dry.resistance(forward, x[joint.velocity], load) * self.pace / (laws.inertia + 1.0)
     }
 }

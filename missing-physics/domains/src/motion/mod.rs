@@ -77,14 +77,13 @@ impl Domain for Motion {
         };
         let file = header.file.clone();
         Ok(CheckedRecording::new(contents, move || {
-            let (model, undetermined) =
-                tune::model(equations, &recording).map_err(|why| ReadError::Value {
-                    file,
-                    key: "model".into(),
-                    got: "without an answer".into(),
-                    expected: format!("equations that can be followed from their starts ({why})"),
-                })?;
-            Ok(Loaded::new(recording, model, Vec::new(), undetermined))
+            let model = tune::model(equations, &recording).map_err(|why| ReadError::Value {
+                file,
+                key: "model".into(),
+                got: "without an answer".into(),
+                expected: format!("equations that can be followed from their starts ({why})"),
+            })?;
+            Ok(Loaded::new(recording, model, Vec::new(), Vec::new()))
         }))
     }
 }

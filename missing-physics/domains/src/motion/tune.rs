@@ -4,6 +4,7 @@
 use missing_physics::data::{Recording, Run};
 use missing_physics::fit::least_squares;
 use missing_physics::model::Model as _;
+use missing_physics::noise::rough_sigma;
 
 use super::equations::Equations;
 use super::model::MotionModel;
@@ -20,14 +21,11 @@ const WINDOWED_ROWS: usize = 3000;
 /// Rows of the shortest windows in which the equations are fitted first.
 const FIRST_WINDOW: usize = 40;
 
-/// The full model, and what the data cannot determine.
+/// The full model.
 ///
 /// # Errors
 /// Why the equations give no prediction, in words.
-pub(super) fn model(
-    equations: Equations,
-    recording: &Recording,
-) -> Result<(MotionModel, Vec<String>), String> {
+pub(super) fn model(equations: Equations, recording: &Recording) -> Result<MotionModel, String> {
     let step_s = median_step(recording);
     let mut model = MotionModel::baseline(equations, step_s);
     let starts: Vec<f64> = shared_starts(&model);
@@ -36,7 +34,7 @@ pub(super) fn model(
     resolve(&mut model, recording, &fitted)?;
     let stated = model.stated(&fitted);
     let scales = sizes(&model, recording, &fitted)?;
-    Ok((model.full(scales, &stated), Vec::new()))
+    Ok(model.full(scales, &stated))
 }
 
 fn shared_starts(model: &MotionModel) -> Vec<f64> {
@@ -93,15 +91,13 @@ fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Re
     before.map(|_| ())
 }
 
-/// By how much the integration may be off in a channel: little beside what third differences of its rows show, or its calibration.
+/// By how much the integration may be off in a channel: little beside the rough part of its rows, or its calibration.
 fn tolerance(recording: &Recording, run: &Run, channel: usize) -> f64 {
-    let column: Vec<f64> = run.outputs[channel].iter().copied().filter(|v| v.is_finite()).collect();
-    let mut differences: Vec<f64> =
-        column.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs() / 20_f64.sqrt()).collect();
-    differences.sort_by(f64::total_cmp);
-    let rough = differences.get(differences.len() / 2).map_or(0.0, |d| d / 0.6745);
-    let sigma =
-        recording.calibration[channel].unwrap_or(rough).max(recording.resolution[channel] / 12_f64.sqrt());
+    let measured = run.inputs[0].iter().zip(&run.outputs[channel]).filter(|(_, v)| v.is_finite());
+    let (times, column): (Vec<f64>, Vec<f64>) = measured.unzip();
+    let rough = || rough_sigma(&times, &column).unwrap_or(0.0);
+    let known = recording.calibration[channel].unwrap_or_else(rough);
+    let sigma = known.max(recording.resolution[channel] / 12_f64.sqrt());
     let [low, high] = range(column.iter().copied());
     (TOLERANCE * sigma).max(LEAST_TOLERANCE * (high - low))
 }

@@ -8,7 +8,6 @@ use crate::fit::alternate::fit;
 use crate::fit::gauss_newton::solve;
 use crate::fit::optimum::Fit;
 use crate::model::{Model, PredictError};
-use crate::noise::process::rough_sigma;
 use crate::noise::rule::{NoiseRule, NoiseState, noise_rule};
 use crate::problem::Problem;
 use crate::selection::candidate::{Candidate, candidate};
@@ -62,18 +61,8 @@ pub(super) fn least_squares_baseline(begun: &Begun<'_>) -> Result<Candidate, Pre
 pub(super) fn rough_sigmas(problem: &Problem<'_>, rule: &NoiseRule, fallback: &Fit) -> Vec<f64> {
     (0..problem.channels())
         .map(|c| {
-            let mut sigmas: Vec<f64> = problem
-                .rows
-                .iter()
-                .enumerate()
-                .filter_map(|(r, rows)| {
-                    let column = &problem.recording.runs[r].outputs[c];
-                    let values: Vec<f64> = rows.valid[c].iter().map(|&i| column[i]).collect();
-                    rough_sigma(&rows.positions[c], &values)
-                })
-                .collect();
             rule.fixed_sigma[c]
-                .or_else(|| median(&mut sigmas))
+                .or_else(|| median(&mut problem.rough_sigmas(c)))
                 .map_or(fallback.noise.sigma[c], |s| s.max(rule.floor[c]))
         })
         .collect()

@@ -3,7 +3,6 @@
 use crate::data::Recording;
 use crate::fit::gauss_newton::solve;
 use crate::model::{Model, PredictError};
-use crate::noise::rough_sigma;
 use crate::noise::rule::NoiseState;
 use crate::problem::Problem;
 
@@ -40,17 +39,7 @@ fn sigma(problem: &Problem<'_>, channel: usize) -> f64 {
     if let Some(sigma) = problem.recording.calibration[channel] {
         return sigma;
     }
-    let squares: Vec<f64> = problem
-        .rows
-        .iter()
-        .enumerate()
-        .filter_map(|(run, rows)| {
-            let column = &problem.recording.runs[run].outputs[channel];
-            let values: Vec<f64> = rows.valid[channel].iter().map(|&i| column[i]).collect();
-            rough_sigma(&rows.positions[channel], &values)
-        })
-        .map(|s| s * s)
-        .collect();
+    let squares: Vec<f64> = problem.rough_sigmas(channel).iter().map(|s| s * s).collect();
     let mean = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
     mean.max(problem.recording.resolution[channel] / 12_f64.sqrt()).max(f64::MIN_POSITIVE.sqrt())
 }

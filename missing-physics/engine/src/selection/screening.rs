@@ -25,9 +25,10 @@ pub(crate) struct Promising {
 pub(crate) struct Screening(Vec<(usize, Vec<Guess>)>);
 
 impl Screening {
-    /// All mechanisms of a list, each where the model proposes to start it and, unless it proposes anything, near its off value.
-    pub(crate) fn of(problem: &Problem<'_>, allowed: &[usize]) -> Self {
-        Self(allowed.iter().map(|&m| (m, starts(problem, m))).collect())
+    /// Mechanisms with their starts; one without any is looked at near its off value.
+    pub(crate) fn new(mechanisms: impl Iterator<Item = (usize, Vec<Guess>)>) -> Self {
+        let near_off = |starts: Vec<Guess>| if starts.is_empty() { vec![Guess::new()] } else { starts };
+        Self(mechanisms.map(|(m, starts)| (m, near_off(starts))).collect())
     }
 
     /// The mechanisms whose first step beside a fitted set promises most, most promising first; forgets starts that promise least.
@@ -68,20 +69,6 @@ impl Screening {
             }
         }
     }
-}
-
-/// Where to begin a mechanism.
-fn starts(problem: &Problem<'_>, mechanism: usize) -> Vec<Guess> {
-    let slot = |p: usize| problem.shared.index.iter().position(|&i| i == p);
-    let proposed: Vec<Guess> = problem
-        .model
-        .extensions()
-        .modes
-        .map_or(Vec::new(), |modes| modes.starts(mechanism, &problem.recording.runs, &[]))
-        .into_iter()
-        .map(|start| start.into_iter().filter_map(|(p, value)| Some((slot(p)?, value))).collect())
-        .collect();
-    if proposed.is_empty() { vec![Vec::new()] } else { proposed }
 }
 
 /// The sum of squares that is left after one step from a start, as the linearised model has it.

@@ -27,7 +27,8 @@ pub(crate) fn search(
 ) -> Option<Vec<Candidate>> {
     let mut all = vec![baseline];
     // Where there are many, most would be fitted for nothing.
-    let mut screening = (allowed.len() > MANY).then(|| Screening::of(problem, allowed));
+    let mut screening = (allowed.len() > MANY)
+        .then(|| Screening::new(allowed.iter().map(|&m| (m, guesses(problem, &all[0], &[m])))));
     let mut layer: Vec<usize> = vec![0];
     for size in 1..=MOST {
         let wanted = match &mut screening {

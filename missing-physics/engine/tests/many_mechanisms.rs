@@ -1,0 +1,78 @@
+//! Models that know so many mechanisms that only those which promise anything are fitted; parameters that may stay open.
+#![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+
+mod common;
+
+use common::{Curve, mechanism, parameter, recording};
+use missing_physics::data::{Recording, Run};
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::model::{Mechanism, Model};
+use missing_physics::observer::Silent;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+const WAVES: usize = 24;
+const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// An offset, and 24 waves that may be on.
+fn waves() -> Curve {
+    let amplitudes = (1..=WAVES).map(|k| parameter(&format!("amplitude_{k}"), 0.0, ANY));
+    let parameters = std::iter::once(parameter("offset", 0.0, ANY)).chain(amplitudes).collect();
+    let mechanisms = (1..=WAVES).map(|k| mechanism(&format!("wave-{k}"), vec![k])).collect();
+    Curve::new(parameters, mechanisms, |s, _, x| {
+        s[0] + (1..=WAVES).map(|k| s[k] * (k as f64 * x).sin()).sum::<f64>()
+    })
+}
+
+/// Two runs of a law with noise of 0.1.
+fn draw(law: impl Fn(f64) -> f64) -> Recording {
+    let noise = Normal::new(0.0, 0.1).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let xs: Vec<f64> = (0..120).map(|i| 0.05 * f64::from(i)).collect();
+    let runs = ["1", "2"].map(|label| Run {
+        label: label.into(),
+        outputs: vec![xs.iter().map(|x| law(*x) + noise.sample(&mut rng)).collect()],
+        inputs: vec![xs.clone()],
+        kind: 0,
+    });
+    recording("x", runs.into(), Some(0.1))
+}
+
+fn answer(model: &dyn Model, recording: &Recording) -> Diagnosis {
+    let options = Options { replicates: 99, ..Options::default() };
+    diagnose(model, recording, &[], &options, &Silent).unwrap()
+}
+
+#[test]
+fn two_of_many_are_found() {
+    let found = answer(&waves(), &draw(|x| 1.0 + 0.4 * (5.0 * x).sin() - 0.3 * (17.0 * x).sin()));
+    let mut chosen = found.chosen;
+    chosen.sort();
+    assert_eq!(chosen, ["wave-17", "wave-5"]);
+}
+
+#[test]
+fn none_of_many_is_named_for_nothing() {
+    assert!(answer(&waves(), &draw(|_| 1.0)).chosen.is_empty());
+}
+
+/// A sine that is cut at its top alone: the upper bound is reported, the lower one stays open and unsaid.
+#[test]
+fn a_bound_that_nothing_reaches_stays_open() {
+    let cut = |may_be_open| {
+        let bound = |name, start| parameter(name, start, [-2.0, 2.0]);
+        let parameters = vec![parameter("amplitude", 1.0, ANY), bound("upper", 1.5), bound("lower", -1.5)];
+        let saturation = Mechanism { may_be_open, ..mechanism("saturation", vec![1, 2]) };
+        Curve::new(parameters, vec![saturation], |s, _, x| (s[0] * x.sin()).min(s[1]).max(s[2]))
+            .from(|_| vec![vec![(1, 0.8)], vec![(2, -0.8)]])
+    };
+    let recording = draw(|x| x.sin().min(0.6));
+    let found = answer(&cut(vec![1, 2]), &recording);
+    assert_eq!(found.chosen, ["saturation"]);
+    let [upper] = &found.mechanisms[0].parameters[..] else { unreachable!("the upper bound alone") };
+    assert!(upper.name == "upper" && upper.ci95[0] < 0.6 && upper.ci95[1] > 0.6, "{upper:?}");
+    // Where both have to be determined, one that is not rules the mechanism out.
+    assert!(answer(&cut(vec![]), &recording).chosen.is_empty());
+}
