@@ -16,6 +16,7 @@ use crate::problem::Problem;
 use crate::repaired::Repaired;
 use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
+use crate::selection::main_cause::MainCause;
 use crate::selection::ranking::{Best, Ranking};
 
 /// Sets that are listed.
@@ -49,12 +50,14 @@ impl Answer<'_> {
         model: &Candidate,
         before: Vec<ChannelFit>,
     ) -> Result<Diagnosis, PredictError> {
+        let with_leftover = verdict == Verdict::Partly;
         let recording = &self.problem.recording;
         let pairs =
             |list: &[crate::model::Quantity]| list.iter().map(|q| (q.name.clone(), q.unit.clone())).collect();
         let free: Vec<usize> =
             self.baseline.selection.shared.iter().map(|&slot| self.problem.shared.index[slot]).collect();
-        let open = with_open_noise(self.problem, self.rule, model);
+        // A leftover in the model leaves the noise open by itself.
+        let open = if with_leftover { None } else { with_open_noise(self.problem, self.rule, model) };
         Ok(Diagnosis {
             verdict,
             p_value: adequacy.p_value,
@@ -71,6 +74,9 @@ impl Answer<'_> {
             chosen: Vec::new(),
             confused_with: Vec::new(),
             confusion: None,
+            explained_share: None,
+            leftover: Vec::new(),
+            limits: Vec::new(),
             final_p_value: None,
             after: before.clone(),
             before,
@@ -192,24 +198,55 @@ impl Answer<'_> {
     pub(crate) fn mechanisms(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<MechanismReport> {
         let best = best.map(|b| ranking.at(b.at));
         let open = best.and_then(|b| with_open_noise(self.problem, self.rule, b));
+        let sets: Vec<(&Candidate, f64)> = ranking.physical().collect();
+        self.reports(ranking, open.as_ref().or(best), &sets, best.is_some())
+    }
+
+    /// The same where a leftover is in the model: of all sets, the main cause and its rivals count.
+    pub(crate) fn mechanisms_beside_a_leftover(
+        &self,
+        ranking: &Ranking,
+        cause: &MainCause,
+    ) -> Vec<MechanismReport> {
+        let all = || std::iter::once(&cause.chosen).chain(&cause.rivals).map(|judged| &judged.candidate);
+        let most = all().map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = all().map(|c| (c.evidence - most).exp()).sum();
+        let sets: Vec<(&Candidate, f64)> = all().map(|c| (c, (c.evidence - most).exp() / total)).collect();
+        self.reports(ranking, Some(&cause.chosen.candidate), &sets, false)
+    }
+
+    fn reports(
+        &self,
+        ranking: &Ranking,
+        best: Option<&Candidate>,
+        sets: &[(&Candidate, f64)],
+        profile: bool,
+    ) -> Vec<MechanismReport> {
         let mut reports: Vec<MechanismReport> = (0..self.problem.spec().mechanisms.len())
-            .filter_map(|m| self.mechanism(m, ranking, open.as_ref().or(best)))
+            .filter_map(|m| self.mechanism(m, ranking, best, sets, profile))
             .collect();
         reports.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         reports
     }
 
-    fn mechanism(&self, m: usize, ranking: &Ranking, best: Option<&Candidate>) -> Option<MechanismReport> {
+    fn mechanism(
+        &self,
+        m: usize,
+        ranking: &Ranking,
+        best: Option<&Candidate>,
+        sets: &[(&Candidate, f64)],
+        profile: bool,
+    ) -> Option<MechanismReport> {
         let mechanism = &self.problem.spec().mechanisms[m];
         let alone = ranking.of(&[m]);
         let holder = best
             .filter(|c| c.set.contains(&m))
-            .or_else(|| ranking.physical().map(|p| p.0).find(|c| c.set.contains(&m)))
+            .or_else(|| sets.iter().map(|p| p.0).find(|c| c.set.contains(&m)))
             .or(alone)?;
         let scored = if ranking.score_of(&holder.set).is_some() { &holder.set[..] } else { &[m] };
         let score = ranking.score_of(scored);
-        let profile = best.is_some_and(|b| b.set == holder.set);
-        let holding = ranking.physical().filter(|(c, _)| c.set.contains(&m));
+        let profile = profile && best.is_some_and(|b| b.set == holder.set);
+        let holding = sets.iter().filter(|(c, _)| c.set.contains(&m));
         let channels = &self.problem.recording.channels;
         Some(MechanismReport {
             id: mechanism.id.clone(),

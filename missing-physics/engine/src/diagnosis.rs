@@ -12,6 +12,8 @@ pub enum Verdict {
     Adequate,
     /// The chosen mechanisms bring the model to within the noise.
     Explained,
+    /// The chosen mechanisms are needed and take away nearly all of the misfit; a smaller one is left.
+    Partly,
     /// Several sets of mechanisms fit equally well.
     Ambiguous,
     /// Something is wrong that no listed mechanism describes.
@@ -24,6 +26,7 @@ impl Verdict {
         match self {
             Self::Adequate => "adequate",
             Self::Explained => "explained",
+            Self::Partly => "partly",
             Self::Ambiguous => "ambiguous",
             Self::Unexplained => "unexplained",
         }
@@ -98,8 +101,12 @@ pub struct Location {
     pub share: f64,
     /// Mean residual there (measured less predicted), in the channel's unit.
     pub mean_residual: f64,
+    /// Root mean square of the residual there, in the channel's unit.
+    pub rms: f64,
     /// The residual of largest modulus there, in the channel's unit.
     pub largest_residual: f64,
+    /// One sigma of the channel's white noise, in its unit.
+    pub sigma: f64,
     /// Size of the misfit in standard errors.
     pub z: f64,
 }
@@ -166,6 +173,19 @@ pub struct ChannelFit {
     pub heldout_rmse: f64,
 }
 
+/// What these data would have shown of a mechanism that they do not show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Limit {
+    /// Identifier of the mechanism.
+    pub id: String,
+    /// Name of its parameter, with the unit as a suffix.
+    pub parameter: String,
+    /// The unit alone.
+    pub unit: String,
+    /// A size (modulus) above this is excluded at 95 %.
+    pub upper: f64,
+}
+
 /// How often data from one rival are taken for another's, by simulation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusion {
@@ -180,8 +200,10 @@ pub struct Confusion {
 pub struct Law {
     /// The whole law, in plain text.
     pub formula: String,
-    /// `sparse` (a few terms), `periodic` (an oscillation) or `smooth` (an empirical curve, no formula).
+    /// `sparse` (a few terms), `power` (another exponent), `periodic` (an oscillation) or `smooth` (an empirical curve, no formula).
     pub kind: &'static str,
+    /// Identifiers of the mechanisms on top of which it stands.
+    pub beside: Vec<String>,
     /// Channel or quantity that it adds to, with its unit.
     pub adds_to: (String, String),
     /// Variables in it, with their units.
@@ -268,6 +290,12 @@ pub struct Diagnosis {
     pub confused_with: Vec<Vec<String>>,
     /// How the rivals are confused, by simulation.
     pub confusion: Option<Confusion>,
+    /// The part of the squared misfit beyond the noise that the chosen mechanisms take away on unseen data, where some were chosen.
+    pub explained_share: Option<f64>,
+    /// What the chosen mechanisms leave, by place, for [`Verdict::Partly`].
+    pub leftover: Vec<Location>,
+    /// The size of each mechanism that would have shown, for [`Verdict::Adequate`].
+    pub limits: Vec<Limit>,
     /// p-value of the final model's adequacy, where one was chosen.
     pub final_p_value: Option<f64>,
     /// Errors of the baseline.

@@ -8,6 +8,7 @@ mod estimate;
 mod experiment;
 pub mod fit;
 mod law;
+mod leftover;
 pub mod likelihood;
 mod linalg;
 mod locate;

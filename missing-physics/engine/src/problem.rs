@@ -131,6 +131,13 @@ impl<'a> Problem<'a> {
         other
     }
 
+    /// The same model on some of the runs.
+    pub(crate) fn of_runs(&self, runs: &[usize]) -> Problem<'a> {
+        let mut recording = self.recording.clone();
+        recording.runs = runs.iter().map(|&r| self.recording.runs[r].clone()).collect();
+        self.with(recording)
+    }
+
     pub(crate) fn spec(&self) -> &Spec {
         self.model.spec()
     }

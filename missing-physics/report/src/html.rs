@@ -10,7 +10,7 @@ use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::plots;
 use super::svg::{CHART_STYLE, escape};
-use super::text::{headline, law_kind, noise_sentence, where_sentence};
+use super::text::{headline, law_kind, leftover_sentence, limits, noise_sentence, where_sentence};
 
 /// Style of a page.
 pub const STYLE: &str = "
@@ -36,6 +36,9 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     }
     section(&mut page, "The law in the residual", &d.law.as_ref().map(law).unwrap_or_default());
     section(&mut page, "How much better", &errors(d));
+    let left: Vec<String> = d.leftover.iter().map(|l| leftover_sentence(d, l)).collect();
+    section(&mut page, "What is left", &list(&left));
+    section(&mut page, "What would have shown", &list(&limits(d)));
     let confused = d.confusion.as_ref().map(confusion).unwrap_or_default();
     section(&mut page, "How the rivals are confused", &confused);
     section(&mut page, "Do this next", &d.next_experiment.as_ref().map(next).unwrap_or_default());

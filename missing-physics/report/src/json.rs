@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use missing_physics::diagnosis::{
-    ChannelFit, ChannelNoise, Confusion, Diagnosis, Estimate, Law, Location, MechanismReport, NextExperiment,
-    Outlier, SetReport, TestOutcome,
+    ChannelFit, ChannelNoise, Confusion, Diagnosis, Estimate, Law, Limit, Location, MechanismReport,
+    NextExperiment, Outlier, SetReport, TestOutcome,
 };
 use serde::Serialize;
 use serde_json::{Value, json as value};
@@ -25,6 +25,9 @@ struct Answer<'a> {
     chosen: &'a [String],
     confused_with: &'a [Vec<String>],
     fit: Value,
+    explained_share: Option<f64>,
+    leftover: Vec<Value>,
+    limits: Vec<Value>,
     law: Value,
     next_experiment: Value,
     #[serde(flatten)]
@@ -57,6 +60,9 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
         chosen: &d.chosen,
         confused_with: &d.confused_with,
         fit: value!({"before": fits(&d.before), "after": fits(&d.after)}),
+        explained_share: d.explained_share,
+        leftover: d.leftover.iter().map(place).collect(),
+        limits: d.limits.iter().map(limit).collect(),
         law: d.law.as_ref().map_or(Value::Null, law),
         next_experiment: d.next_experiment.as_ref().map_or(Value::Null, next_experiment),
         p_floor: d.p_floor,
@@ -83,7 +89,12 @@ fn noise(n: &ChannelNoise) -> Value {
 
 fn place(l: &Location) -> Value {
     value!({"channel": l.channel, "variable": l.variable, "from": l.from, "to": l.to, "runs": l.runs,
-        "share": l.share, "mean_residual": l.mean_residual, "z": l.z, "largest_residual": l.largest_residual})
+        "share": l.share, "mean_residual": l.mean_residual, "z": l.z, "largest_residual": l.largest_residual,
+        "rms": l.rms, "sigma": l.sigma})
+}
+
+fn limit(l: &Limit) -> Value {
+    value!({"id": l.id, "parameter": l.parameter, "unit": l.unit, "upper": l.upper})
 }
 
 fn mechanism(m: &MechanismReport) -> Value {
@@ -100,7 +111,7 @@ fn law(l: &Law) -> Value {
         .map(|(c, without, with)| (c.as_str(), value!({"without": without, "with": with})))
         .collect();
     let quantity = |(name, unit): &(String, String)| value!({"name": name, "unit": unit});
-    value!({"formula": l.formula, "kind": l.kind, "adds_to": quantity(&l.adds_to),
+    value!({"formula": l.formula, "kind": l.kind, "beside": l.beside, "adds_to": quantity(&l.adds_to),
         "variables": l.variables.iter().map(quantity).collect::<Vec<_>>(),
         "coefficients": estimates(&l.coefficients), "heldout_rmse": rmse,
         "heldout_log_score_gain": l.heldout_log_score_gain})

@@ -60,7 +60,7 @@ fn key(changed: bool, shaded: bool) -> String {
 
 /// Whether the diagnosis has a second fit to draw.
 fn changed(d: &Diagnosis) -> bool {
-    d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Ambiguous)
+    d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Partly | Verdict::Ambiguous)
 }
 
 /// The rows that miss, along the variable of their place.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Location, MechanismReport, Verdict};
+use missing_physics::diagnosis::{Diagnosis, Law, Limit, Location, MechanismReport, Verdict};
 
 use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, probability, significant};
@@ -22,7 +22,7 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
         page.entry("what", &line);
     }
     if let Some(law) = &d.law {
-        page.entry("law", &format!("{} ({})", law.formula, law_kind(law.kind)));
+        page.entry("law", &law_sentence(d, law));
         for coefficient in law.coefficients.iter().filter(|_| law.kind != "smooth") {
             page.entry("law", &estimate(coefficient));
         }
@@ -30,9 +30,15 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
     for line in better(d) {
         page.entry("better", &line);
     }
+    for place in d.leftover.iter().take(3) {
+        page.entry("left", &leftover_sentence(d, place));
+    }
     if d.verdict == Verdict::Adequate {
         for noise in &d.noise {
             page.entry("noise", &noise_sentence(d, noise));
+        }
+        for line in limits(d) {
+            page.entry("limits", &line);
         }
     }
     for line in d.undetermined.iter().chain(&d.remarks) {
@@ -71,6 +77,17 @@ pub(super) fn headline(d: &Diagnosis) -> String {
         Verdict::Explained => {
             format!("The simulation does not explain this recording ({p}); {} does.", named(d, &d.chosen))
         }
+        Verdict::Partly => {
+            let sets: Vec<String> =
+                std::iter::once(&d.chosen).chain(&d.confused_with).map(|s| named(d, s)).collect();
+            let share =
+                d.explained_share.map_or_else(String::new, |s| format!(" {:.0} % of", 100.0 * floored(s)));
+            let takes = if sets.len() == 1 { " takes" } else { ", equally well, take" };
+            format!(
+                "The simulation does not explain this recording ({p}); {}{takes} away{share} the misfit, and something smaller is left.",
+                sets.join(" or ")
+            )
+        }
         Verdict::Ambiguous => {
             let sets: Vec<String> =
                 std::iter::once(&d.chosen).chain(&d.confused_with).map(|s| named(d, s)).collect();
@@ -99,10 +116,23 @@ fn named(d: &Diagnosis, set: &[String]) -> String {
     set.iter().map(name).collect::<Vec<_>>().join(" together with ")
 }
 
+/// A share that is not the whole is not said to be the whole.
+fn floored(share: f64) -> f64 {
+    (100.0 * share).floor().min(99.0) / 100.0
+}
+
+/// A law, its kind, and the mechanisms on top of which it stands.
+pub(super) fn law_sentence(d: &Diagnosis, law: &Law) -> String {
+    let beside =
+        if law.beside.is_empty() { String::new() } else { format!(", beside {}", named(d, &law.beside)) };
+    format!("{} ({}{beside})", law.formula, law_kind(law.kind))
+}
+
 /// What kind of law it is, in words.
 pub(super) fn law_kind(kind: &str) -> &str {
     match kind {
         "sparse" => "a few terms",
+        "power" => "another power",
         "periodic" => "an oscillation",
         _ => "a smooth curve without a formula",
     }
@@ -110,10 +140,43 @@ pub(super) fn law_kind(kind: &str) -> &str {
 
 /// Where the baseline misses, in one sentence.
 pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
-    let unit = |name: &str| {
-        let known = d.channels.iter().chain(&d.variables).find(|(n, _)| n == name);
-        known.map(|(_, u)| u.clone()).unwrap_or_default()
+    format!(
+        "{}: measured less simulated is {} {unit} on average, at most {} {unit} ({:.0} sigma, {:.0} % of the misfit)",
+        place_words(d, l),
+        significant(l.mean_residual, 2),
+        significant(l.largest_residual, 2),
+        l.z,
+        100.0 * l.share,
+        unit = unit_of(d, &l.channel),
+    )
+}
+
+/// What the chosen mechanisms leave, in one sentence.
+pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
+    format!(
+        "{}: {} {unit} rms is left, beside white noise of {} {unit}",
+        place_words(d, l),
+        significant(l.rms, 2),
+        significant(l.sigma, 2),
+        unit = unit_of(d, &l.channel),
+    )
+}
+
+/// A size of each mechanism that would have shown, a line each.
+pub(super) fn limits(d: &Diagnosis) -> Vec<String> {
+    let line = |l: &Limit| {
+        format!("{}: {} above {} {} would have shown", l.id, l.parameter, significant(l.upper, 2), l.unit)
     };
+    d.limits.iter().map(|l| line(l).replace("  ", " ")).collect()
+}
+
+fn unit_of(d: &Diagnosis, name: &str) -> String {
+    let known = d.channels.iter().chain(&d.variables).find(|(n, _)| n == name);
+    known.map(|(_, u)| u.clone()).unwrap_or_default()
+}
+
+/// Channel, runs and interval of a place.
+fn place_words(d: &Diagnosis, l: &Location) -> String {
     let total = d.curves.len();
     let runs = match l.runs.len() {
         0 => "no run alone".into(),
@@ -126,21 +189,14 @@ pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
     };
     let interval = match (&l.variable, l.from, l.to) {
         (Some(v), Some(from), Some(to)) => {
-            format!(", {v} from {} to {} {}", significant(from, 3), significant(to, 3), unit(v))
+            let unit = unit_of(d, v);
+            format!(", {v} from {} to {} {unit}", significant(from, 3), significant(to, 3))
                 .trim_end()
                 .to_owned()
         }
         _ => String::new(),
     };
-    format!(
-        "{}, {runs}{interval}: measured less simulated is {} {unit} on average, at most {} {unit} ({:.0} sigma, {:.0} % of the misfit)",
-        l.channel,
-        significant(l.mean_residual, 2),
-        significant(l.largest_residual, 2),
-        l.z,
-        100.0 * l.share,
-        unit = unit(&l.channel),
-    )
+    format!("{}, {runs}{interval}", l.channel)
 }
 
 fn what(d: &Diagnosis) -> Vec<String> {

@@ -2,18 +2,23 @@
 
 use crate::adequacy::test::{self, Adequacy};
 use crate::answer::Answer;
-use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Verdict};
+use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict};
 use crate::engine::begin::{Begun, rough_sigmas};
 use crate::engine::input::{DiagnoseError, Options};
+use crate::estimate::limits::limits;
 use crate::experiment;
 use crate::fit::prediction::predictions;
+use crate::law::found::improves;
 use crate::law::search::find;
 use crate::locate::locations::locate;
 use crate::model::{Experiment, PredictError};
+use crate::noise::rule::NoiseState;
 use crate::observer::{Observer, Progress};
+use crate::problem::Problem;
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::confusion::confusion;
-use crate::selection::held_out::{HeldOut, held_out};
+use crate::selection::held_out::held_out;
+use crate::selection::main_cause::{Judge, MainCause};
 use crate::selection::ranking::{Best, Ranking, clearly};
 use crate::selection::search::search;
 
@@ -60,7 +65,10 @@ impl Course<'_> {
             outliers: &self.begun.outliers,
         };
         if adequacy.p_value > self.options.alpha {
-            return Ok(answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?);
+            let mut diagnosis =
+                answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?;
+            diagnosis.limits = limits(problem, rule, baseline);
+            return Ok(diagnosis);
         }
         let mut ranking = self.compare()?;
         self.tell("adequacy of the best explanation", 0.0)?;
@@ -70,26 +78,36 @@ impl Course<'_> {
         // The chosen set has been selected to fit: only a clear failure speaks against it.
         let fails = |best: &Best| best.p_value <= clearly(self.options.alpha);
         let explained = best.as_ref().filter(|b| !fails(b) && ranking.gains(b.at));
-
-        let ended_with = explained.map_or(baseline, |b| ranking.at(b.at));
-        let mut diagnosis =
-            answer.skeleton(&adequacy, Verdict::Unexplained, ended_with, self.before(&answer)?)?;
-        diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref());
+        let white = rough_sigmas(problem, rule, &baseline.fit);
+        let before = self.before(&answer)?;
+        // Noise that is correlated as long as the runs are is no noise.
+        let sound = explained.filter(|b| !slow(problem, &ranking.at(b.at).fit.noise, &white));
+        let cause = if sound.is_some() {
+            None
+        } else {
+            self.tell("what the closest explanation leaves", 0.0)?;
+            Judge::new(problem, rule, ranking.all(), &white, |_| true).main_cause()
+        };
+        let explained = if cause.is_some() { None } else { explained };
+        let mut diagnosis = match (cause, explained) {
+            (Some(cause), _) => self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?,
+            (None, Some(chosen)) => self.explained(&answer, &adequacy, before, &ranking, chosen, &white)?,
+            (None, None) => {
+                let mut diagnosis = answer.skeleton(&adequacy, Verdict::Unexplained, baseline, before)?;
+                diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref());
+                if let Some(closest) = &best {
+                    diagnosis.remarks.push(answer.closest(&ranking, closest, fails(closest)));
+                }
+                self.unexplained(&mut diagnosis, &answer, &ranking, best.as_ref())?;
+                diagnosis
+            }
+        };
         diagnosis.sets = answer.sets(&ranking, best.as_ref());
         let sigma = match explained {
-            Some(_) => ended_with.fit.noise.sigma.clone(),
-            None => rough_sigmas(problem, rule, &baseline.fit),
+            Some(chosen) => ranking.at(chosen.at).fit.noise.sigma.clone(),
+            None => white,
         };
         diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &sigma)?;
-        if let Some(chosen) = explained {
-            diagnosis.final_p_value = Some(chosen.p_value);
-            self.explained(&mut diagnosis, &answer, &ranking, chosen)?;
-        } else {
-            if let Some(closest) = &best {
-                diagnosis.remarks.push(answer.closest(&ranking, closest, fails(closest)));
-            }
-            self.unexplained(&mut diagnosis, &answer, ranking.base())?;
-        }
         self.tell("done", 1.0)?;
         Ok(diagnosis)
     }
@@ -112,28 +130,67 @@ impl Course<'_> {
         Ok(Ranking::new(all, held_out(problem, baseline)?))
     }
 
+    /// A set takes away nearly all of the misfit, and something is left.
+    fn partly(
+        &self,
+        answer: &Answer<'_>,
+        adequacy: &Adequacy,
+        before: Vec<ChannelFit>,
+        ranking: &Ranking,
+        cause: &MainCause,
+        white: &[f64],
+    ) -> Result<Diagnosis, DiagnoseError> {
+        let problem = &self.begun.problem;
+        let chosen = &cause.chosen.candidate;
+        let mut diagnosis = answer.skeleton(adequacy, Verdict::Partly, chosen, before)?;
+        diagnosis.mechanisms = answer.mechanisms_beside_a_leftover(ranking, cause);
+        diagnosis.chosen = answer.ids(&chosen.set);
+        diagnosis.explained_share = Some(cause.chosen.share);
+        diagnosis.leftover = locate(problem, &chosen.selection, &chosen.fit, white)?;
+        let after = predictions(problem, &chosen.fit)?;
+        diagnosis.after = answer.errors_of(&after, &held_out(problem, &cause.chosen.plain)?);
+        draw(&mut diagnosis, &after);
+        diagnosis.confused_with = cause.rivals.iter().map(|r| answer.ids(&r.candidate.set)).collect();
+        if !cause.rivals.is_empty() {
+            let sets: Vec<&Candidate> =
+                std::iter::once(chosen).chain(cause.rivals.iter().map(|r| &r.candidate)).collect();
+            let names: Vec<String> = sets.iter().map(|c| answer.names(&c.set)).collect();
+            let line = format!("{} cannot be told apart beside what they leave", listed(&names));
+            diagnosis.undetermined.push(line);
+            self.tell("choosing the next experiment", 0.0)?;
+            diagnosis.next_experiment = experiment::best(problem, &sets, self.experiments);
+        }
+        Ok(diagnosis)
+    }
+
     /// A set explains the data: does another as well, and what would tell them apart?
     fn explained(
         &self,
-        diagnosis: &mut Diagnosis,
         answer: &Answer<'_>,
+        adequacy: &Adequacy,
+        before: Vec<ChannelFit>,
         ranking: &Ranking,
         best: &Best,
-    ) -> Result<(), DiagnoseError> {
-        let problem = &self.begun.problem;
+        white: &[f64],
+    ) -> Result<Diagnosis, DiagnoseError> {
+        let Begun { problem, rule, .. } = self.begun;
         let chosen = ranking.at(best.at);
+        let mut diagnosis = answer.skeleton(adequacy, Verdict::Explained, chosen, before)?;
+        diagnosis.mechanisms = answer.mechanisms(ranking, Some(best));
+        diagnosis.final_p_value = Some(best.p_value);
         diagnosis.chosen = answer.ids(&chosen.set);
+        let judge = Judge::new(problem, rule, ranking.all(), white, |c| c.set == chosen.set);
+        diagnosis.explained_share = judge.share(&chosen.set);
         let after = predictions(problem, &chosen.fit)?;
         if let Some(score) = ranking.score_of(&chosen.set) {
             diagnosis.after = answer.errors_of(&after, score);
         }
-        draw(diagnosis, &after);
+        draw(&mut diagnosis, &after);
         diagnosis.undetermined.extend(answer.open_numbers(chosen));
         self.tell("telling the rivals apart", 0.0)?;
         let rivals = ranking.rivals(best);
         if rivals.len() == 1 {
-            diagnosis.verdict = Verdict::Explained;
-            return Ok(());
+            return Ok(diagnosis);
         }
         diagnosis.verdict = Verdict::Ambiguous;
         let mut sets: Vec<Vec<String>> = rivals.iter().map(|c| answer.ids(&c.set)).collect();
@@ -153,26 +210,45 @@ impl Course<'_> {
         if diagnosis.next_experiment.is_none() {
             diagnosis.undetermined.push("no experiment in the rig's range would separate them".into());
         }
-        Ok(())
+        Ok(diagnosis)
     }
 
-    /// Nothing on the list explains the data: is there a law in what is left?
+    /// Nothing on the list explains the data: is there a law in what is left, beside the best set where that predicts unseen data better
+    /// than the baseline?
     fn unexplained(
         &self,
         diagnosis: &mut Diagnosis,
         answer: &Answer<'_>,
-        base: &HeldOut,
+        ranking: &Ranking,
+        best: Option<&Best>,
     ) -> Result<(), DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell("looking for a law in the residual", 0.0)?;
-        if let Some(found) = find(problem, &rule.competing(), baseline, base)? {
+        let repair =
+            best.map(|b| ranking.at(b.at)).zip(best.and_then(|b| ranking.score_of(&ranking.at(b.at).set)));
+        let repair = repair.filter(|(_, score)| improves(ranking.base(), score));
+        let (start, seen) = repair.unwrap_or((baseline, ranking.base()));
+        if let Some(found) = find(problem, &rule.competing(), start, seen)? {
             diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);
             draw(diagnosis, &found.predictions);
             diagnosis.noise = answer.noise(&found.fit);
-            diagnosis.law = Some(found.law);
+            diagnosis.law = Some(Law { beside: answer.ids(&start.set), ..found.law });
         }
         Ok(())
     }
+}
+
+/// Whether a channel's noise is a slow error: correlated over a good part of a run, and large beside the white noise.
+fn slow(problem: &Problem<'_>, noise: &NoiseState, white: &[f64]) -> bool {
+    /// Part of a run over which noise of an instrument may be correlated.
+    const LONG: f64 = 0.25;
+    /// Times the white noise.
+    const LARGE: f64 = 3.0;
+    (0..problem.channels()).any(|c| {
+        let shape = problem.family.shape(noise.shape[c]);
+        let rows = problem.count(c) as f64 / problem.rows.len().max(1) as f64;
+        shape.correlated > 0.0 && shape.length_steps > LONG * rows && noise.sigma[c] > LARGE * white[c]
+    })
 }
 
 /// Puts what a fit predicts into the curves.

@@ -78,15 +78,26 @@ pub(crate) fn normal_of_run(
     shared: &[f64],
     nuisance: &[f64],
 ) -> Result<DMatrix<f64>, PredictError> {
-    let mut gram = gram(&whitened_columns(problem, selection, noise, run, shared, nuisance)?);
-    let last = gram.nrows() - 1;
+    let mut normal = gram(&whitened_columns(problem, selection, noise, run, shared, nuisance)?);
+    add_nuisance_prior(problem, selection, &mut normal, run, nuisance);
+    Ok(normal)
+}
+
+/// Adds the prior of a run's nuisance parameters to its normal equations.
+pub(crate) fn add_nuisance_prior(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    normal: &mut DMatrix<f64>,
+    run: usize,
+    nuisance: &[f64],
+) {
+    let last = normal.nrows() - 1;
     for (i, &slot) in selection.nuisance.iter().enumerate() {
         let precision = 1.0 / nuisance_prior_width(problem, selection, i).powi(2);
         let departure = problem.nuisance_start[run][slot] - nuisance[slot];
-        gram[(i, i)] += precision;
-        gram[(i, last)] += precision * departure;
-        gram[(last, i)] += precision * departure;
-        gram[(last, last)] += precision * departure * departure;
+        normal[(i, i)] += precision;
+        normal[(i, last)] += precision * departure;
+        normal[(last, i)] += precision * departure;
+        normal[(last, last)] += precision * departure * departure;
     }
-    Ok(gram)
 }

@@ -16,17 +16,17 @@ use crate::selection::held_out::{HeldOut, held_out};
 pub(crate) fn extended(
     problem: &Problem<'_>,
     rule: &NoiseRule,
-    baseline: &Candidate,
+    start: &Candidate,
     seen: &HeldOut,
     model: &Extended<'_>,
 ) -> Result<Option<Found>, PredictError> {
     let wide = Problem::new(model, problem.recording.clone());
-    let mut near = baseline.fit.clone();
+    let mut near = start.fit.clone();
     near.shared.extend_from_slice(&wide.shared.start[model.inner_shared..]);
     for nuisance in &mut near.nuisance {
         nuisance.extend_from_slice(&wide.nuisance.start[model.inner_nuisance..]);
     }
-    let Ok(fitted) = candidate(&wide, rule, &[], &[], &near, &[]) else { return Ok(None) };
+    let Ok(fitted) = candidate(&wide, rule, &start.set, &[], &near, &[]) else { return Ok(None) };
     let Ok(score) = held_out(&wide, &fitted) else { return Ok(None) };
     if !improves(seen, &score) {
         return Ok(None);
@@ -42,6 +42,9 @@ pub(crate) fn extended(
             Added::Periodic => periodic(problem, model, &fitted.fit, coefficients),
             Added::Smooth { channel, variable, centre, half_width } => {
                 smooth(problem, *channel, *variable, [*centre, *half_width], coefficients)
+            }
+            Added::Power { channel, variable, largest } => {
+                power(problem, *channel, *variable, *largest, coefficients)
             }
         }
     };
@@ -75,9 +78,32 @@ fn periodic(problem: &Problem<'_>, model: &Extended<'_>, fit: &Fit, coefficients
             amplitudes.join(", ")
         ),
         kind: "periodic",
+        beside: Vec::new(),
         adds_to: ("measured".to_owned(), String::new()),
         coefficients: coefficients.into_iter().map(named).collect(),
         variables: vec![(along, unit)],
+        heldout_rmse: Vec::new(),
+        heldout_log_score_gain: 0.0,
+    }
+}
+
+/// A power in words.
+fn power(
+    problem: &Problem<'_>,
+    channel: usize,
+    variable: usize,
+    largest: f64,
+    coefficients: Vec<Estimate>,
+) -> Law {
+    let (quantity, v) = (&problem.recording.channels[channel], &problem.recording.variables[variable]);
+    let exponent = coefficients.first().map_or(f64::NAN, |e| e.value);
+    Law {
+        formula: format!("{} *= ({} / {largest:.4e} {})^{exponent:.3}", quantity.name, v.name, v.unit),
+        kind: "power",
+        beside: Vec::new(),
+        adds_to: (quantity.name.clone(), quantity.unit.clone()),
+        variables: vec![(v.name.clone(), v.unit.clone())],
+        coefficients,
         heldout_rmse: Vec::new(),
         heldout_log_score_gain: 0.0,
     }
@@ -98,6 +124,7 @@ fn smooth(
             quantity.name, v.name, v.name
         ),
         kind: "smooth",
+        beside: Vec::new(),
         adds_to: (quantity.name.clone(), quantity.unit.clone()),
         variables: vec![(v.name.clone(), v.unit.clone())],
         coefficients,

@@ -27,6 +27,8 @@ pub(crate) enum Added {
     Periodic,
     /// A polynomial of a variable (scaled to [-1, 1] by centre and half-width) on one channel.
     Smooth { channel: usize, variable: usize, centre: f64, half_width: f64 },
+    /// A power of a variable (over its largest value) by which a channel is multiplied: another exponent than the model has.
+    Power { channel: usize, variable: usize, largest: f64 },
 }
 
 impl<'a> Extended<'a> {
@@ -93,6 +95,29 @@ impl<'a> Extended<'a> {
         Ok(Some(Self::new(problem, parameters, Added::Periodic)))
     }
 
+    /// A power of a variable by which a channel is multiplied; none where the variable is not positive nearly everywhere, or spans less
+    /// than a factor of three.
+    pub(crate) fn power(problem: &Problem<'a>, channel: usize, variable: usize) -> Option<Self> {
+        let mut values: Vec<f64> =
+            problem.recording.runs.iter().flat_map(|r| r.inputs[variable].iter().copied()).collect();
+        values.sort_by(f64::total_cmp);
+        let largest = *values.last()?;
+        let low = values[values.len() / 10];
+        if !(low > 0.0 && largest.is_finite() && largest > 3.0 * low) {
+            return None;
+        }
+        let parameters = vec![Parameter {
+            name: "exponent".into(),
+            unit: String::new(),
+            scope: Scope::Shared,
+            start: 0.0,
+            lower: -3.0,
+            upper: 3.0,
+            scale: 0.3,
+        }];
+        Some(Self::new(problem, parameters, Added::Power { channel, variable, largest }))
+    }
+
     /// A smooth curve over a variable on one channel; none where the variable does not vary.
     pub(crate) fn smooth(problem: &Problem<'a>, channel: usize, variable: usize) -> Option<Self> {
         let (low, high) = problem
@@ -148,6 +173,12 @@ impl Model for Extended<'_> {
                         let at = self.inner_nuisance + 2 * c;
                         out[c * n + i] += nuisance[at] * cos + nuisance[at + 1] * sin;
                     }
+                }
+            }
+            Added::Power { channel, variable, largest } => {
+                let exponent = shared[self.inner_shared];
+                for (i, v) in run.inputs[*variable].iter().enumerate().filter(|(_, v)| **v > 0.0) {
+                    out[channel * n + i] *= (v / largest).powf(exponent);
                 }
             }
             Added::Smooth { channel, variable, centre, half_width } => {

@@ -5,6 +5,6 @@
 
 mod describe;
 mod extended;
-mod found;
+pub(crate) mod found;
 pub(crate) mod search;
 mod sparse;

@@ -10,11 +10,11 @@ use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
 
-/// Looks for a law beyond `baseline`.
+/// Looks for a law beyond the mechanisms of `start`, whose prediction of unseen data is `seen`.
 pub(crate) fn find(
     problem: &Problem<'_>,
     rule: &NoiseRule,
-    baseline: &Candidate,
+    start: &Candidate,
     seen: &HeldOut,
 ) -> Result<Option<Found>, PredictError> {
     let mut best: Option<Found> = None;
@@ -26,15 +26,23 @@ pub(crate) fn find(
             best = Some(found);
         }
     };
-    consider(sparse(problem, rule, baseline, seen)?);
-    if let Some(periodic) = Extended::periodic(problem, &baseline.fit)? {
-        consider(extended(problem, rule, baseline, seen, &periodic)?);
+    consider(sparse(problem, rule, start, seen)?);
+    let places = || {
+        let variables = 0..problem.recording.variables.len();
+        (0..problem.channels())
+            .flat_map(move |channel| variables.clone().map(move |variable| (channel, variable)))
+    };
+    for (channel, variable) in places() {
+        if let Some(power) = Extended::power(problem, channel, variable) {
+            consider(extended(problem, rule, start, seen, &power)?);
+        }
     }
-    for channel in 0..problem.channels() {
-        for variable in 0..problem.recording.variables.len() {
-            if let Some(smooth) = Extended::smooth(problem, channel, variable) {
-                consider(extended(problem, rule, baseline, seen, &smooth)?);
-            }
+    if let Some(periodic) = Extended::periodic(problem, &start.fit)? {
+        consider(extended(problem, rule, start, seen, &periodic)?);
+    }
+    for (channel, variable) in places() {
+        if let Some(smooth) = Extended::smooth(problem, channel, variable) {
+            consider(extended(problem, rule, start, seen, &smooth)?);
         }
     }
     Ok(best)

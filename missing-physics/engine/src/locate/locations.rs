@@ -138,7 +138,9 @@ fn place(
         runs,
         share: 0.0,
         mean_residual: mean,
+        rms: (residuals.iter().map(|(_, v)| v * v).sum::<f64>() / residuals.len().max(1) as f64).sqrt(),
         largest_residual: largest,
+        sigma: sigma[channel],
         z: gain.sqrt(),
     }
 }

@@ -44,6 +44,13 @@ impl NoiseRule {
         shape.length_steps <= self.longest
     }
 
+    /// The rule beside a leftover: what is known of a channel's noise is only the least that there is.
+    pub(crate) fn beside_a_leftover(&self) -> Self {
+        let floor =
+            self.fixed_sigma.iter().zip(&self.floor).map(|(fixed, floor)| fixed.unwrap_or(*floor)).collect();
+        Self { fixed_sigma: vec![None; self.floor.len()], floor, ..self.clone() }
+    }
+
     /// The rule where mechanisms compete.
     pub(crate) fn competing(&self) -> Self {
         Self { against_colour: 6.0, ..self.clone() }

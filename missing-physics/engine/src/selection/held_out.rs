@@ -59,10 +59,8 @@ impl LeavingOut<'_> {
         let runs = problem.recording.runs.len();
         let folds = runs.min(FOLDS);
         let part = |ids: Vec<usize>| -> (Problem<'_>, Vec<Vec<f64>>) {
-            let mut recording = problem.recording.clone();
-            recording.runs = ids.iter().map(|&r| problem.recording.runs[r].clone()).collect();
             let nuisance = ids.iter().map(|&r| candidate.fit.nuisance[r].clone()).collect();
-            (problem.with(recording), nuisance)
+            (problem.of_runs(&ids), nuisance)
         };
         for fold in 0..folds {
             let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);

@@ -57,6 +57,10 @@ impl Ranking {
         Self { all, physical, base, scores: Vec::new() }
     }
 
+    pub(crate) fn all(&self) -> &[Candidate] {
+        &self.all
+    }
+
     pub(crate) fn at(&self, at: usize) -> &Candidate {
         &self.all[at]
     }

@@ -63,7 +63,7 @@ impl Curves {
     }
 
     /// Indices of the variables that count for a channel.
-    fn of(&self, channel: usize) -> Vec<usize> {
+    pub(crate) fn of(&self, channel: usize) -> Vec<usize> {
         let inputs = self.names.len();
         (0..inputs).chain([inputs + channel]).filter(|&v| self.scaled[v].is_some()).collect()
     }
@@ -87,17 +87,35 @@ impl Curves {
     /// Fills in Legendre polynomials of degrees 1 to [`DEGREE`] of the channel's variables.
     pub(super) fn fill(&self, problem: &Problem<'_>, run: usize, channel: usize, columns: &mut [Vec<f64>]) {
         for (k, v) in self.of(channel).into_iter().enumerate() {
-            let Some(values) = &self.scaled[v] else { continue };
             let first = (self.offset(channel) + k) * DEGREE;
-            for (row, &i) in problem.rows[run].valid[channel].iter().enumerate() {
-                let x = values[run][i];
-                let (mut before, mut now) = (1.0, x);
-                for degree in 1..=DEGREE {
-                    columns[first + degree - 1][row] = now;
-                    let d = degree as f64;
-                    (before, now) = (now, ((2.0 * d + 1.0) * x * now - d * before) / (d + 1.0));
-                }
+            let polynomials = self.polynomials(problem, run, channel, v, DEGREE);
+            for (column, values) in columns[first..].iter_mut().zip(polynomials.into_iter().skip(1)) {
+                *column = values;
             }
         }
+    }
+
+    /// Legendre polynomials of degrees 0 to `degree` of a variable at a channel's measured rows.
+    pub(crate) fn polynomials(
+        &self,
+        problem: &Problem<'_>,
+        run: usize,
+        channel: usize,
+        variable: usize,
+        degree: usize,
+    ) -> Vec<Vec<f64>> {
+        let valid = &problem.rows[run].valid[channel];
+        let Some(values) = &self.scaled[variable] else { return vec![vec![0.0; valid.len()]; degree + 1] };
+        let x: Vec<f64> = valid.iter().map(|&i| values[run][i]).collect();
+        let mut columns = vec![vec![1.0; x.len()], x.clone()];
+        for d in 1..degree {
+            let n = d as f64;
+            let next = |((x, now), before): ((&f64, &f64), &f64)| {
+                ((2.0 * n + 1.0) * x * now - n * before) / (n + 1.0)
+            };
+            columns.push(x.iter().zip(&columns[d]).zip(&columns[d - 1]).map(next).collect());
+        }
+        columns.truncate(degree + 1);
+        columns
     }
 }

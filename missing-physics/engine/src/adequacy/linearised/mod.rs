@@ -6,7 +6,7 @@
 //! which is what makes a bootstrap of the *whole* fit affordable.
 
 mod build;
-mod curves;
+pub(crate) mod curves;
 mod outliers;
 mod plane;
 mod read;

@@ -1,0 +1,235 @@
+//! The mechanisms that take away nearly all of the misfit where something else is left over.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::adequacy::linearised::curves::Curves;
+use crate::fit::gauss_newton::solve;
+use crate::fit::optimum::{Fit, covariance};
+use crate::leftover::fit::{given, with_leftover};
+use crate::leftover::process::Process;
+use crate::model::PredictError;
+use crate::noise::rule::{NoiseRule, NoiseState};
+use crate::problem::{Problem, Selection};
+use crate::selection::candidate::Candidate;
+use crate::selection::evidence::evidence;
+use crate::selection::share::unseen_misfit;
+
+/// The part of the squared misfit beyond the noise that a main cause takes away on unseen data.
+const NEARLY_ALL: f64 = 0.9;
+/// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
+const NEEDED: f64 = 5.0;
+/// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
+/// be imitating the leftover.
+const SMALLER: f64 = 3.0;
+/// A rival takes away at least this part of the misfit.
+const RIVAL_SHARE: f64 = 0.85;
+/// A set that leaves less than so many times what the chosen one leaves is not ruled out by that: with eight directions open to a smooth
+/// leftover, its log Bayes factor against one that is smaller by this factor is [`NEEDED`].
+const RIVAL_MISFIT: f64 = 3.5;
+/// Directions among smooth functions that a leftover may take.
+const DIRECTIONS: f64 = 6.0;
+/// Rivals that are said.
+const MOST_RIVALS: usize = 6;
+
+/// A set of mechanisms, fitted with a leftover in the model.
+pub(crate) struct Judged {
+    pub(crate) candidate: Candidate,
+    /// The same set fitted by plain least squares.
+    pub(crate) plain: Candidate,
+    process: Process,
+    /// The part of the squared misfit that it takes away on unseen data.
+    pub(crate) share: f64,
+    misfit: f64,
+}
+
+/// The main cause, and others that do as well.
+pub(crate) struct MainCause {
+    pub(crate) chosen: Judged,
+    pub(crate) rivals: Vec<Judged>,
+}
+
+/// Candidates, judged by what they leave.
+pub(crate) struct Judge<'a> {
+    problem: &'a Problem<'a>,
+    rule: NoiseRule,
+    all: &'a [Candidate],
+    /// By candidate: the plain least-squares fit, and the misfit that it leaves of unseen data.
+    plain: Vec<Option<(Fit, f64)>>,
+    /// What the baseline leaves.
+    base: f64,
+}
+
+impl<'a> Judge<'a> {
+    /// Fits the wanted candidates and the baseline by plain least squares with white noise of the given sigmas.
+    pub(crate) fn new(
+        problem: &'a Problem<'a>,
+        rule: &NoiseRule,
+        all: &'a [Candidate],
+        sigma: &[f64],
+        wanted: impl Fn(&Candidate) -> bool + Sync,
+    ) -> Self {
+        let white = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
+        let plain = |c: &Candidate| -> Option<(Fit, f64)> {
+            (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
+            let fit = solve(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
+            let misfit = unseen_misfit(problem, &c.selection, &fit, &white).ok()?;
+            Some((fit, misfit))
+        };
+        let plain: Vec<Option<(Fit, f64)>> = all.par_iter().map(plain).collect();
+        let at = all.iter().position(|c| c.set.is_empty());
+        let base = at.and_then(|i| plain[i].as_ref()).map_or(0.0, |p| p.1);
+        Self { problem, rule: rule.beside_a_leftover(), all, plain, base }
+    }
+
+    /// The part of the squared misfit beyond the noise that a set takes away on unseen data.
+    pub(crate) fn share(&self, set: &[usize]) -> Option<f64> {
+        let misfit = self.misfit(set)?;
+        (self.base > 0.0).then(|| 1.0 - misfit / self.base)
+    }
+
+    fn misfit(&self, set: &[usize]) -> Option<f64> {
+        let at = self.all.iter().position(|c| c.set == set)?;
+        self.plain[at].as_ref().map(|p| p.1)
+    }
+
+    /// The smallest set that takes away nearly all and is needed as a whole; larger ones only where they take away most of what that leaves.
+    pub(crate) fn main_cause(&self) -> Option<MainCause> {
+        let mut found: Option<MainCause> = None;
+        for size in 1..=self.all.iter().map(|c| c.set.len()).max()? {
+            let limit = match &found {
+                None => (1.0 - NEARLY_ALL) * self.base,
+                Some(smaller) => smaller.chosen.misfit / SMALLER,
+            };
+            let beyond = |c: &Candidate| {
+                found.as_ref().is_none_or(|f| f.chosen.candidate.set.iter().all(|m| c.set.contains(m)))
+            };
+            let wanted: Vec<usize> = (0..self.all.len())
+                .filter(|&i| self.all[i].set.len() == size && beyond(&self.all[i]))
+                .filter(|&i| self.plain[i].as_ref().is_some_and(|p| p.1 <= limit) && self.each_helps(i))
+                .collect();
+            let needed = |i: usize| self.judged(i).filter(|j| self.needed(i, j) && self.beats_its_parts(j));
+            let mut judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
+            judged.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
+            if judged.is_empty() {
+                if found.is_some() {
+                    break;
+                }
+                continue;
+            }
+            let chosen = judged.remove(0);
+            let rivals = self.rivals(&chosen);
+            found = Some(MainCause { chosen, rivals });
+        }
+        found
+    }
+
+    /// Whether each member of a set takes away most of what is left without it.
+    fn each_helps(&self, at: usize) -> bool {
+        let set = &self.all[at].set;
+        let Some((_, left)) = &self.plain[at] else { return false };
+        set.len() == 1
+            || set.iter().all(|m| {
+                let without: Vec<usize> = set.iter().copied().filter(|o| o != m).collect();
+                self.misfit(&without).is_none_or(|misfit| misfit >= SMALLER * left)
+            })
+    }
+
+    /// A candidate fitted with a leftover; none where it is no explanation then.
+    fn judged(&self, at: usize) -> Option<Judged> {
+        let (plain, misfit) = self.plain[at].as_ref()?;
+        let of = &self.all[at];
+        let (fit, process) = with_leftover(self.problem, &self.rule, &of.selection, plain).ok()?;
+        let (mut worth, ruled_out) = evidence(self.problem, &of.set, &[], &of.selection, &fit);
+        worth += process.log_prior(self.problem);
+        let sound = worth.is_finite() && ruled_out.is_none();
+        let fit = self.widened(&of.selection, plain, fit);
+        let candidate =
+            Candidate { fit, alternative_modes: Vec::new(), evidence: worth, ruled_out, ..of.clone() };
+        let plain = Candidate { fit: plain.clone(), alternative_modes: Vec::new(), ..of.clone() };
+        sound.then(|| Judged { candidate, plain, process, share: 1.0 - misfit / self.base, misfit: *misfit })
+    }
+
+    /// A fit with errors that allow for a leftover along the parameters' own effect, where no residual shows it: of a leftover that has
+    /// [`DIRECTIONS`] directions open, that one has its share of the sum of squares.
+    fn widened(&self, selection: &Selection, plain: &Fit, fit: Fit) -> Fit {
+        let problem = self.problem;
+        let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+        let fitted = selection.shared.len() + selection.nuisance.len() * problem.rows.len();
+        let beyond = (plain.chi2 - rows.saturating_sub(fitted) as f64).max(0.0);
+        let white = covariance(&plain.information);
+        let mut wide = covariance(&fit.information);
+        let n = wide.nrows();
+        let factors: Vec<f64> = (0..n)
+            .map(|i| ((1.0 + beyond / DIRECTIONS) * white[(i, i)] / wide[(i, i)]).max(1.0).sqrt())
+            .collect();
+        if factors.iter().any(|f| !f.is_finite()) {
+            return fit;
+        }
+        wide = DMatrix::from_fn(n, n, |i, j| factors[i] * factors[j] * wide[(i, j)]);
+        match wide.cholesky().map(|factor| factor.inverse()) {
+            Some(information) => Fit { information, ..fit },
+            None => fit,
+        }
+    }
+
+    /// Whether each member is needed beside the leftover that the whole set has: a leftover that may be as large as what the member does
+    /// would stand in for it.
+    fn needed(&self, at: usize, judged: &Judged) -> bool {
+        let whole = &self.all[at];
+        let Ok(curves) = Curves::new(self.problem, &judged.candidate.fit) else { return false };
+        let with = judged.candidate.evidence - judged.process.log_prior(self.problem);
+        whole.set.iter().all(|m| {
+            let set: Vec<usize> = whole.set.iter().copied().filter(|o| o != m).collect();
+            let near = self.all.iter().position(|c| c.set == set).and_then(|i| self.plain[i].as_ref());
+            let Some((near, _)) = near else { return true };
+            let selection = self.problem.select(&set, &[]);
+            let without = || -> Result<f64, PredictError> {
+                let fit = given(self.problem, &selection, &curves, &judged.process, near)?;
+                Ok(evidence(self.problem, &set, &[], &selection, &fit).0)
+            };
+            without().is_ok_and(|without| with > without + NEEDED)
+        })
+    }
+
+    /// Whether a set of several is likelier than it is without any one member and with a leftover in that one's place.
+    fn beats_its_parts(&self, judged: &Judged) -> bool {
+        let set = &judged.candidate.set;
+        set.len() == 1
+            || set.iter().all(|m| {
+                let part = |c: &Candidate| {
+                    c.set.len() + 1 == set.len()
+                        && !c.set.contains(m)
+                        && c.set.iter().all(|o| set.contains(o))
+                };
+                let without = self.all.iter().position(part).and_then(|i| self.judged(i));
+                without.is_none_or(|w| judged.candidate.evidence > w.candidate.evidence + NEEDED)
+            })
+    }
+
+    /// Sets that lack a member of the chosen one and do as well with a leftover of their own.
+    fn rivals(&self, chosen: &Judged) -> Vec<Judged> {
+        let set = &chosen.candidate.set;
+        let enough = (1.0 - RIVAL_SHARE) * self.base;
+        let other = |&i: &usize| {
+            let rival = &self.all[i].set;
+            rival.len() <= set.len()
+                && !rival.is_empty()
+                && !rival.iter().all(|m| set.contains(m))
+                && self.plain[i].as_ref().is_some_and(|p| p.1 <= enough)
+                && self.each_helps(i)
+        };
+        let others: Vec<usize> = (0..self.all.len()).filter(other).collect();
+        let mut rivals: Vec<Judged> = others
+            .into_par_iter()
+            .filter_map(|i| self.judged(i))
+            .filter(|j| {
+                j.candidate.evidence > chosen.candidate.evidence - NEEDED
+                    || j.misfit < RIVAL_MISFIT * chosen.misfit
+            })
+            .collect();
+        rivals.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
+        rivals.truncate(MOST_RIVALS);
+        rivals
+    }
+}

@@ -1,0 +1,60 @@
+//! What part of the misfit a set of mechanisms takes away on data that it has not seen.
+
+use crate::fit::gauss_newton::solve;
+use crate::fit::optimum::Fit;
+use crate::fit::prediction::residuals;
+use crate::model::PredictError;
+use crate::noise::rule::NoiseState;
+use crate::problem::{Problem, Selection};
+
+/// Groups in which runs, or the rows of a single run, are left out.
+const FOLDS: usize = 5;
+
+/// Sum of squares, in units of white noise, by which unseen data miss a fit beyond that noise.
+///
+/// Each run (or each of five groups of runs) is left out in turn, its nuisance parameters then fitted to it; of a single run, each fifth of
+/// its rows. Fits are plain least squares: a slow misfit is not taken for noise.
+pub(crate) fn unseen_misfit(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    fit: &Fit,
+    white: &NoiseState,
+) -> Result<f64, PredictError> {
+    let mut misfit = 0.0;
+    let mut add = |residual: &[Vec<Vec<f64>>]| {
+        for (sigma, column) in residual.iter().flat_map(|run| white.sigma.iter().zip(run)) {
+            misfit += column.iter().map(|v| (v / sigma).powi(2) - 1.0).sum::<f64>();
+        }
+    };
+    let runs = problem.recording.runs.len();
+    if runs > 1 {
+        let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+        let folds = runs.min(FOLDS);
+        for fold in 0..folds {
+            let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);
+            let nuisance =
+                |ids: &[usize]| -> Vec<Vec<f64>> { ids.iter().map(|&r| fit.nuisance[r].clone()).collect() };
+            let seen = problem.of_runs(&train);
+            let trained = solve(&seen, selection, white, &fit.shared, &nuisance(&train))?;
+            let unseen = problem.of_runs(&test);
+            let tested = solve(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
+            add(&residuals(&unseen, &tested)?);
+        }
+        return Ok(misfit.max(0.0));
+    }
+    let rows = problem.recording.runs[0].len();
+    for fold in 0..FOLDS {
+        let block = rows * fold / FOLDS..rows * (fold + 1) / FOLDS;
+        let without = |inside: bool| {
+            let mut recording = problem.recording.clone();
+            for column in &mut recording.runs[0].outputs {
+                let rows = column.iter_mut().enumerate().filter(|(i, _)| block.contains(i) == inside);
+                rows.for_each(|(_, v)| *v = f64::NAN);
+            }
+            problem.with(recording)
+        };
+        let trained = solve(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
+        add(&residuals(&without(false), &trained)?);
+    }
+    Ok(misfit.max(0.0))
+}
