@@ -65,6 +65,9 @@ enum Command {
         /// Worlds of each domain.
         #[arg(long, default_value_t = 100)]
         worlds: usize,
+        /// One kind of worlds (nothing, one, two, unlisted, leftover, imitated); all in turns without it.
+        #[arg(long)]
+        kind: Option<String>,
         /// Seed of the worlds.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -134,8 +137,8 @@ fn run(command: Command) -> Result<String, CommandError> {
             commands::diagnose(&arguments, &Bar::new())
         }
         Command::Predict { model, folder, csv } => commands::predict(&model, &folder, csv.as_deref()),
-        Command::Prove { domain, worlds, seed, out, threads } => {
-            Ok(prove(&ProveArguments { domain, worlds, seed, folder: out, threads }, &Bar::new())?)
+        Command::Prove { domain, worlds, kind, seed, out, threads } => {
+            Ok(prove(&ProveArguments { domain, worlds, kind, seed, folder: out, threads }, &Bar::new())?)
         }
         Command::Domains => Ok(commands::domains()),
         Command::Check { folder } => commands::check(&folder),

@@ -253,6 +253,94 @@ fn the_author_s_times_of_the_same_ball() {
     assert!(end_after < end_before, "{end_before} {end_after}");
 }
 
+/// Simulated recordings with an effect of the list and a smaller one beside it that is not: the former is named, the latter is said. With
+/// an effect that is not on the list, of which the best of the list takes away four fifths, nothing is named.
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_leftovers_are_said_beside_the_main_cause() {
+    let (mut leftovers, mut imitated, mut named) = (0, 0, Vec::new());
+    for domain in ["indentation", "liquid-tilt", "slosh", "trajectory", "dough-roll"] {
+        for entry in std::fs::read_dir(shared("practice/leftover").join(domain)).unwrap() {
+            let folder = entry.unwrap().path();
+            let key: Value =
+                serde_json::from_str(&std::fs::read_to_string(folder.join("key.json")).unwrap()).unwrap();
+            let answer = answer(&folder, "2");
+            if key["kind"] == "leftover" {
+                leftovers += 1;
+                let truth: Vec<String> =
+                    key["mechanisms"].as_array().unwrap().iter().map(|m| text(&m["id"])).collect();
+                assert_eq!(answer["verdict"], "partly", "{}", folder.display());
+                assert_eq!(ids(&answer["chosen"]), truth, "{}", folder.display());
+                assert!(answer["explained_share"].as_f64().unwrap() >= 0.9);
+                assert!(!answer["leftover"].as_array().unwrap().is_empty());
+            } else {
+                imitated += 1;
+                assert_eq!(answer["verdict"], "unexplained", "{}", folder.display());
+                named.extend(ids(&answer["chosen"]));
+            }
+        }
+    }
+    assert!(leftovers >= 9 && imitated >= 5 && named.is_empty(), "{leftovers} {imitated} {named:?}");
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// The sets that an answer names, in order.
+fn named_sets(answer: &Value) -> Vec<Vec<String>> {
+    let mut sets: Vec<Vec<String>> =
+        [&answer["chosen"]].into_iter().chain(answer["confused_with"].as_array().unwrap()).map(ids).collect();
+    sets.retain(|set| !set.is_empty());
+    sets.sort();
+    sets
+}
+
+/// A cell that is held relaxes, and something is left beside one time of relaxation.
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_measured_cell_relaxes() {
+    let answer = answer(&shared("recordings/real/indentation/afm-cell-relaxation"), "0");
+    assert_eq!(
+        (&answer["verdict"], named_sets(&answer)),
+        (&Value::from("partly"), vec![vec!["viscoelasticity".into()]])
+    );
+    let parameters = answer["mechanisms"][0]["parameters"].as_array().unwrap().clone();
+    let value =
+        |name: &str| parameters.iter().find(|p| p["name"] == name).unwrap()["value"].as_f64().unwrap();
+    // A linear solid by plain least squares: 2.7 s, 0.63 of the modulus.
+    assert!((2.0..3.5).contains(&value("tau_s")) && (0.58..0.68).contains(&value("relaxed_fraction")));
+}
+
+/// Sand hardens with depth, and which law of hardening it is no plate tells.
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_measured_sand_hardens() {
+    for plate in ["60mm", "80mm", "100mm"] {
+        let answer = answer(&shared(&format!("recordings/real/indentation/sand-plate-{plate}")), "0");
+        assert_eq!(answer["verdict"], "partly", "{plate}");
+        let sets = named_sets(&answer);
+        for law in ["strain-stiffening", "membrane-stretching"] {
+            assert!(sets.iter().any(|set| set.iter().any(|id| id == law)), "{plate}: {sets:?}");
+        }
+        let never = ["load-cell-compliance", "viscoelasticity", "adhesion"];
+        assert!(!sets.iter().flatten().any(|id| never.contains(&id.as_str())), "{plate}: {sets:?}");
+    }
+}
+
+/// Curves on cells' surfaces that no law of the list, and no pair of them, takes away nearly all of: nothing is named that is wrong, and
+/// the closest set is said.
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_measured_surfaces_are_not_explained() {
+    for name in ["afm-chiaro-aebp1", "afm-reference-point-0", "afm-reference-point-2"] {
+        let answer = answer(&shared(&format!("recordings/real/indentation/{name}")), "0");
+        assert_eq!(answer["verdict"], "unexplained", "{name}");
+        let closest = ids(&answer["closest"]["ids"]);
+        assert!(!closest.is_empty() && !closest.iter().any(|id| id == "adhesion"), "{name}: {closest:?}");
+    }
+}
+
 /// Measured drops: drag where there is drag, and no other set; the golf ball proves nothing.
 #[test]
 fn measured_drops_are_drag_or_nothing() {
@@ -269,6 +357,11 @@ fn measured_drops_are_drag_or_nothing() {
                 );
             }
         }
+        if !name.contains("whiffle") {
+            // Plain fits leave 0.16 and 0.22 m, 0.13 and 0.18 m: the form cannot be told.
+            let both = [["linear-drag"], ["quadratic-drag"]].map(|set| set.map(str::to_owned).to_vec());
+            assert_eq!(named_sets(&answer), both, "{name}");
+        }
         if name.contains("whiffle") {
             let error = |when: &str| answer["fit"][when]["z_m"]["heldout_rmse"].as_f64().unwrap();
             assert!(error("before") > 5.0 * error("after"), "{} and {}", error("before"), error("after"));
@@ -280,17 +373,17 @@ fn measured_drops_are_drag_or_nothing() {
 }
 
 /// The measured decay of a wave: four effects at once, two of them outside the list (an arm that rings at two frequencies, a sensor
-/// whose rest value moved; `liquid-haptics/tests/measured_slosh.rs` takes it apart). The tool does not say that what it knows explains
-/// it, and of what it knows the frequency that falls with the amplitude is part of the closest set.
+/// whose rest value moved; `liquid-haptics/tests/measured_slosh.rs` takes it apart). The frequency that falls with the amplitude takes away
+/// nine tenths of the misfit, and the rest is said to be left.
 #[test]
-fn a_measured_wave_is_not_explained_by_one_effect() {
+fn a_measured_wave_is_explained_in_part() {
     let answer = answer(&bundled("measured/slosh/antisloshing-torque"), "0");
-    assert_eq!(answer["verdict"], "unexplained");
-    assert!(ids(&answer["chosen"]).is_empty());
+    assert_eq!(answer["verdict"], "partly");
+    assert!(ids(&answer["chosen"]).contains(&"nonlinear-frequency".to_owned()));
+    assert!(!answer["leftover"].as_array().unwrap().is_empty());
     let named =
         |id: &str| answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == id).unwrap().clone();
     let bends = named("nonlinear-frequency");
-    assert!(bends["probability"].as_f64().unwrap() > 0.99);
     let parameters = bends["parameters"].as_array().unwrap();
     let coefficient = parameters.iter().find(|p| p["name"] == "coefficient").unwrap();
     let coefficient = coefficient["value"].as_f64().unwrap();

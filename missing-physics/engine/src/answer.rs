@@ -3,8 +3,8 @@
 use crate::adequacy::test::Adequacy;
 use crate::data::Run;
 use crate::diagnosis::{
-    ChannelFit, ChannelNoise, Curves, Diagnosis, Estimate, MechanismReport, NoiseSource, Outlier, SetReport,
-    Verdict,
+    ChannelFit, ChannelNoise, Closest, Curves, Diagnosis, Estimate, MechanismReport, NoiseSource, Outlier,
+    SetReport, Verdict,
 };
 use crate::estimate::estimates::{estimates, of_mechanism};
 use crate::estimate::open_noise::with_open_noise;
@@ -16,7 +16,7 @@ use crate::problem::Problem;
 use crate::repaired::Repaired;
 use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
-use crate::selection::main_cause::MainCause;
+use crate::selection::main_cause::{Judged, MainCause};
 use crate::selection::ranking::{Best, Ranking};
 
 /// Sets that are listed.
@@ -76,6 +76,7 @@ impl Answer<'_> {
             confusion: None,
             explained_share: None,
             leftover: Vec::new(),
+            closest: None,
             limits: Vec::new(),
             final_p_value: None,
             after: before.clone(),
@@ -179,19 +180,21 @@ impl Answer<'_> {
         self.problem.integer_slots(&chosen.set).into_iter().filter_map(open).collect()
     }
 
-    /// Why the closest explanation is none.
-    pub(crate) fn closest(&self, ranking: &Ranking, best: &Best, fails: bool) -> String {
-        let closest = ranking.at(best.at);
-        let but = if fails {
-            format!("it leaves a misfit of its own (p = {:.3}; {})", best.p_value, best.failing)
-        } else {
-            let noise = match ranking.gain(&closest.set) {
-                Some(gain) if gain > 0.0 => " with correlated noise",
-                _ => "",
-            };
-            format!("it predicts data that it has not seen no better than the baseline{noise}")
+    /// The closest explanation, with what its parameters would be.
+    pub(crate) fn closest(&self, judged: &Judged) -> Closest {
+        let spec = self.problem.spec();
+        let of = |&m: &usize| {
+            let mechanism = &spec.mechanisms[m];
+            self.without_open(
+                mechanism,
+                of_mechanism(self.problem, &judged.candidate, mechanism, self.rule, false),
+            )
         };
-        format!("the closest explanation is {}, but {but}", self.names(&closest.set))
+        Closest {
+            ids: self.ids(&judged.candidate.set),
+            share: judged.share,
+            parameters: judged.candidate.set.iter().flat_map(of).collect(),
+        }
     }
 
     /// Every mechanism that the data can speak of, likeliest first.

@@ -173,6 +173,17 @@ pub struct ChannelFit {
     pub heldout_rmse: f64,
 }
 
+/// The set of mechanisms that comes closest where none explains the data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Closest {
+    /// Identifiers.
+    pub ids: Vec<String>,
+    /// The part of the squared misfit beyond the noise that it takes away on unseen data.
+    pub share: f64,
+    /// Its parameters, as they are if it is at work and what it leaves is smooth.
+    pub parameters: Vec<Estimate>,
+}
+
 /// What these data would have shown of a mechanism that they do not show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Limit {
@@ -294,6 +305,8 @@ pub struct Diagnosis {
     pub explained_share: Option<f64>,
     /// What the chosen mechanisms leave, by place, for [`Verdict::Partly`].
     pub leftover: Vec<Location>,
+    /// The set that comes closest, for [`Verdict::Unexplained`].
+    pub closest: Option<Closest>,
     /// The size of each mechanism that would have shown, for [`Verdict::Adequate`].
     pub limits: Vec<Limit>,
     /// p-value of the final model's adequacy, where one was chosen.

@@ -19,6 +19,12 @@ pub enum ProveError {
         /// The domains of which worlds can be drawn.
         known: Vec<&'static str>,
     },
+    /// A kind of worlds that there is not.
+    #[error("no worlds of the kind {}, expected one of: nothing, one, two, unlisted, leftover, imitated", quoted(.kind))]
+    UnknownKind {
+        /// The kind that was asked for.
+        kind: String,
+    },
     /// No world was asked for.
     #[error("0 worlds prove nothing, expected at least 1")]
     NoWorlds,

@@ -10,7 +10,15 @@ pub(super) fn word(hidden: Hidden) -> &'static str {
         Hidden::One => "one",
         Hidden::Two => "two",
         Hidden::Unlisted => "unlisted",
+        Hidden::Leftover => "leftover",
+        Hidden::Imitated => "imitated",
     }
+}
+
+/// The kind of world of a word.
+pub(super) fn hidden(wanted: &str) -> Option<Hidden> {
+    use Hidden::{Imitated, Leftover, Nothing, One, Two, Unlisted};
+    [Nothing, One, Two, Unlisted, Leftover, Imitated].into_iter().find(|hidden| word(*hidden) == wanted)
 }
 
 /// An answer as a line of JSON.
@@ -23,6 +31,7 @@ pub(super) fn to_json(world: &str, key: &Key) -> String {
     let place = key.place.as_ref().map(|p| json!({"variable": p.variable, "from": p.from, "to": p.to}));
     let line = json!({"world": world, "hidden": word(key.hidden), "mechanisms": key.mechanisms,
         "beside": key.beside,
-        "parameters": parameters, "unlisted": key.unlisted, "place": place});
+        "parameters": parameters, "unlisted": key.unlisted, "place": place,
+        "strength": key.strength, "leftover": key.leftover});
     format!("{line}\n")
 }

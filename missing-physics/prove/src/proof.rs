@@ -22,6 +22,8 @@ pub struct ProveArguments {
     pub domain: Option<String>,
     /// Worlds of each domain.
     pub worlds: usize,
+    /// One kind of worlds (`nothing`, `one`, `two`, `unlisted`, `leftover`, `imitated`); all in turns without it.
+    pub kind: Option<String>,
     /// Seed of the worlds.
     pub seed: u64,
     /// The folder of the proof.
@@ -38,6 +40,8 @@ struct Plan {
     version: String,
     domains: Vec<String>,
     worlds: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    kind: Option<String>,
     seed: u64,
     /// SHA-256 of the answers, before any diagnosis.
     seal: String,
@@ -66,6 +70,12 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
     if arguments.worlds == 0 {
         return Err(ProveError::NoWorlds);
     }
+    let kind = match &arguments.kind {
+        Some(wanted) => {
+            Some(key::hidden(wanted).ok_or_else(|| ProveError::UnknownKind { kind: wanted.clone() })?)
+        }
+        None => None,
+    };
     let threads = arguments.threads;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -74,7 +84,7 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
     let worlds: Vec<World> = chosen
         .iter()
         .flat_map(|&maker| (0..arguments.worlds).map(move |number| (maker, number)))
-        .map(|(maker, number)| World::new(maker, number, arguments.seed, &arguments.folder))
+        .map(|(maker, number)| World::new(maker, number, kind, arguments.seed, &arguments.folder))
         .collect();
     report(observer, "drawing the worlds", 0.0)?;
     let keys: Vec<String> =
@@ -84,6 +94,7 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
         version: env!("CARGO_PKG_VERSION").into(),
         domains: chosen.iter().map(|m| m.name().to_owned()).collect(),
         worlds: arguments.worlds,
+        kind: arguments.kind.clone(),
         seed: arguments.seed,
         seal: seal(&keys),
     };

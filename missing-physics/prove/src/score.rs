@@ -67,6 +67,14 @@ pub struct DomainScore {
     pub wrong_of_all: Part,
     /// Unlisted effects answered `unexplained`, of those that were doubted.
     pub unexplained: Part,
+    /// Worlds of a listed effect with a smaller unlisted one: answered by exactly the listed one.
+    pub main_cause: Part,
+    /// Of those, answered `partly`: the smaller one is said.
+    pub leftover_said: Part,
+    /// Of those, where the set is right, intervals of 95 % that hold the true value.
+    pub covered_beside: Part,
+    /// Unlisted effects that a listed one imitates to 40 to 85 %: a name was given.
+    pub imitated: Part,
     /// Local effects with p at most 0.001: the first place named begins or ends where the effect does, to a tenth of the
     /// variable's extent.
     pub located: Part,
@@ -144,10 +152,20 @@ impl DomainScore {
                     self.unexplained.add(o.verdict == "unexplained");
                 }
             }
+            Hidden::Leftover => {
+                let truth = sorted(&w.key.mechanisms, &w.key.beside);
+                let named = sorted(&o.chosen, &w.key.beside) == truth;
+                self.main_cause.add(named);
+                self.leftover_said.add(o.verdict == "partly");
+                if named {
+                    Self::add_intervals(&mut self.covered_beside, w);
+                }
+            }
+            Hidden::Imitated => self.imitated.add(!o.chosen.is_empty()),
             Hidden::One | Hidden::Two => self.add_listed(w, doubted),
         }
         // Beside a second effect the baseline misses where that acts, too.
-        let alone = w.key.hidden != Hidden::Two && o.p_value <= 0.001;
+        let alone = !matches!(w.key.hidden, Hidden::Two | Hidden::Leftover) && o.p_value <= 0.001;
         if let Some(place) = w.key.place.as_ref().filter(|_| alone) {
             let hit = o.places.first().is_some_and(|found| {
                 let near = |found: Option<f64>, extent: f64| {
@@ -203,17 +221,22 @@ impl DomainScore {
 
     /// What can be scored only where the right mechanisms were chosen.
     fn add_right(&mut self, w: &Judged) {
-        for p in &w.key.parameters {
-            let found = w.outcome.estimates.iter().find(|e| e.mechanism == p.mechanism && e.name == p.name);
-            if let Some(e) = found {
-                self.covered.add((e.ci95[0]..=e.ci95[1]).contains(&p.value));
-            }
-        }
+        Self::add_intervals(&mut self.covered, w);
         if let Some(oracle) = &w.oracle {
             let pairs = w.outcome.heldout_rmse.iter().zip(&oracle.heldout_rmse);
             let ratios: Vec<f64> = pairs.filter_map(|(a, b)| Some((*a)? / (*b)?)).collect();
             if !ratios.is_empty() {
                 self.ratios.push(ratios.iter().sum::<f64>() / ratios.len() as f64);
+            }
+        }
+    }
+
+    /// Counts the intervals that hold the true values.
+    fn add_intervals(covered: &mut Part, w: &Judged) {
+        for p in &w.key.parameters {
+            let found = w.outcome.estimates.iter().find(|e| e.mechanism == p.mechanism && e.name == p.name);
+            if let Some(e) = found {
+                covered.add((e.ci95[0]..=e.ci95[1]).contains(&p.value));
             }
         }
     }
@@ -243,10 +266,12 @@ impl DomainScore {
         let power: Vec<Value> =
             self.power.iter().map(|(size, tool, test)| json!([size, part(*tool), part(*test)])).collect();
         json!({"domain": self.domain, "false_alarms_5": part(self.alarms_5), "false_alarms_1": part(self.alarms_1),
-            "detected": part(self.detected), "told_detected": part(self.oracle_detected),
+            "detected": part(self.detected), "oracle_detected": part(self.oracle_detected),
             "right": part(self.right), "ambiguous": part(self.ambiguous), "wrong": part(self.wrong),
             "answer_set_holds": part(self.holds), "answer_set_size": number(self.set_size),
             "wrong_of_all": part(self.wrong_of_all), "unlisted_unexplained": part(self.unexplained),
+            "main_cause": part(self.main_cause), "leftover_said": part(self.leftover_said),
+            "covered_beside_leftover": part(self.covered_beside), "imitated_named": part(self.imitated),
             "located": part(self.located), "covered": part(self.covered),
             "heldout_ratio": number(self.heldout_ratio), "power": power, "confusion": self.confusion})
     }

@@ -6,11 +6,11 @@ use super::score::{DomainScore, Part, Score};
 pub(super) type Measure = (&'static str, &'static str, fn(&DomainScore) -> String);
 
 /// All measures, in the order of the table.
-pub(super) const MEASURES: [Measure; 15] = [
+pub(super) const MEASURES: [Measure; 19] = [
     ("false alarms at 5 %", "in the band", |s| banded(s.alarms_5, 0.05)),
     ("false alarms at 1 %", "in the band", |s| banded(s.alarms_1, 0.01)),
     ("listed effects detected", "", |s| part(s.detected)),
-    ("  by a test told the truth", "", |s| part(s.oracle_detected)),
+    ("  by an oracle's test", "", |s| part(s.oracle_detected)),
     ("where the data decide: named right", ">= 90 %", |s| part(s.right)),
     ("  honestly ambiguous", "", |s| part(s.ambiguous)),
     ("  wrong name", "<= 5 %", |s| part(s.wrong)),
@@ -18,6 +18,10 @@ pub(super) const MEASURES: [Measure; 15] = [
     ("  sets in an answer", "<= 2", |s| number(s.set_size, 2)),
     ("wrong name, of all listed", "<= 5 %", |s| part(s.wrong_of_all)),
     ("unlisted and doubted: unexplained", ">= 80 %", |s| part(s.unexplained)),
+    ("a leftover beside: main cause named", ">= 90 %", |s| part(s.main_cause)),
+    ("  leftover said", ">= 90 %", |s| part(s.leftover_said)),
+    ("  intervals that hold the truth", ">= 90 %", |s| part(s.covered_beside)),
+    ("imitated by the list: wrong name", "<= 5 %", |s| part(s.imitated)),
     ("local effects located (p <= 0.001)", ">= 95 %", |s| part(s.located)),
     ("intervals that hold the truth", "93 to 97 %", |s| part(s.covered)),
     ("error left out / true model's", "<= 1.05", |s| number(s.heldout_ratio, 3)),

@@ -17,10 +17,10 @@ use missing_physics_report::{self as report, ReportContext};
 use crate::error::ProveError;
 use crate::files::{make_folder, read_json, write_json, write_whole};
 
-/// Kinds of worlds, in the order in which they take turns: 40 % nothing, 30 % one, 15 % two, 15 % unlisted.
+/// Kinds of worlds, in the order in which they take turns: 35 % nothing, 25 % one, 10 % each of two, unlisted, leftover, imitated.
 const TURNS: [Hidden; 20] = {
-    use Hidden::{Nothing as N, One as O, Two as T, Unlisted as U};
-    [N, O, N, U, O, N, T, N, O, N, O, T, N, U, O, N, T, N, O, U]
+    use Hidden::{Imitated as I, Leftover as L, Nothing as N, One as O, Two as T, Unlisted as U};
+    [N, O, L, U, O, N, T, I, O, N, N, L, N, U, O, I, T, N, O, N]
 };
 
 /// The file of what an oracle finds in a world.
@@ -89,7 +89,13 @@ pub(super) struct Judged {
 }
 
 impl World {
-    pub(super) fn new(maker: &'static dyn Maker, number: usize, seed: u64, folder: &Path) -> Self {
+    pub(super) fn new(
+        maker: &'static dyn Maker,
+        number: usize,
+        kind: Option<Hidden>,
+        seed: u64,
+        folder: &Path,
+    ) -> Self {
         let name = format!("{}/{number:04}", maker.name());
         // FNV-1a of the name, so that a domain's worlds do not depend on which others are asked for.
         let hash =
@@ -97,7 +103,7 @@ impl World {
                 (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
             });
         let folder = folder.join(&name);
-        Self { maker, hidden: TURNS[number % TURNS.len()], seed: hash, name, folder }
+        Self { maker, hidden: kind.unwrap_or(TURNS[number % TURNS.len()]), seed: hash, name, folder }
     }
 
     pub(super) fn name(&self) -> &str {
@@ -131,6 +137,7 @@ impl World {
             title: self.name.clone(),
             citations: vec![domains::THESIS.into()],
             additions: loaded.additions,
+            ..ReportContext::default()
         };
         write_whole(&self.folder.join("answer.json"), report::json(&found, &context))?;
         write_whole(&self.folder.join("report.html"), report::html(&found, &context))?;

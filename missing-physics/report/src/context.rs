@@ -13,4 +13,6 @@ pub struct ReportContext {
     pub citations: Vec<String>,
     /// What the domain adds to the answer, by the key it has there.
     pub additions: serde_json::Map<String, serde_json::Value>,
+    /// What the answer was made from: version, seed, alpha, and the SHA-256 of the files; null where nobody says.
+    pub provenance: serde_json::Value,
 }

@@ -10,7 +10,7 @@ use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::plots;
 use super::svg::{CHART_STYLE, escape};
-use super::text::{headline, law_kind, leftover_sentence, limits, noise_sentence, where_sentence};
+use super::text::{closest, headline, law_kind, leftover_sentence, limits, noise_sentence, where_sentence};
 
 /// Style of a page.
 pub const STYLE: &str = "
@@ -34,6 +34,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
         section(&mut page, "How probable each mechanism is", &plots::probabilities(d));
         section(&mut page, "What was left out", &parameters(d, &context.citations));
     }
+    section(&mut page, "What comes closest", &list(&closest(d)));
     section(&mut page, "The law in the residual", &d.law.as_ref().map(law).unwrap_or_default());
     section(&mut page, "How much better", &errors(d));
     let left: Vec<String> = d.leftover.iter().map(|l| leftover_sentence(d, l)).collect();
@@ -49,6 +50,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     section(&mut page, "Noise", &list(&noise));
     section(&mut page, "Rows set aside", &outliers(d));
     section(&mut page, &format!("Adequacy of the baseline: {}", p_value(d)), &tests(d));
+    page.push_str(&foot(context));
     page.push_str("</body></html>\n");
     page
 }
@@ -63,6 +65,25 @@ fn head(d: &Diagnosis, context: &ReportContext) -> String {
         d.curves.len(),
         escape(&headline(d)),
         escape(&d.baseline)
+    )
+}
+
+/// What the answer was made from.
+fn foot(context: &ReportContext) -> String {
+    let Some(known) = context.provenance.as_object() else { return String::new() };
+    let said = |key: &str| known.get(key).map(ToString::to_string).unwrap_or_default();
+    let files = known.get("sha256").and_then(|files| files.as_object());
+    let files: Vec<String> = files
+        .into_iter()
+        .flatten()
+        .map(|(name, hash)| format!("{name}: {}", hash.as_str().unwrap_or_default()))
+        .collect();
+    format!(
+        "<footer class=\"note\"><p>missing-physics {}, seed {}, alpha {}. SHA-256 of what was read:</p>{}</footer>",
+        escape(known.get("version").and_then(|v| v.as_str()).unwrap_or_default()),
+        escape(&said("seed")),
+        escape(&said("alpha")),
+        list(&files)
     )
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use missing_physics::diagnosis::{
-    ChannelFit, ChannelNoise, Confusion, Diagnosis, Estimate, Law, Limit, Location, MechanismReport,
+    ChannelFit, ChannelNoise, Closest, Confusion, Diagnosis, Estimate, Law, Limit, Location, MechanismReport,
     NextExperiment, Outlier, SetReport, TestOutcome,
 };
 use serde::Serialize;
@@ -27,6 +27,7 @@ struct Answer<'a> {
     fit: Value,
     explained_share: Option<f64>,
     leftover: Vec<Value>,
+    closest: Value,
     limits: Vec<Value>,
     law: Value,
     next_experiment: Value,
@@ -43,6 +44,7 @@ struct Answer<'a> {
     undetermined: &'a [String],
     outliers: Vec<Value>,
     remarks: &'a [String],
+    provenance: &'a Value,
 }
 
 /// The answer as JSON; numbers that are not finite become null.
@@ -62,6 +64,7 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
         fit: value!({"before": fits(&d.before), "after": fits(&d.after)}),
         explained_share: d.explained_share,
         leftover: d.leftover.iter().map(place).collect(),
+        closest: d.closest.as_ref().map_or(Value::Null, closest),
         limits: d.limits.iter().map(limit).collect(),
         law: d.law.as_ref().map_or(Value::Null, law),
         next_experiment: d.next_experiment.as_ref().map_or(Value::Null, next_experiment),
@@ -75,6 +78,7 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
         undetermined: &d.undetermined,
         outliers: d.outliers.iter().map(outlier).collect(),
         remarks: &d.remarks,
+        provenance: &context.provenance,
     };
     // Numbers, texts and lists always serialise.
     let mut text = serde_json::to_string_pretty(&answer).unwrap_or_default();
@@ -91,6 +95,10 @@ fn place(l: &Location) -> Value {
     value!({"channel": l.channel, "variable": l.variable, "from": l.from, "to": l.to, "runs": l.runs,
         "share": l.share, "mean_residual": l.mean_residual, "z": l.z, "largest_residual": l.largest_residual,
         "rms": l.rms, "sigma": l.sigma})
+}
+
+fn closest(c: &Closest) -> Value {
+    value!({"ids": c.ids, "share": c.share, "parameters": estimates(&c.parameters)})
 }
 
 fn limit(l: &Limit) -> Value {

@@ -21,6 +21,9 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
     for line in what(d) {
         page.entry("what", &line);
     }
+    for line in closest(d) {
+        page.entry("closest", &line);
+    }
     if let Some(law) = &d.law {
         page.entry("law", &law_sentence(d, law));
         for coefficient in law.coefficients.iter().filter(|_| law.kind != "smooth") {
@@ -160,6 +163,16 @@ pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
         significant(l.sigma, 2),
         unit = unit_of(d, &l.channel),
     )
+}
+
+/// What comes closest where nothing explains the data, and what its parameters would be.
+pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
+    let Some(closest) = &d.closest else { return Vec::new() };
+    let share = 100.0 * floored(closest.share.max(0.0));
+    let words =
+        format!("{} takes away {share:.0} % of the misfit, too little to be named", named(d, &closest.ids));
+    let parameters = closest.parameters.iter().map(|e| format!("{}, if it is at work", estimate(e)));
+    std::iter::once(words).chain(parameters).collect()
 }
 
 /// A size of each mechanism that would have shown, a line each.

@@ -20,6 +20,7 @@ impl Maker for Bounce {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let hidden = self.kind(hidden);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut key = Key::new(hidden);
         let mut world = BounceWorld {
@@ -36,7 +37,7 @@ impl Maker for Bounce {
         for which in choose(&mut rng, LISTED, hidden.listed()) {
             listed(&mut world, which, &mut key, &mut rng);
         }
-        if hidden == Hidden::Unlisted {
+        if hidden.unlisted() {
             world.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }

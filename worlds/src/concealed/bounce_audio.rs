@@ -33,6 +33,7 @@ impl Maker for BounceAudio {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let hidden = self.kind(hidden);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut key = Key::new(hidden);
         let mut world = SoundWorld::new(&mut rng);
@@ -40,7 +41,7 @@ impl Maker for BounceAudio {
         for which in choose(&mut rng, what.len(), hidden.listed()).into_iter().map(|k| what[k]) {
             world.hide(which, &mut key, &mut rng);
         }
-        if hidden == Hidden::Unlisted {
+        if hidden.unlisted() {
             world.ball.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }

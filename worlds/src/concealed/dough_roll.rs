@@ -43,7 +43,7 @@ impl Rig for Table {
         let table = Self::drawn(rng);
         let tried = table.candidates();
         let listed = choose(rng, tried.len(), hidden.listed()).into_iter().map(|k| tried[k]).collect();
-        let unlisted = if hidden == Hidden::Unlisted { whole(rng, 0, UNLISTED - 1) } else { 0 };
+        let unlisted = if hidden.unlisted() { whole(rng, 0, UNLISTED - 1) } else { 0 };
         (table, Choice { listed, unlisted })
     }
 
@@ -115,13 +115,12 @@ impl Rig for Table {
         }
     }
 
-    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
-        let none = Effects::default();
+    fn unlisted(&self, beside: Effects, which: usize, sign: f64, size: f64) -> Effects {
         match which {
-            0 => Effects { alternation: sign * size, ..none },
-            1 => Effects { throw_per_m: sign * size, ..none },
-            2 => Effects { long: Long { fall: size, from_m: self.long_from_m }, ..none },
-            _ => Effects { worked: size, ..none },
+            0 => Effects { alternation: sign * size, ..beside },
+            1 => Effects { throw_per_m: sign * size, ..beside },
+            2 => Effects { long: Long { fall: size, from_m: self.long_from_m }, ..beside },
+            _ => Effects { worked: size, ..beside },
         }
     }
 

@@ -39,6 +39,11 @@ pub(crate) fn strength(rng: &mut impl Rng) -> f64 {
     log_between(rng, 3.0, 150.0)
 }
 
+/// The strength of an effect beside which something smaller is still to be seen.
+pub(crate) fn great_strength(rng: &mut impl Rng) -> f64 {
+    log_between(rng, 40.0, 300.0)
+}
+
 /// One sigma of readings with their rounding, as a calibration finds it.
 pub(crate) fn sigma(noise: &Noise) -> f64 {
     noise.sigma.hypot(noise.digit / 12f64.sqrt())

@@ -48,7 +48,7 @@ impl Rig for Press {
         let sphere = whole(rng, 0, 4) > 0;
         let listed = choose(rng, if sphere { LISTED } else { FOR_ALL }, hidden.listed());
         let unlisted = whole(rng, 0, UNLISTED - 1);
-        let returns = hidden == Hidden::Unlisted && unlisted == 0;
+        let returns = hidden.unlisted() && unlisted == 0;
         let press = Self::drawn(sphere, returns, listed.contains(&RELAXES), rng);
         (press, Choice { listed, unlisted })
     }
@@ -78,6 +78,18 @@ impl Rig for Press {
     fn response(&self, effects: Effects) -> Vec<f64> {
         let moduli = &self.world.moduli_pa;
         difference(&self.whitened(Effects::default(), moduli), &self.whitened(effects, moduli))
+    }
+
+    /// A relaxation may take any time.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        let middle = |[low, high]: [f64; 2]| (low * high).sqrt();
+        let of = |listed: usize| {
+            let one = self.alone(listed, middle(self.size_bounds(listed)));
+            let times: &[f64] =
+                if listed == RELAXES { &[0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0] } else { &[1.0] };
+            times.iter().map(move |factor| Effects { tau_s: factor * one.tau_s, ..one })
+        };
+        self.candidates().into_iter().flat_map(of).map(|effects| self.response(effects)).collect()
     }
 
     fn size_bounds(&self, listed: usize) -> [f64; 2] {
@@ -143,12 +155,11 @@ impl Rig for Press {
         }
     }
 
-    fn unlisted(&self, which: usize, _sign: f64, size: f64) -> Effects {
-        let none = Effects::default();
+    fn unlisted(&self, beside: Effects, which: usize, _sign: f64, size: f64) -> Effects {
         match which {
-            0 => Effects { dent: size, ..none },
-            1 => Effects { ripple: Ripple { amplitude_n: size, pitch_m: self.pitch_m }, ..none },
-            _ => Effects { slip: Slip { depth_m: self.depth_m, force_n: size }, ..none },
+            0 => Effects { dent: size, ..beside },
+            1 => Effects { ripple: Ripple { amplitude_n: size, pitch_m: self.pitch_m }, ..beside },
+            _ => Effects { slip: Slip { depth_m: self.depth_m, force_n: size }, ..beside },
         }
     }
 
@@ -325,7 +336,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let press = Press::drawn(seed % 2 == 0, false, false, &mut rng);
             let rim = press.alone(3, press.size_bounds(3)[1]);
-            let slip = press.unlisted(2, 1.0, press.unlisted_size_bounds(2)[1]);
+            let slip = press.unlisted(Effects::default(), 2, 1.0, press.unlisted_size_bounds(2)[1]);
             for (effects, place) in [(rim, press.beyond_depth()), (slip, press.after_slip())] {
                 let in_time = place.variable == "t_s";
                 ways_back += u32::from(in_time);

@@ -11,15 +11,33 @@ pub enum Hidden {
     Two,
     /// An effect that is not on the list.
     Unlisted,
+    /// One strong mechanism of the list with a smaller effect that is not on it.
+    Leftover,
+    /// A strong effect that is not on the list, of which the best mechanism on it takes away 40 to 85 % of the squares.
+    Imitated,
 }
 
 impl Hidden {
     /// How many mechanisms of the list are at work.
     pub(crate) const fn listed(self) -> usize {
         match self {
-            Self::Nothing | Self::Unlisted => 0,
-            Self::One => 1,
+            Self::Nothing | Self::Unlisted | Self::Imitated => 0,
+            Self::One | Self::Leftover => 1,
             Self::Two => 2,
+        }
+    }
+
+    /// Whether something is at work that is not on the list.
+    pub(crate) const fn unlisted(self) -> bool {
+        matches!(self, Self::Unlisted | Self::Leftover | Self::Imitated)
+    }
+
+    /// The kind that stands in for this one where no world has a leftover or an imitation.
+    pub(crate) const fn without_leftovers(self) -> Self {
+        match self {
+            Self::Leftover => Self::One,
+            Self::Imitated => Self::Unlisted,
+            other => other,
         }
     }
 }
@@ -60,6 +78,8 @@ pub struct Key {
     /// in sigmas of white noise, less the part that the baseline's nuisance parameters can take away (and, for an unlisted effect,
     /// any two listed mechanisms with them).
     pub strength: Option<f64>,
+    /// Strength of an unlisted effect beside a listed one, less the part that the latter can take away.
+    pub leftover: Option<f64>,
 }
 
 impl Key {
@@ -73,6 +93,7 @@ impl Key {
             unlisted: None,
             place: None,
             strength: None,
+            leftover: None,
         }
     }
 

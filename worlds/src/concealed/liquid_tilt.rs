@@ -39,7 +39,7 @@ impl Rig for Container {
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
         let container = Self::drawn(rng);
         let listed = choose(rng, LISTED, hidden.listed());
-        let unlisted = if hidden == Hidden::Unlisted { whole(rng, 0, UNLISTED - 1) } else { 0 };
+        let unlisted = if hidden.unlisted() { whole(rng, 0, UNLISTED - 1) } else { 0 };
         (container, Choice { listed, unlisted })
     }
 
@@ -128,16 +128,15 @@ impl Rig for Container {
         }
     }
 
-    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
-        let none = Effects::default();
+    fn unlisted(&self, beside: Effects, which: usize, sign: f64, size: f64) -> Effects {
         match which {
             0 => Effects {
                 cable: Cable { taut_from_rad: self.taut_from_rad, stiffness_nm_rad: sign * size },
-                ..none
+                ..beside
             },
-            1 => Effects { play_nm: size, ..none },
-            2 => Effects { flex: sign * size, ..none },
-            _ => Effects { spilt_kg: size, slip_run: self.slip_run, slip_pose: self.slip_pose, ..none },
+            1 => Effects { play_nm: size, ..beside },
+            2 => Effects { flex: sign * size, ..beside },
+            _ => Effects { spilt_kg: size, slip_run: self.slip_run, slip_pose: self.slip_pose, ..beside },
         }
     }
 

@@ -14,7 +14,7 @@ pub trait Maker: Sync {
 
     /// The kind of world that stands in for one that the domain has not.
     fn kind(&self, hidden: Hidden) -> Hidden {
-        hidden
+        hidden.without_leftovers()
     }
 
     /// Draws a world with a hidden effect of the given kind, or of the kind that stands in for it: the strength from faint to strong on a

@@ -38,10 +38,11 @@ mod tests {
 
     use super::*;
 
-    const KINDS: [Hidden; 4] = [Hidden::Nothing, Hidden::One, Hidden::Two, Hidden::Unlisted];
+    const KINDS: [Hidden; 6] =
+        [Hidden::Nothing, Hidden::One, Hidden::Two, Hidden::Unlisted, Hidden::Leftover, Hidden::Imitated];
 
     /// A domain with worlds of every kind.
-    type Drawn = (&'static str, [Concealed; 4]);
+    type Drawn = (&'static str, [Concealed; 6]);
 
     /// Every maker's worlds, drawn once from each seed.
     fn worlds(seed: u64) -> &'static [Drawn] {
@@ -129,11 +130,14 @@ mod tests {
             let counts =
                 keys.each_ref().map(|k| k.mechanisms.iter().filter(|m| *m != "quadratic-drag").count());
             assert!(counts[0] == 0 && counts[1] <= 1 && counts[2] <= 2 && counts[3] == 0, "{keys:?}");
-            if kinds == KINDS {
+            assert!(counts[4] <= 1 && counts[5] == 0, "{keys:?}");
+            if kinds[..4] == KINDS[..4] {
                 assert!(!keys[1].mechanisms.is_empty() && keys[2].mechanisms.len() >= 2, "{keys:?}");
             }
             for (key, hidden) in keys.iter().zip(kinds) {
-                assert_eq!((key.hidden, key.unlisted.is_some()), (hidden, hidden == Hidden::Unlisted));
+                // Where no draw fits, the kind that stands in is drawn.
+                assert!([hidden, hidden.without_leftovers()].contains(&key.hidden), "{key:?}");
+                assert_eq!(key.unlisted.is_some(), key.hidden.unlisted());
                 assert!(key.parameters.iter().all(|p| p.value.is_finite() && p.value != 0.0), "{key:?}");
                 assert!(key.mechanisms.iter().all(|m| key.parameters.iter().any(|p| p.mechanism == *m)));
                 assert!(key.strength.is_none_or(|s| s > 0.5 && s.is_finite()), "{key:?}");

@@ -19,7 +19,7 @@ impl Nuisances {
     }
 
     /// This space with one direction more.
-    fn with(&self, direction: &[f64]) -> Self {
+    pub(crate) fn with(&self, direction: &[f64]) -> Self {
         let mut more = self.clone();
         more.add(direction);
         more

@@ -5,10 +5,19 @@ use std::marker::PhantomData;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::draw::{sign, strength};
+use super::draw::{great_strength, log_between, sign, strength};
 use super::key::{Concealed, Hidden, Key};
 use super::maker::Maker;
-use super::nuisances::{Nuisances, size_of_strength};
+use super::nuisances::{Nuisances, difference, size_of_strength};
+
+/// The size of a leftover beside that of the main effect.
+const LEFT: std::ops::Range<f64> = 0.03..0.3;
+/// The strength from which a leftover shows.
+const SHOWS: f64 = 8.0;
+/// The part of an imitated effect's squares that the best listed mechanism takes away.
+const IMITATED: std::ops::Range<f64> = 0.4..0.85;
+/// Draws after which the kind that stands in is drawn.
+const TRIES: usize = 60;
 
 /// Which effects a world hides, by their numbers.
 pub(crate) struct Choice {
@@ -50,8 +59,8 @@ pub(crate) trait Rig: Sized {
     /// The smallest and the largest plausible size of an unlisted effect.
     fn unlisted_size_bounds(&self, which: usize) -> [f64; 2];
 
-    /// An unlisted effect of this size and sign.
-    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Self::Effects;
+    /// Effects with an unlisted one of this size and sign beside them.
+    fn unlisted(&self, beside: Self::Effects, which: usize, sign: f64, size: f64) -> Self::Effects;
 
     /// Writes an unlisted effect into the key.
     fn describe_unlisted(&self, which: usize, key: &mut Key);
@@ -90,7 +99,7 @@ pub(crate) trait Rig: Sized {
         let nuisances = self.nuisances();
         let mut effects = Self::Effects::default();
         for &listed in &choice.listed {
-            let wanted = strength(rng);
+            let wanted = if hidden == Hidden::Leftover { great_strength(rng) } else { strength(rng) };
             let strength_of = |size| nuisances.residual_norm(&self.response(self.alone(listed, size)));
             self.apply(&mut effects, listed, size_of_strength(wanted, self.size_bounds(listed), strength_of));
             self.describe(&effects, listed, key);
@@ -98,21 +107,48 @@ pub(crate) trait Rig: Sized {
         if !choice.listed.is_empty() {
             key.strength = Some(nuisances.residual_norm(&self.response(effects)));
         }
-        if hidden == Hidden::Unlisted {
+        if hidden.unlisted() {
             let which = choice.unlisted;
-            let spaces = nuisances.with_pairs(&self.directions());
-            let strength_of = |effects| {
-                let response = self.response(effects);
-                spaces.iter().map(|s| s.residual_norm(&response)).fold(f64::INFINITY, f64::min)
+            // What could pass for the unlisted effect: what is truly at work beside it, or any two of the list, or none.
+            let truth = nuisances.with(&self.response(effects));
+            let spaces = match hidden {
+                Hidden::Leftover => vec![truth.clone()],
+                Hidden::Imitated => vec![nuisances],
+                _ => nuisances.with_pairs(&self.directions()),
             };
-            let (wanted, sign) = (strength(rng), Self::unlisted_sign(rng));
-            let unlisted = |size| self.unlisted(which, sign, size);
+            let before = self.response(effects);
+            let strength_of = |all| {
+                let change = difference(&before, &self.response(all));
+                spaces.iter().map(|s| s.residual_norm(&change)).fold(f64::INFINITY, f64::min)
+            };
+            let wanted = match hidden {
+                Hidden::Leftover => key.strength.unwrap_or(0.0) * log_between(rng, 0.03, 0.3),
+                Hidden::Imitated => great_strength(rng),
+                _ => strength(rng),
+            };
+            let sign = Self::unlisted_sign(rng);
+            let unlisted = |size| self.unlisted(effects, which, sign, size);
             let bounds = self.unlisted_size_bounds(which);
-            effects = unlisted(size_of_strength(wanted, bounds, |size| strength_of(unlisted(size))));
-            key.strength = Some(strength_of(effects));
+            let all = unlisted(size_of_strength(wanted, bounds, |size| strength_of(unlisted(size))));
+            key.strength = Some(strength_of(all)).filter(|_| hidden != Hidden::Leftover).or(key.strength);
+            // One that a second mechanism of the list would take away as well is no leftover.
+            let change = difference(&before, &self.response(all));
+            let beyond = |other: Vec<f64>| truth.with(&other).residual_norm(&change) > SHOWS;
+            let shows = hidden == Hidden::Leftover && self.directions().into_iter().all(beyond);
+            key.leftover = shows.then(|| strength_of(all));
+            effects = all;
             self.describe_unlisted(which, key);
         }
         effects
+    }
+
+    /// The part of an unlisted effect's squares that the best listed mechanism takes away.
+    fn imitated(&self, effects: Self::Effects) -> f64 {
+        let nuisances = self.nuisances();
+        let response = self.response(effects);
+        let whole = nuisances.residual_norm(&response);
+        let beside = |direction: Vec<f64>| nuisances.with(&direction).residual_norm(&response) / whole;
+        1.0 - self.directions().into_iter().map(beside).fold(1.0, f64::min).powi(2)
     }
 }
 
@@ -129,11 +165,32 @@ impl<R: Rig> Maker for RigMaker<R> {
         R::DOMAIN
     }
 
+    fn kind(&self, hidden: Hidden) -> Hidden {
+        hidden
+    }
+
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut key = Key::new(hidden);
-        let (rig, choice) = R::draw(hidden, &mut rng);
-        let effects = rig.hide(hidden, &choice, &mut key, &mut rng);
+        let (mut hidden, mut tries) = (hidden, 0);
+        let (rig, effects, key) = loop {
+            let mut key = Key::new(hidden);
+            let (rig, choice) = R::draw(hidden, &mut rng);
+            let effects = rig.hide(hidden, &choice, &mut key, &mut rng);
+            let fits = match hidden {
+                Hidden::Leftover => {
+                    LEFT.contains(&(key.leftover.unwrap_or(0.0) / key.strength.unwrap_or(1.0)))
+                }
+                Hidden::Imitated => IMITATED.contains(&rig.imitated(effects)),
+                _ => true,
+            };
+            if fits {
+                break (rig, effects, key);
+            }
+            tries += 1;
+            if tries == TRIES {
+                hidden = hidden.without_leftovers();
+            }
+        };
         let further = rig.further_files(&mut rng);
         let [header, data] = rig.files(effects, &mut rng);
         let mut concealed = Concealed::table(header, data, key);
@@ -156,7 +213,8 @@ pub(crate) mod tests {
             assert!(strong > ratio * weak && strong > least[0], "{listed}: {weak} {strong}");
         }
         for which in 0..unlisted {
-            let strong = left(rig.unlisted(which, 1.0, rig.unlisted_size_bounds(which)[1]));
+            let strong =
+                left(rig.unlisted(R::Effects::default(), which, 1.0, rig.unlisted_size_bounds(which)[1]));
             assert!(strong > least[1], "{which}: {strong}");
         }
         assert!(left(R::Effects::default()) < 1e-9);

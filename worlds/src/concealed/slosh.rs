@@ -39,7 +39,7 @@ impl Rig for Bottle {
 
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
         let unlisted = whole(rng, 0, UNLISTED - 1);
-        let bottle = Self::drawn(hidden == Hidden::Unlisted && unlisted == 1, rng);
+        let bottle = Self::drawn(hidden.unlisted() && unlisted == 1, rng);
         (bottle, Choice { listed: choose(rng, LISTED, hidden.listed()), unlisted })
     }
 
@@ -141,16 +141,15 @@ impl Rig for Bottle {
         }
     }
 
-    fn unlisted(&self, which: usize, sign: f64, size: f64) -> Effects {
-        let none = Effects::default();
+    fn unlisted(&self, beside: Effects, which: usize, sign: f64, size: f64) -> Effects {
         match which {
-            0 => Effects { machine: Machine { amplitude: size, ..self.machine }, ..none },
-            1 => Effects { leak: size, ..none },
+            0 => Effects { machine: Machine { amplitude: size, ..self.machine }, ..beside },
+            1 => Effects { leak: size, ..beside },
             2 => {
                 let run = self.world.starts.len() / 2;
-                Effects { slip: Slip { shift: sign * size, run, at_s: self.slip_s }, ..none }
+                Effects { slip: Slip { shift: sign * size, run, at_s: self.slip_s }, ..beside }
             }
-            _ => Effects { swirl_rad_s: size, ..none },
+            _ => Effects { swirl_rad_s: size, ..beside },
         }
     }
 

@@ -21,6 +21,7 @@ impl Maker for Trajectory {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
+        let hidden = self.kind(hidden);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut key = Key::new(hidden);
         let rows = whole(&mut rng, 35, 60);
@@ -35,7 +36,7 @@ impl Maker for Trajectory {
         for which in choose(&mut rng, LISTED, hidden.listed()) {
             listed(effects, which, &mut key, &mut rng);
         }
-        if hidden == Hidden::Unlisted {
+        if hidden.unlisted() {
             unlisted(effects, &mut key, &mut rng);
         }
         let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n";

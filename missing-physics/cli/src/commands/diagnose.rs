@@ -6,6 +6,7 @@ use missing_physics::engine::{Options, diagnose as run};
 use missing_physics::observer::Observer;
 
 use super::error::{CommandError, write_whole};
+use super::provenance::provenance;
 use missing_physics_domains as domains;
 use missing_physics_domains::repair::{Repair, RepairError};
 use missing_physics_report::{self as report, ReportContext};
@@ -65,6 +66,7 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
             .map_or_else(|| "recording".into(), |n| n.to_string_lossy().into_owned()),
         citations: vec![domains::THESIS.into()],
         additions: loaded.additions,
+        provenance: provenance(&arguments.folder, &arguments.options),
     };
     if let Some(path) = &arguments.json {
         write_whole(path, report::json(&diagnosis, &context))?;

@@ -5,6 +5,7 @@ mod error;
 mod list;
 mod new;
 mod predict;
+mod provenance;
 
 pub use diagnose::{DiagnoseArguments, diagnose};
 pub use error::CommandError;

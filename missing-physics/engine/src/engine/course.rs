@@ -80,28 +80,35 @@ impl Course<'_> {
         let explained = best.as_ref().filter(|b| !fails(b) && ranking.gains(b.at));
         let white = rough_sigmas(problem, rule, &baseline.fit);
         let before = self.before(&answer)?;
-        // Noise that is correlated as long as the runs are is no noise.
-        let sound = explained.filter(|b| !slow(problem, &ranking.at(b.at).fit.noise, &white));
-        let cause = if sound.is_some() {
+        // Noise that is correlated as long as the runs are is no noise, and a member that takes away little of what is left without it
+        // may be imitating something else.
+        let sound = explained.is_some_and(|b| {
+            let chosen = ranking.at(b.at);
+            let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
+            !slow(problem, &chosen.fit.noise, &white)
+                && Judge::new(problem, rule, ranking.all(), &white, parts).holds(&chosen.set)
+        });
+        let judge = if sound {
             None
         } else {
             self.tell("what the closest explanation leaves", 0.0)?;
-            Judge::new(problem, rule, ranking.all(), &white, |_| true).main_cause()
+            Some(Judge::new(problem, rule, ranking.all(), &white, |_| true))
         };
-        let explained = if cause.is_some() { None } else { explained };
-        let mut diagnosis = match (cause, explained) {
+        let mut diagnosis = match (judge.as_ref().and_then(Judge::main_cause), explained) {
             (Some(cause), _) => self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?,
             (None, Some(chosen)) => self.explained(&answer, &adequacy, before, &ranking, chosen, &white)?,
             (None, None) => {
                 let mut diagnosis = answer.skeleton(&adequacy, Verdict::Unexplained, baseline, before)?;
                 diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref());
-                if let Some(closest) = &best {
-                    diagnosis.remarks.push(answer.closest(&ranking, closest, fails(closest)));
-                }
-                self.unexplained(&mut diagnosis, &answer, &ranking, best.as_ref())?;
+                let closest = judge.as_ref().and_then(Judge::closest);
+                diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
+                let set = closest.map_or_else(Vec::new, |closest| closest.candidate.set);
+                self.unexplained(&mut diagnosis, &answer, &ranking, &set)?;
                 diagnosis
             }
         };
+        let explained =
+            explained.filter(|_| !diagnosis.chosen.is_empty() && diagnosis.verdict != Verdict::Partly);
         diagnosis.sets = answer.sets(&ranking, best.as_ref());
         let sigma = match explained {
             Some(chosen) => ranking.at(chosen.at).fit.noise.sigma.clone(),
@@ -213,20 +220,20 @@ impl Course<'_> {
         Ok(diagnosis)
     }
 
-    /// Nothing on the list explains the data: is there a law in what is left, beside the best set where that predicts unseen data better
-    /// than the baseline?
+    /// Nothing on the list explains the data: is there a law in what is left, beside the closest set where that predicts unseen data
+    /// better than the baseline?
     fn unexplained(
         &self,
         diagnosis: &mut Diagnosis,
         answer: &Answer<'_>,
         ranking: &Ranking,
-        best: Option<&Best>,
+        closest: &[usize],
     ) -> Result<(), DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell("looking for a law in the residual", 0.0)?;
-        let repair =
-            best.map(|b| ranking.at(b.at)).zip(best.and_then(|b| ranking.score_of(&ranking.at(b.at).set)));
-        let repair = repair.filter(|(_, score)| improves(ranking.base(), score));
+        let repair = ranking.of(closest).filter(|c| !c.set.is_empty());
+        let score = repair.and_then(|repair| held_out(problem, repair).ok());
+        let repair = repair.zip(score.as_ref()).filter(|(_, score)| improves(ranking.base(), score));
         let (start, seen) = repair.unwrap_or((baseline, ranking.base()));
         if let Some(found) = find(problem, &rule.competing(), start, seen)? {
             diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);

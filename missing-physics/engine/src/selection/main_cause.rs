@@ -22,6 +22,8 @@ const NEEDED: f64 = 5.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
 /// be imitating the leftover.
 const SMALLER: f64 = 3.0;
+/// Noise alone moves a sum of squares by so many standard deviations at most.
+const CHANCE: f64 = 3.0;
 /// A rival takes away at least this part of the misfit.
 const RIVAL_SHARE: f64 = 0.85;
 /// A set that leaves less than so many times what the chosen one leaves is not ruled out by that: with eight directions open to a smooth
@@ -85,7 +87,7 @@ impl<'a> Judge<'a> {
     /// The part of the squared misfit beyond the noise that a set takes away on unseen data.
     pub(crate) fn share(&self, set: &[usize]) -> Option<f64> {
         let misfit = self.misfit(set)?;
-        (self.base > 0.0).then(|| 1.0 - misfit / self.base)
+        Some(if self.base > 0.0 { 1.0 - misfit / self.base } else { 1.0 })
     }
 
     fn misfit(&self, set: &[usize]) -> Option<f64> {
@@ -122,6 +124,25 @@ impl<'a> Judge<'a> {
             found = Some(MainCause { chosen, rivals });
         }
         found
+    }
+
+    /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them.
+    pub(crate) fn closest(&self) -> Option<Judged> {
+        let mut order: Vec<(f64, usize)> = (0..self.all.len())
+            .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none() && self.each_helps(i))
+            .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.1, i)))
+            .filter(|(misfit, _)| *misfit < self.base)
+            .collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order.into_iter().find_map(|(_, i)| self.judged(i))
+    }
+
+    /// Whether a set leaves nothing but noise, or has no member that takes away little of what is left without it.
+    pub(crate) fn holds(&self, set: &[usize]) -> bool {
+        let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
+        let by_chance = CHANCE * (2.0 * rows as f64).sqrt();
+        let at = self.all.iter().position(|c| c.set == set);
+        at.is_none_or(|i| self.plain[i].as_ref().is_none_or(|p| p.1 < by_chance) || self.each_helps(i))
     }
 
     /// Whether each member of a set takes away most of what is left without it.

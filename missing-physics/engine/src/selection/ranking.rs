@@ -32,8 +32,6 @@ pub(crate) struct Best {
     pub(crate) at: usize,
     /// p-value of the set's adequacy.
     pub(crate) p_value: f64,
-    /// What the likeliest set fails in first, if it does.
-    pub(crate) failing: String,
     /// A simpler set that is hardly less likely, doubted but not clearly rejected: where it stands, and its p value.
     pub(crate) doubted: Option<(usize, f64)>,
     /// Sets that are as likely but clearly rejected: where they stand.
@@ -97,7 +95,6 @@ impl Ranking {
             self.physical.iter().map(|p| p.0).filter(|&i| !self.all[i].set.is_empty()).collect();
         let Some(&first) = standing.first() else { return Ok(None) };
         let tested = test(&self.all[first], 2)?;
-        let failing = tested.tests.first().map_or_else(String::new, |t| t.name.clone());
         let (mut at, mut p_value) = (first, tested.p_value);
         let mut rejected = Vec::new();
         if p_value <= clearly(alpha) {
@@ -123,7 +120,7 @@ impl Ranking {
             }
             (at, p_value) = (simpler, p);
         }
-        Ok(Some(Best { at, p_value, failing, doubted, rejected }))
+        Ok(Some(Best { at, p_value, doubted, rejected }))
     }
 
     /// Is one a part of the other with fewer unknowns, and hardly less likely?
