@@ -1,5 +1,5 @@
-//! The tool on measured soft bodies: none of them is an elastic half-space, and none is explained by what the tool knows; what it says
-//! of each is defended in `docs/evidence/soft-bodies.md`.
+//! The tool on measured soft bodies: none of them is an elastic half-space, and none is wholly explained by what the tool knows; sand hardens
+//! with depth, which takes away nearly all, and something is left. What it says of each is defended in `docs/evidence/soft-bodies.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -11,7 +11,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Recordings, and mechanisms that a fair answer gives a probability of a half or more (of those on the list).
+/// Recordings, and mechanisms that a fair answer gives a probability of a half or more, or of sand names first (of those on the list).
 const CLOSEST: [(&str, &[&str]); 6] = [
     ("afm-chiaro-aebp1", &["force-offset", "rim-contact"]),
     ("afm-reference-point-0", &["force-offset"]),
@@ -50,11 +50,22 @@ fn is_not_called_explained(folder: &Path, name: &str, closest: &[&str]) {
         .unwrap();
     assert!(output.status.success(), "{output:?}");
     let answer: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
-    assert_eq!(answer["verdict"], "unexplained", "{name}");
+    let verdict = if name.starts_with("sand") { "partly" } else { "unexplained" };
+    assert_eq!(answer["verdict"], verdict, "{name}");
     let probability = |id: &str| {
         let mine = answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == id).unwrap();
         mine["probability"].as_f64().unwrap()
     };
+    if verdict == "partly" {
+        let named: Vec<&str> =
+            answer["chosen"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert!(closest.iter().all(|id| named.contains(id)), "{name}: {named:?}");
+        assert!(
+            !answer["confused_with"].as_array().unwrap().is_empty(),
+            "{name}: the law of hardening cannot be told"
+        );
+        return;
+    }
     for id in closest {
         println!("{name}: {id} {:.3}", probability(id));
         assert!(probability(id) > 0.5, "{name}: {id} {}", probability(id));
