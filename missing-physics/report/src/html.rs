@@ -39,7 +39,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     section(&mut page, "How much better", &errors(d));
     let left: Vec<String> = d.leftover.iter().map(|l| leftover_sentence(d, l)).collect();
     section(&mut page, "What is left", &list(&left));
-    section(&mut page, "What would have shown", &list(&limits(d)));
+    section(&mut page, "What would have shown, if larger", &list(&limits(d)));
     let confused = d.confusion.as_ref().map(confusion).unwrap_or_default();
     section(&mut page, "How the rivals are confused", &confused);
     section(&mut page, "Do this next", &d.next_experiment.as_ref().map(next).unwrap_or_default());

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Law, Limit, Location, MechanismReport, Verdict};
+use missing_physics::diagnosis::{Diagnosis, Law, Location, MechanismReport, Verdict};
 
 use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, probability, significant};
@@ -40,8 +40,8 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
         for noise in &d.noise {
             page.entry("noise", &noise_sentence(d, noise));
         }
-        for line in limits(d) {
-            page.entry("limits", &line);
+        if !d.limits.is_empty() {
+            page.entry("limits", &format!("larger ones would have shown: {}", limits(d).join("; ")));
         }
     }
     for line in d.undetermined.iter().chain(&d.remarks) {
@@ -175,12 +175,17 @@ pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     std::iter::once(words).chain(parameters).collect()
 }
 
-/// A size of each mechanism that would have shown, a line each.
+/// The sizes of each mechanism that would have shown, a line each.
 pub(super) fn limits(d: &Diagnosis) -> Vec<String> {
-    let line = |l: &Limit| {
-        format!("{}: {} above {} {} would have shown", l.id, l.parameter, significant(l.upper, 2), l.unit)
-    };
-    d.limits.iter().map(|l| line(l).replace("  ", " ")).collect()
+    let mut lines: Vec<(&str, Vec<String>)> = Vec::new();
+    for limit in &d.limits {
+        let size = format!("{} {} {}", limit.parameter, significant(limit.upper, 2), limit.unit);
+        match lines.last_mut().filter(|(id, _)| *id == limit.id) {
+            Some((_, sizes)) => sizes.push(size.trim_end().to_owned()),
+            None => lines.push((&limit.id, vec![size.trim_end().to_owned()])),
+        }
+    }
+    lines.into_iter().map(|(id, sizes)| format!("{id}: {}", sizes.join(", "))).collect()
 }
 
 fn unit_of(d: &Diagnosis, name: &str) -> String {
