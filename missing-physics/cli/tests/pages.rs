@@ -121,7 +121,10 @@ fn fields(value: &Value, found: &mut BTreeSet<String>) {
                 if !name.ends_with("_m") {
                     found.insert(name.clone());
                 }
-                fields(inner, found);
+                // By the names of files.
+                if name != "sha256" {
+                    fields(inner, found);
+                }
             }
         }
         _ => {}
