@@ -48,8 +48,13 @@ fn kind(answer: &Diagnosis, hidden: &str) -> usize {
     match answer.verdict {
         Verdict::Adequate => 0,
         Verdict::Explained if is(&answer.chosen) => 1,
-        Verdict::Ambiguous if is(&answer.chosen) || answer.confused_with.iter().any(|s| is(s)) => 2,
-        Verdict::Explained | Verdict::Ambiguous => 3,
+        Verdict::Partly if is(&answer.chosen) && answer.confused_with.is_empty() => 1,
+        Verdict::Ambiguous | Verdict::Partly
+            if is(&answer.chosen) || answer.confused_with.iter().any(|s| is(s)) =>
+        {
+            2
+        }
+        Verdict::Explained | Verdict::Partly | Verdict::Ambiguous => 3,
         Verdict::Unexplained => 4,
     }
 }
