@@ -93,7 +93,8 @@ struct Scanned<'a> {
     coefficients: &'a [Vec<f64>],
 }
 
-/// An interval as a place: what the rows in it miss where the baseline is fitted to the others.
+/// An interval as a place: what the fitted baseline misses in its rows. The runs in which it shows are those whose rows there miss a
+/// baseline that is fitted to the others.
 fn place(
     problem: &Problem<'_>,
     columns: &[Vec<Vec<f64>>],
@@ -103,7 +104,7 @@ fn place(
     gain: f64,
 ) -> Location {
     let &Scanned { variable, edges, bins: (from, to), coefficients } = scanned;
-    let mut residuals: Vec<(usize, f64)> = Vec::new();
+    let (mut residuals, mut fitted_out): (Vec<f64>, Vec<(usize, f64)>) = (Vec::new(), Vec::new());
     for (r, x) in coefficients.iter().enumerate() {
         let start: usize = (0..channel).map(|c| problem.rows[r].valid[c].len()).sum();
         for (k, &i) in problem.rows[r].valid[channel].iter().enumerate() {
@@ -111,13 +112,14 @@ fn place(
             if b >= from && b < to {
                 let fitted: f64 = x.iter().zip(&columns[r]).map(|(x, c)| x * c[start + k]).sum();
                 let measured = columns[r].last().map_or(0.0, |c| c[start + k]);
-                residuals.push((r, (measured - fitted) * sigma[channel]));
+                residuals.push(measured * sigma[channel]);
+                fitted_out.push((r, measured - fitted));
             }
         }
     }
     let squares = |r: usize| -> (f64, f64) {
-        let of_run = residuals.iter().filter(|(run, _)| r == *run);
-        of_run.fold((0.0, 0.0), |(s, n), (_, v)| (s + (v / sigma[channel]).powi(2), n + 1.0))
+        let of_run = fitted_out.iter().filter(|(run, _)| r == *run);
+        of_run.fold((0.0, 0.0), |(s, n), (_, v)| (s + v * v, n + 1.0))
     };
     // A run shows the misfit where its rows exceed the noise at 1 in 1,000.
     let runs = (0..problem.rows.len())
@@ -127,9 +129,8 @@ fn place(
         })
         .map(|r| problem.recording.runs[r].label.clone())
         .collect();
-    let mean = residuals.iter().map(|(_, v)| v).sum::<f64>() / residuals.len().max(1) as f64;
-    let largest =
-        residuals.iter().map(|(_, v)| *v).fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
+    let mean = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
+    let largest = residuals.iter().copied().fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
     Location {
         channel: problem.recording.channels[channel].name.clone(),
         variable: Some(variable_name(problem, variable)),
@@ -138,7 +139,7 @@ fn place(
         runs,
         share: 0.0,
         mean_residual: mean,
-        rms: (residuals.iter().map(|(_, v)| v * v).sum::<f64>() / residuals.len().max(1) as f64).sqrt(),
+        rms: (residuals.iter().map(|v| v * v).sum::<f64>() / residuals.len().max(1) as f64).sqrt(),
         largest_residual: largest,
         sigma: sigma[channel],
         z: gain.sqrt(),

@@ -171,27 +171,28 @@ impl<'a> Judge<'a> {
         sound.then(|| Judged { candidate, plain, process, share: 1.0 - misfit / self.base, misfit: *misfit })
     }
 
-    /// A fit with errors that allow for a leftover along the parameters' own effect, where no residual shows it: of a leftover that has
-    /// [`DIRECTIONS`] directions open, that one has its share of the sum of squares.
-    fn widened(&self, selection: &Selection, plain: &Fit, fit: Fit) -> Fit {
+    /// The plain fit with errors that allow for a leftover: those beside the leftover that the residual shows, or, along the parameters' own
+    /// effect, where no residual shows it, those of a leftover that has [`DIRECTIONS`] directions open, whichever are larger; and what
+    /// the two fits differ by.
+    fn widened(&self, selection: &Selection, plain: &Fit, beside: Fit) -> Fit {
         let problem = self.problem;
         let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let fitted = selection.shared.len() + selection.nuisance.len() * problem.rows.len();
         let beyond = (plain.chi2 - rows.saturating_sub(fitted) as f64).max(0.0);
         let white = covariance(&plain.information);
-        let mut wide = covariance(&fit.information);
+        let mut wide = covariance(&beside.information);
         let n = wide.nrows();
         let factors: Vec<f64> = (0..n)
             .map(|i| ((1.0 + beyond / DIRECTIONS) * white[(i, i)] / wide[(i, i)]).max(1.0).sqrt())
             .collect();
-        if factors.iter().any(|f| !f.is_finite()) {
-            return fit;
-        }
-        wide = DMatrix::from_fn(n, n, |i, j| factors[i] * factors[j] * wide[(i, j)]);
-        match wide.cholesky().map(|factor| factor.inverse()) {
-            Some(information) => Fit { information, ..fit },
-            None => fit,
-        }
+        let moved = |i: usize| beside.shared[selection.shared[i]] - plain.shared[selection.shared[i]];
+        wide = DMatrix::from_fn(n, n, |i, j| factors[i] * factors[j] * wide[(i, j)] + moved(i) * moved(j));
+        let information = match wide.cholesky().map(|factor| factor.inverse()) {
+            Some(information) if information.iter().all(|v| v.is_finite()) => information,
+            _ => beside.information,
+        };
+        let (shared, nuisance) = (plain.shared.clone(), plain.nuisance.clone());
+        Fit { information, shared, nuisance, ..beside }
     }
 
     /// Whether each member is needed beside the leftover that the whole set has: a leftover that may be as large as what the member does
