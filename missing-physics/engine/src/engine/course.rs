@@ -80,8 +80,8 @@ impl Course<'_> {
         let explained = best.as_ref().filter(|b| !fails(b) && ranking.gains(b.at));
         let white = rough_sigmas(problem, rule, &baseline.fit);
         let before = self.before(&answer)?;
-        // Noise that is correlated as long as the runs are is no noise, and a member that takes away little of what is left without it
-        // may be imitating something else.
+        // Noise that is correlated as long as the runs are is no noise, and a member without which unseen data are predicted better is
+        // imitating something else.
         let sound = explained.is_some_and(|b| {
             let chosen = ranking.at(b.at);
             let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));

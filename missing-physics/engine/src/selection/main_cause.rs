@@ -137,12 +137,15 @@ impl<'a> Judge<'a> {
         order.into_iter().find_map(|(_, i)| self.judged(i))
     }
 
-    /// Whether a set leaves nothing but noise, or has no member that takes away little of what is left without it.
+    /// Whether a set leaves nothing but noise, or predicts unseen data no worse than it does without any one member.
     pub(crate) fn holds(&self, set: &[usize]) -> bool {
         let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
         let by_chance = CHANCE * (2.0 * rows as f64).sqrt();
-        let at = self.all.iter().position(|c| c.set == set);
-        at.is_none_or(|i| self.plain[i].as_ref().is_none_or(|p| p.1 < by_chance) || self.each_helps(i))
+        let Some(left) = self.misfit(set).filter(|left| *left > by_chance) else { return true };
+        set.iter().all(|m| {
+            let without: Vec<usize> = set.iter().copied().filter(|o| o != m).collect();
+            self.misfit(&without).is_none_or(|misfit| misfit >= left)
+        })
     }
 
     /// Whether each member of a set takes away most of what is left without it.
