@@ -17,7 +17,7 @@ use crate::repaired::Repaired;
 use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
 use crate::selection::main_cause::{Judged, MainCause};
-use crate::selection::ranking::{Best, Ranking};
+use crate::selection::ranking::{Best, Ranking, probabilities};
 
 /// Sets that are listed.
 const LISTED_SETS: usize = 12;
@@ -212,9 +212,8 @@ impl Answer<'_> {
         cause: &MainCause,
     ) -> Vec<MechanismReport> {
         let all = || std::iter::once(&cause.chosen).chain(&cause.rivals).map(|judged| &judged.candidate);
-        let most = all().map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = all().map(|c| (c.evidence - most).exp()).sum();
-        let sets: Vec<(&Candidate, f64)> = all().map(|c| (c, (c.evidence - most).exp() / total)).collect();
+        let evidence: Vec<f64> = all().map(|c| c.evidence).collect();
+        let sets: Vec<(&Candidate, f64)> = all().zip(probabilities(&evidence)).collect();
         self.reports(ranking, Some(&cause.chosen.candidate), &sets, false)
     }
 

@@ -82,33 +82,35 @@ impl Course<'_> {
         let before = self.before(&answer)?;
         // Noise that is correlated as long as the runs are is no noise, and a member without which unseen data are predicted better is
         // imitating something else.
-        let sound = explained.is_some_and(|b| {
-            let chosen = ranking.at(b.at);
+        let sound = explained.map(|b| ranking.at(b.at)).and_then(|chosen| {
             let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
-            !slow(problem, &chosen.fit.noise, &white)
-                && Judge::new(problem, rule, ranking.all(), &white, parts).holds(&chosen.set)
+            let judge = || Judge::new(problem, rule, ranking.all(), &white, parts);
+            let judge = (!slow(problem, &chosen.fit.noise, &white)).then(judge);
+            judge.filter(|judge| judge.holds(&chosen.set))
         });
-        let judge = if sound {
-            None
-        } else {
-            self.tell("what the closest explanation leaves", 0.0)?;
-            Some(Judge::new(problem, rule, ranking.all(), &white, |_| true))
+        let (judge, cause) = match sound {
+            Some(judge) => (judge, None),
+            None => {
+                self.tell("what the closest explanation leaves", 0.0)?;
+                let judge = Judge::new(problem, rule, ranking.all(), &white, |_| true);
+                let cause = judge.main_cause();
+                (judge, cause)
+            }
         };
-        let mut diagnosis = match (judge.as_ref().and_then(Judge::main_cause), explained) {
+        let mut diagnosis = match (cause, explained) {
             (Some(cause), _) => self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?,
-            (None, Some(chosen)) => self.explained(&answer, &adequacy, before, &ranking, chosen, &white)?,
+            (None, Some(chosen)) => self.explained(&answer, &adequacy, before, &ranking, chosen, &judge)?,
             (None, None) => {
                 let mut diagnosis = answer.skeleton(&adequacy, Verdict::Unexplained, baseline, before)?;
                 diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref());
-                let closest = judge.as_ref().and_then(Judge::closest);
+                let closest = judge.closest();
                 diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
                 let set = closest.map_or_else(Vec::new, |closest| closest.candidate.set);
                 self.unexplained(&mut diagnosis, &answer, &ranking, &set)?;
                 diagnosis
             }
         };
-        let explained =
-            explained.filter(|_| !diagnosis.chosen.is_empty() && diagnosis.verdict != Verdict::Partly);
+        let explained = explained.filter(|_| diagnosis.verdict != Verdict::Partly);
         diagnosis.sets = answer.sets(&ranking, best.as_ref());
         let sigma = match explained {
             Some(chosen) => ranking.at(chosen.at).fit.noise.sigma.clone(),
@@ -178,15 +180,14 @@ impl Course<'_> {
         before: Vec<ChannelFit>,
         ranking: &Ranking,
         best: &Best,
-        white: &[f64],
+        judge: &Judge<'_>,
     ) -> Result<Diagnosis, DiagnoseError> {
-        let Begun { problem, rule, .. } = self.begun;
+        let problem = &self.begun.problem;
         let chosen = ranking.at(best.at);
         let mut diagnosis = answer.skeleton(adequacy, Verdict::Explained, chosen, before)?;
         diagnosis.mechanisms = answer.mechanisms(ranking, Some(best));
         diagnosis.final_p_value = Some(best.p_value);
         diagnosis.chosen = answer.ids(&chosen.set);
-        let judge = Judge::new(problem, rule, ranking.all(), white, |c| c.set == chosen.set);
         diagnosis.explained_share = judge.share(&chosen.set);
         let after = predictions(problem, &chosen.fit)?;
         if let Some(score) = ranking.score_of(&chosen.set) {

@@ -62,6 +62,11 @@ pub(crate) struct Judge<'a> {
     base: f64,
 }
 
+/// A set without one of its members.
+fn without(set: &[usize], member: usize) -> Vec<usize> {
+    set.iter().copied().filter(|m| *m != member).collect()
+}
+
 impl<'a> Judge<'a> {
     /// Fits the wanted candidates and the baseline by plain least squares with white noise of the given sigmas.
     pub(crate) fn new(
@@ -91,20 +96,24 @@ impl<'a> Judge<'a> {
     }
 
     fn misfit(&self, set: &[usize]) -> Option<f64> {
-        let at = self.all.iter().position(|c| c.set == set)?;
-        self.plain[at].as_ref().map(|p| p.1)
+        self.plain[self.at(set)?].as_ref().map(|p| p.1)
+    }
+
+    /// Where a set stands among the candidates.
+    fn at(&self, set: &[usize]) -> Option<usize> {
+        self.all.iter().position(|c| c.set == set)
     }
 
     /// The smallest set that takes away nearly all and is needed as a whole; larger ones only where they take away most of what that leaves.
     pub(crate) fn main_cause(&self) -> Option<MainCause> {
-        let mut found: Option<MainCause> = None;
+        let mut found: Option<Judged> = None;
         for size in 1..=self.all.iter().map(|c| c.set.len()).max()? {
             let limit = match &found {
                 None => (1.0 - NEARLY_ALL) * self.base,
-                Some(smaller) => smaller.chosen.misfit / SMALLER,
+                Some(smaller) => smaller.misfit / SMALLER,
             };
             let beyond = |c: &Candidate| {
-                found.as_ref().is_none_or(|f| f.chosen.candidate.set.iter().all(|m| c.set.contains(m)))
+                found.as_ref().is_none_or(|f| f.candidate.set.iter().all(|m| c.set.contains(m)))
             };
             let wanted: Vec<usize> = (0..self.all.len())
                 .filter(|&i| self.all[i].set.len() == size && beyond(&self.all[i]))
@@ -113,17 +122,14 @@ impl<'a> Judge<'a> {
             let needed = |i: usize| self.judged(i).filter(|j| self.needed(i, j) && self.beats_its_parts(j));
             let mut judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
             judged.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
-            if judged.is_empty() {
-                if found.is_some() {
-                    break;
-                }
-                continue;
+            match judged.into_iter().next() {
+                Some(likeliest) => found = Some(likeliest),
+                None if found.is_some() => break,
+                None => {}
             }
-            let chosen = judged.remove(0);
-            let rivals = self.rivals(&chosen);
-            found = Some(MainCause { chosen, rivals });
         }
-        found
+        let chosen = found?;
+        Some(MainCause { rivals: self.rivals(&chosen), chosen })
     }
 
     /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them.
@@ -142,10 +148,7 @@ impl<'a> Judge<'a> {
         let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
         let by_chance = CHANCE * (2.0 * rows as f64).sqrt();
         let Some(left) = self.misfit(set).filter(|left| *left > by_chance) else { return true };
-        set.iter().all(|m| {
-            let without: Vec<usize> = set.iter().copied().filter(|o| o != m).collect();
-            self.misfit(&without).is_none_or(|misfit| misfit >= left)
-        })
+        set.iter().all(|m| self.misfit(&without(set, *m)).is_none_or(|misfit| misfit >= left))
     }
 
     /// Whether each member of a set takes away most of what is left without it.
@@ -153,10 +156,9 @@ impl<'a> Judge<'a> {
         let set = &self.all[at].set;
         let Some((_, left)) = &self.plain[at] else { return false };
         set.len() == 1
-            || set.iter().all(|m| {
-                let without: Vec<usize> = set.iter().copied().filter(|o| o != m).collect();
-                self.misfit(&without).is_none_or(|misfit| misfit >= SMALLER * left)
-            })
+            || set
+                .iter()
+                .all(|m| self.misfit(&without(set, *m)).is_none_or(|misfit| misfit >= SMALLER * left))
     }
 
     /// A candidate fitted with a leftover; none where it is no explanation then.
@@ -205,15 +207,15 @@ impl<'a> Judge<'a> {
         let Ok(curves) = Curves::new(self.problem, &judged.candidate.fit) else { return false };
         let with = judged.candidate.evidence - judged.process.log_prior(self.problem);
         whole.set.iter().all(|m| {
-            let set: Vec<usize> = whole.set.iter().copied().filter(|o| o != m).collect();
-            let near = self.all.iter().position(|c| c.set == set).and_then(|i| self.plain[i].as_ref());
+            let set = without(&whole.set, *m);
+            let near = self.at(&set).and_then(|i| self.plain[i].as_ref());
             let Some((near, _)) = near else { return true };
             let selection = self.problem.select(&set, &[]);
-            let without = || -> Result<f64, PredictError> {
+            let refitted = || -> Result<f64, PredictError> {
                 let fit = given(self.problem, &selection, &curves, &judged.process, near)?;
                 Ok(evidence(self.problem, &set, &[], &selection, &fit).0)
             };
-            without().is_ok_and(|without| with > without + NEEDED)
+            refitted().is_ok_and(|alone| with > alone + NEEDED)
         })
     }
 
@@ -222,13 +224,8 @@ impl<'a> Judge<'a> {
         let set = &judged.candidate.set;
         set.len() == 1
             || set.iter().all(|m| {
-                let part = |c: &Candidate| {
-                    c.set.len() + 1 == set.len()
-                        && !c.set.contains(m)
-                        && c.set.iter().all(|o| set.contains(o))
-                };
-                let without = self.all.iter().position(part).and_then(|i| self.judged(i));
-                without.is_none_or(|w| judged.candidate.evidence > w.candidate.evidence + NEEDED)
+                let part = self.at(&without(set, *m)).and_then(|i| self.judged(i));
+                part.is_none_or(|w| judged.candidate.evidence > w.candidate.evidence + NEEDED)
             })
     }
 

@@ -43,15 +43,21 @@ pub(crate) fn clearly(alpha: f64) -> f64 {
     alpha / 5.0
 }
 
+/// How probable each of several sets is, by their log evidence.
+pub(crate) fn probabilities(evidence: &[f64]) -> Vec<f64> {
+    let most = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = evidence.iter().map(|e| (e - most).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    weights.into_iter().map(|w| w / total).collect()
+}
+
 impl Ranking {
     pub(crate) fn new(all: Vec<Candidate>, base: HeldOut) -> Self {
         let mut order: Vec<usize> =
             (0..all.len()).filter(|&i| all[i].ruled_out.is_none() && all[i].evidence.is_finite()).collect();
         order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
-        let most = order.first().map_or(0.0, |&i| all[i].evidence);
-        let weights: Vec<f64> = order.iter().map(|&i| (all[i].evidence - most).exp()).collect();
-        let total: f64 = weights.iter().sum();
-        let physical = order.into_iter().zip(weights.into_iter().map(|w| w / total)).collect();
+        let evidence: Vec<f64> = order.iter().map(|&i| all[i].evidence).collect();
+        let physical = order.into_iter().zip(probabilities(&evidence)).collect();
         Self { all, physical, base, scores: Vec::new() }
     }
 
