@@ -105,7 +105,11 @@ impl<'a> Judge<'a> {
     }
 
     /// The smallest set that takes away nearly all and is needed as a whole; larger ones only where they take away most of what that leaves.
+    /// None where the baseline predicts unseen data within their noise: there is no misfit to take away.
     pub(crate) fn main_cause(&self) -> Option<MainCause> {
+        if self.base <= self.by_chance() {
+            return None;
+        }
         let mut found: Option<Judged> = None;
         for size in 1..=self.all.iter().map(|c| c.set.len()).max()? {
             let limit = match &found {
@@ -143,11 +147,15 @@ impl<'a> Judge<'a> {
         order.into_iter().find_map(|(_, i)| self.judged(i))
     }
 
+    /// The misfit that noise alone may leave.
+    fn by_chance(&self) -> f64 {
+        let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
+        CHANCE * (2.0 * rows as f64).sqrt()
+    }
+
     /// Whether a set leaves nothing but noise, or predicts unseen data no worse than it does without any one member.
     pub(crate) fn holds(&self, set: &[usize]) -> bool {
-        let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
-        let by_chance = CHANCE * (2.0 * rows as f64).sqrt();
-        let Some(left) = self.misfit(set).filter(|left| *left > by_chance) else { return true };
+        let Some(left) = self.misfit(set).filter(|left| *left > self.by_chance()) else { return true };
         set.iter().all(|m| self.misfit(&without(set, *m)).is_none_or(|misfit| misfit >= left))
     }
 
