@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             options: Options::default(),
             threads: 0,
         };
-        println!("== {title}\n{}", diagnose(&arguments, &Silent)?);
+        println!("== {title}\n{}", diagnose(&arguments, &Silent)?.text);
         Ok(())
     };
     println!("Hidden: dry friction, 0.04 rad/s^2.\n");

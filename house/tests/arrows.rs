@@ -35,6 +35,7 @@ fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
                 .chain(SHARED)
                 .chain(["missing-physics", "missing-physics-pours"])
                 .collect(),
+            "missing-physics-import" => vec!["missing-physics-domains"],
             // The proof draws the worlds.
             "missing-physics-prove" => {
                 vec!["missing-physics", "missing-physics-domains", "missing-physics-report", "worlds"]
@@ -42,6 +43,7 @@ fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
             "missing-physics-cli" => vec![
                 "missing-physics",
                 "missing-physics-domains",
+                "missing-physics-import",
                 "missing-physics-prove",
                 "missing-physics-report",
             ],

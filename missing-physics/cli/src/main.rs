@@ -1,20 +1,30 @@
 //! The command line of `missing-physics`.
 
+mod progress;
+
+use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 use missing_physics::engine::Options;
-use missing_physics::observer::{Observer, Progress};
-use missing_physics_cli::commands::{self, CommandError, DiagnoseArguments};
+use missing_physics_cli::commands::{self, CommandError, DiagnoseArguments, Said};
+use missing_physics_domains::recording::program_of;
+use missing_physics_import::Request;
 use missing_physics_prove::{ProveArguments, prove};
+use progress::{Loudness, Steps};
 
 /// Says which physics a simulation leaves out, from recordings.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Arguments {
+    /// Print errors alone: no report, no progress.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Print each step and the time that it took, on standard error.
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -25,7 +35,7 @@ enum Command {
     Diagnose {
         /// The recording's folder (it holds recording.toml).
         folder: PathBuf,
-        /// Write the answer as JSON as well.
+        /// Write the answer as JSON as well; - for standard output (the text is then on standard error).
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
         /// Write the report as one HTML page as well.
@@ -46,6 +56,42 @@ enum Command {
         /// Rate of false alarms that is put up with, above 0 and below 0.5.
         #[arg(long, default_value_t = 0.05)]
         alpha: f64,
+        /// Start the program that the recording names (`custom`): recordings are passed on, and it may do anything.
+        #[arg(long)]
+        allow_command: bool,
+    },
+    /// Makes a recording of a laboratory's files: CSV, MCAP and ROS 2 bags, Parquet, NumPy, MATLAB, WAV.
+    Import {
+        /// Files, or the folder of a bag or data set; several files are runs of one recording.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// What it is a recording of (see `domains`); without it the columns are listed.
+        #[arg(long)]
+        domain: Option<String>,
+        /// The folder to make; without it nothing is written.
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// A column: z_m="Höhe (mm)", z_m="-Höhe (mm) + 1.2" (offset in m), t_s="Zeit [ms]" where the file says no unit, x_m= for none.
+        #[arg(long = "map", value_name = "COLUMN=NAME")]
+        maps: Vec<String>,
+        /// A value of recording.toml: liquid_mass_kg="282 g", noise.z_m=0.002.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        settings: Vec<String>,
+        /// The column that tells runs apart.
+        #[arg(long, value_name = "NAME")]
+        run: Option<String>,
+        /// A pause longer than this begins a new run.
+        #[arg(long, value_name = "SECONDS")]
+        gap: Option<f64>,
+        /// So many rows are a run.
+        #[arg(long, value_name = "ROWS")]
+        every: Option<usize>,
+        /// Rows a second, where no column tells the time.
+        #[arg(long, value_name = "HZ")]
+        rate: Option<f64>,
+        /// Take recording.toml from this recording.
+        #[arg(long, value_name = "FOLDER")]
+        like: Option<PathBuf>,
     },
     /// Predicts a recording by a repaired model: simulated channels as CSV, with intervals.
     Predict {
@@ -56,6 +102,9 @@ enum Command {
         /// Write the table to a file instead of printing it.
         #[arg(long, value_name = "FILE")]
         csv: Option<PathBuf>,
+        /// Start the program that the recording names (`custom`).
+        #[arg(long)]
+        allow_command: bool,
     },
     /// Proves the tool on concealed effects: draws worlds, seals the answers, diagnoses, opens the seal, scores.
     Prove {
@@ -94,68 +143,130 @@ enum Command {
     },
 }
 
-/// A bar on a terminal, nothing in a pipe.
-struct Bar(Option<ProgressBar>);
-
-impl Bar {
-    fn new() -> Self {
-        if !std::io::stderr().is_terminal() {
-            return Self(None);
-        }
-        let bar = ProgressBar::new(100);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {msg}") {
-            bar.set_style(style);
-        }
-        Self(Some(bar))
-    }
-}
-
-impl Observer for Bar {
-    fn progress(&self, progress: Progress<'_>) -> bool {
-        if let Some(bar) = &self.0 {
-            bar.set_message(progress.stage.to_owned());
-            bar.set_position((100.0 * progress.done) as u64);
-        }
-        true
-    }
-}
-
-impl Drop for Bar {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.0 {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-fn run(command: Command) -> Result<String, CommandError> {
+fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
     match command {
-        Command::Diagnose { folder, json, html, svg, write_model, seed, threads, alpha } => {
+        Command::Diagnose { folder, json, html, svg, write_model, seed, threads, alpha, allow_command } => {
+            permit(&folder, allow_command)?;
+            on_interrupt("nothing was written".into());
             let options = Options { alpha, seed, ..Options::default() };
+            let threads = useful(threads);
             let arguments =
                 DiagnoseArguments { folder, json, html, svg, model: write_model, options, threads };
-            commands::diagnose(&arguments, &Bar::new())
+            commands::diagnose(&arguments, &Steps::new(loudness))
         }
-        Command::Predict { model, folder, csv } => commands::predict(&model, &folder, csv.as_deref()),
+        Command::Import { files, domain, out, maps, settings, run, gap, every, rate, like } => {
+            let (gap_s, rate_hz) = (gap, rate);
+            let request =
+                Request { files, maps, settings, run, gap_s, every, rate_hz, like, ..Request::default() };
+            Ok(commands::import(&request, domain.as_deref(), out.as_deref())?.into())
+        }
+        Command::Predict { model, folder, csv, allow_command } => {
+            permit(&folder, allow_command)?;
+            on_interrupt("nothing was written".into());
+            commands::predict(&model, &folder, csv.as_deref())
+        }
         Command::Prove { domain, worlds, kind, seed, out, threads } => {
-            Ok(prove(&ProveArguments { domain, worlds, kind, seed, folder: out, threads }, &Bar::new())?)
+            let threads = useful(threads);
+            on_interrupt(format!(
+                "worlds that were judged are kept in {}, the same command goes on",
+                out.display()
+            ));
+            let arguments = ProveArguments { domain, worlds, kind, seed, folder: out, threads };
+            Ok(prove(&arguments, &Steps::new(loudness))?.into())
         }
-        Command::Domains => Ok(commands::domains()),
-        Command::Check { folder } => commands::check(&folder),
-        Command::New { domain, folder } => commands::new(&domain, &folder),
+        Command::Domains => Ok(commands::domains().into()),
+        Command::Check { folder } => Ok(commands::check(&folder)?.into()),
+        Command::New { domain, folder } => Ok(commands::new(&domain, &folder)?.into()),
+    }
+}
+
+/// Asks, on a terminal, whether the program that a recording names may be started.
+///
+/// # Errors
+/// [`CommandError::Program`] where nobody allows it.
+fn permit(folder: &Path, allowed: bool) -> Result<(), CommandError> {
+    let Some(command) = program_of(folder).filter(|_| !allowed) else { return Ok(()) };
+    let program = command.join(" ");
+    let refused = || CommandError::Program { folder: folder.into(), program: program.clone() };
+    let (stdin, mut stderr) = (std::io::stdin(), std::io::stderr());
+    if !(stdin.is_terminal() && stderr.is_terminal()) {
+        return Err(refused());
+    }
+    let question = format!("{}: starts the program {program}\nmay it run? [y/N] ", folder.display());
+    let mut answer = String::new();
+    let asked =
+        stderr.write_all(shown(&question, true).as_bytes()).and_then(|()| stdin.read_line(&mut answer));
+    let yes = ["y", "yes"].contains(&answer.trim().to_lowercase().as_str());
+    if asked.is_ok() && yes { Ok(()) } else { Err(refused()) }
+}
+
+/// Says what is kept where the work is interrupted, and ends what recordings have started.
+fn on_interrupt(kept: String) {
+    // Without a handler an interruption ends the program as well, and says nothing.
+    let _ = ctrlc::set_handler(move || {
+        missing_physics_domains::custom::end_all();
+        let _ = writeln!(std::io::stderr(), "\nmissing-physics: stopped; {}", shown(&kept, true));
+        std::process::exit(130);
+    });
+}
+
+/// No more threads than can do any good: four for each core.
+fn useful(threads: usize) -> usize {
+    threads.min(4 * std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// A text whose control characters move no cursor, where a terminal would obey them.
+fn shown(text: &str, terminal: bool) -> Cow<'_, str> {
+    let obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if !terminal || !text.contains(obeyed) {
+        return text.into();
+    }
+    let escaped = |c: char| if obeyed(c) { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(escaped).collect::<String>().into()
+}
+
+/// Prints what a command says, then writes its files.
+fn deliver(said: &Said, quiet: bool) -> Result<(), String> {
+    let printed = if quiet {
+        Ok(())
+    } else if said.takes_stdout() {
+        let mut err = std::io::stderr().lock();
+        err.write_all(shown(&said.text, std::io::stderr().is_terminal()).as_bytes())
+    } else {
+        let mut out = std::io::stdout().lock();
+        let text = shown(&said.text, std::io::stdout().is_terminal());
+        out.write_all(text.as_bytes()).and_then(|()| out.flush())
+    };
+    said.write_files().map_err(|error| error.to_string())?;
+    match printed {
+        // A reader that has gone away is no failure of ours.
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(format!("standard output: {error}"))
+        }
+        _ => Ok(()),
     }
 }
 
 fn main() -> ExitCode {
     // Clap prints its own messages, and leaves with status 2 for a wrong call.
-    match run(Arguments::parse().command) {
-        Ok(text) => {
-            // A reader that has gone away is no failure of ours.
-            let _ = std::io::stdout().lock().write_all(text.as_bytes());
-            ExitCode::SUCCESS
-        }
+    let Arguments { quiet, verbose, command } = Arguments::parse();
+    let loudness = match (quiet, verbose) {
+        (true, _) => Loudness::Quiet,
+        (_, true) => Loudness::Verbose,
+        _ => Loudness::Usual,
+    };
+    let done = run(command, loudness);
+    if let Err(CommandError::Unsound { text, .. }) = &done
+        && !quiet
+    {
+        // What was taken for what is what helps; a reader that has gone away misses nothing.
+        let _ = std::io::stdout().lock().write_all(shown(text, std::io::stdout().is_terminal()).as_bytes());
+    }
+    let delivered = done.map_err(|error| error.to_string()).and_then(|said| deliver(&said, quiet));
+    match delivered {
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "missing-physics: {error}");
+            let _ = writeln!(std::io::stderr(), "missing-physics: {}", shown(&error, true));
             ExitCode::from(2)
         }
     }

@@ -15,7 +15,9 @@ fn diagnose(folder: &Path) -> Result<Value, String> {
     let out = tempfile::tempdir().unwrap();
     let json = out.path().join("a.json");
     let tool = env!("CARGO_BIN_EXE_missing-physics");
-    let output = Command::new(tool).arg("diagnose").arg(folder).arg("--json").arg(&json).output().unwrap();
+    let mut command = Command::new(tool);
+    command.arg("diagnose").arg(folder).arg("--allow-command").arg("--json").arg(&json);
+    let output = command.output().unwrap();
     match output.status.code() {
         Some(0) => Ok(serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap()),
         Some(2) => {
@@ -98,6 +100,60 @@ fn a_simulator_that_hangs_is_stopped_in_time() {
     let begin = std::time::Instant::now();
     assert!(said_of(script).contains("the simulator gave no answer within 0.3 s"));
     assert!(begin.elapsed().as_secs() < 30);
+}
+
+/// A recording that somebody else made may start anything.
+#[test]
+fn nothing_is_started_that_nobody_allows() {
+    let folder = line("[simulator]\ncommand = [\"touch\", \"started\"]\n");
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output = Command::new(tool).arg("diagnose").arg(folder.path()).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), said.lines().count()), (Some(2), 1), "{said}");
+    assert!(
+        said.contains("starts the program \"touch started\"") && said.contains("--allow-command"),
+        "{said}"
+    );
+    assert!(!folder.path().join("started").exists());
+    // To read it is no danger.
+    assert!(Command::new(tool).arg("check").arg(folder.path()).output().unwrap().status.success());
+    assert!(!folder.path().join("started").exists());
+}
+
+/// Answers once, starts a sleeper that outlives it, and floods its last words.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_simulator_has_started_ends_with_it() {
+    let script = "sleep 987 & echo $! > sleeper; head -c 50000000 /dev/zero >&2; read l; echo nonsense; cat";
+    let simulator = format!("[simulator]\ncommand = [\"sh\", \"-c\", '''{script}''']\n");
+    let parameter = "[[parameter]]\nname = \"slope\"\nstart = 1.0\nscale = 0.1\n";
+    let folder = line(&format!("{simulator}{parameter}"));
+    assert!(diagnose(folder.path()).unwrap_err().contains("nonsense"));
+    let sleeper = std::fs::read_to_string(folder.path().join("sleeper")).unwrap();
+    let status = std::fs::read_to_string(format!("/proc/{}/status", sleeper.trim())).unwrap_or_default();
+    // Gone, or dead and not yet buried by whoever adopted it.
+    assert!(status.is_empty() || status.contains("State:\tZ"), "{status}");
+}
+
+/// It answers, hangs at its second question, and answers again when it is started anew.
+#[test]
+fn a_slow_answer_is_asked_for_again() {
+    let line_of = "awk -v id=$id 'BEGIN { printf \"{\\\"id\\\": %d, \\\"channels\\\": {\\\"y_m\\\": [\", id; for (i = 0; i < 12; i++) printf \"%s%d\", (i ? \",\" : \"\"), i; print \"]}}\" }'";
+    let script = format!(
+        "n=0; while read l; do n=$((n+1)); if [ $n = 2 ] && [ ! -e hung ]; then touch hung; sleep 1000; fi; \
+         id=$(echo \"$l\" | sed 's/.*\"id\":\\([0-9]*\\).*/\\1/'); {line_of}; done"
+    );
+    let folder = line("");
+    let path = folder.path().join("recording.toml");
+    let header = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(folder.path().join("simulate.sh"), script).unwrap();
+    std::fs::write(
+        &path,
+        format!("{header}[simulator]\ncommand = [\"sh\", \"simulate.sh\"]\ntimeout_s = 2\n"),
+    )
+    .unwrap();
+    diagnose(folder.path()).unwrap();
+    assert!(folder.path().join("hung").exists());
 }
 
 #[test]

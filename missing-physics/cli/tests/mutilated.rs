@@ -110,11 +110,12 @@ fn answered(kind: &Kind, folder: &Path) -> Option<String> {
         ..DiagnoseArguments::default()
     };
     match diagnose(&arguments, &Silent) {
-        Ok(text) => {
+        Ok(said) => {
+            said.write_files().unwrap();
             let whole = std::fs::read_to_string(json)
                 .is_ok_and(|text| serde_json::from_str::<serde_json::Value>(&text).is_ok())
                 && std::fs::read_to_string(html).is_ok_and(|page| page.trim_end().ends_with("</html>"))
-                && !text.is_empty();
+                && !said.text.is_empty();
             (!whole).then(|| "left half a report".into())
         }
         Err(error) => {

@@ -3,7 +3,7 @@
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Experiment, Model, Quantity, Spec};
 
-use crate::recording::{Header, ReadError};
+use crate::recording::{Column, ColumnContents, Header, ReadError};
 
 /// The thesis whose rigs the domains follow, in full; mechanisms cite it by the key with which this begins.
 pub const THESIS: &str = "[Matl 2021] Carolyn Chen Matl, Interactive Perception for Robotic Manipulation of Liquids, Grains, and \
@@ -17,10 +17,18 @@ pub trait Domain: Sync {
     fn summary(&self) -> &'static str;
     /// The files, columns and keys that it reads, a line each.
     fn reads(&self) -> &'static [(&'static str, &'static str)];
+    /// The columns of its table; none where the recording itself names them.
+    fn columns(&self) -> &'static [Column<'static>] {
+        &[]
+    }
     /// The fullest model of the domain, for `domains`.
     fn spec(&self) -> Spec;
     /// A recording to begin from.
     fn template(&self) -> Template;
+    /// Files that the template's table names: name and contents.
+    fn template_files(&self) -> &'static [(&'static str, &'static [u8])] {
+        &[]
+    }
     /// Whether its channels are what is measured, so that a model of them can predict a run; false where the engine is shown
     /// errors that the domain has whitened.
     fn predicts(&self) -> bool {
@@ -46,6 +54,10 @@ pub struct Template {
 pub struct CheckedRecording {
     /// What the recording holds.
     pub contents: Contents,
+    /// What looks like a mistake in a unit or a sign, a sentence each.
+    pub hints: Vec<String>,
+    /// The columns of the table that hold numbers.
+    pub columns: Vec<ColumnContents>,
     prepare: Box<dyn FnOnce() -> Result<Loaded, ReadError> + Send>,
 }
 
@@ -55,7 +67,13 @@ impl CheckedRecording {
         contents: Contents,
         prepare: impl FnOnce() -> Result<Loaded, ReadError> + Send + 'static,
     ) -> Self {
-        Self { contents, prepare: Box::new(prepare) }
+        Self { contents, hints: Vec::new(), columns: Vec::new(), prepare: Box::new(prepare) }
+    }
+
+    /// The same recording with what looks like a mistake in it.
+    pub fn with_hints(mut self, hints: impl IntoIterator<Item = String>) -> Self {
+        self.hints.extend(hints);
+        self
     }
 
     /// Does that work: learns and simulates what the recording's model needs.
@@ -63,7 +81,9 @@ impl CheckedRecording {
     /// # Errors
     /// [`ReadError::Unfit`] where that cannot be done with this recording, or what is wrong with its rows.
     pub fn prepare(self) -> Result<Loaded, ReadError> {
-        (self.prepare)()
+        let mut loaded = (self.prepare)()?;
+        loaded.hints = self.hints;
+        Ok(loaded)
     }
 }
 
@@ -137,6 +157,8 @@ pub struct Loaded {
     pub experiments: Vec<Experiment>,
     /// What such data cannot determine, one sentence each.
     pub undetermined: Vec<String>,
+    /// What looks like a mistake in a unit or a sign, one sentence each.
+    pub hints: Vec<String>,
     /// What the domain adds to the answer (impacts that were heard in sound), by the key it has there.
     pub additions: serde_json::Map<String, serde_json::Value>,
 }
@@ -149,8 +171,8 @@ impl Loaded {
         experiments: Vec<Experiment>,
         undetermined: Vec<String>,
     ) -> Self {
-        let additions = serde_json::Map::new();
-        Self { recording, model: Box::new(model), experiments, undetermined, additions }
+        let (hints, additions) = (Vec::new(), serde_json::Map::new());
+        Self { recording, model: Box::new(model), experiments, undetermined, hints, additions }
     }
 }
 

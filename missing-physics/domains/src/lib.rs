@@ -22,6 +22,16 @@ pub mod motion;
     feature = "bounce",
     feature = "custom",
     feature = "dough-roll",
+    feature = "indentation",
+    feature = "liquid-tilt",
+    feature = "slosh",
+    feature = "trajectory"
+))]
+mod plausible;
+#[cfg(any(
+    feature = "bounce",
+    feature = "custom",
+    feature = "dough-roll",
     feature = "grain-pour",
     feature = "indentation",
     feature = "liquid-tilt",

@@ -78,8 +78,10 @@ fn read(header: &Header) -> Result<(&'static dyn Domain, CheckedRecording), Read
     let expected = format!("one of: {}", known().join(", "));
     let id = header.root().text("domain", &expected)?;
     let domain = find(id).map_err(|_| header.root().unfit("domain", quoted(id), expected))?;
-    let checked = domain.read(header)?;
+    let mut checked = domain.read(header)?;
     header.finish()?;
+    checked.columns = header.columns();
+    checked.hints.extend(header.placeholders());
     Ok((domain, checked))
 }
 

@@ -1,11 +1,12 @@
 //! `diagnose`: a recording in, a report out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use missing_physics::engine::{Options, diagnose as run};
 use missing_physics::observer::Observer;
 
-use super::error::{CommandError, write_whole};
+use super::error::CommandError;
+use super::output::{Said, places};
 use super::provenance::provenance;
 use missing_physics_domains as domains;
 use missing_physics_domains::repair::{Repair, RepairError};
@@ -30,20 +31,15 @@ pub struct DiagnoseArguments {
     pub threads: usize,
 }
 
-/// Diagnoses a recording, writes the files asked for and returns the text.
+/// Diagnoses a recording, and returns the text with the files that are to be written after it.
 ///
 /// # Errors
-/// [`CommandError`]; nothing is written then.
-pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<String, CommandError> {
-    for path in arguments.json.iter().chain(&arguments.html).chain(&arguments.svg).chain(&arguments.model) {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            return Err(CommandError::NoFolder { folder: folder.into() });
-        }
-        if path.is_dir() {
-            return Err(CommandError::NotAFile { path: path.into() });
-        }
-    }
+/// [`CommandError`]; outputs that cannot be written are refused before the work begins.
+pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<Said, CommandError> {
+    let asked = [&arguments.json, &arguments.html, &arguments.svg, &arguments.model];
+    let outputs: Vec<&std::path::Path> = asked.iter().filter_map(|path| path.as_deref()).collect();
+    let mut places = places(&outputs, &domains::recording::files_of(&arguments.folder))?.into_iter();
+    let [json, html, svg, model] = asked.map(|path| path.as_ref().and_then(|_| places.next()));
     let threads = arguments.threads;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -57,6 +53,7 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
         run(&*loaded.model, &loaded.recording, &loaded.experiments, &arguments.options, observer)
     })?;
     diagnosis.undetermined.extend(loaded.undetermined);
+    diagnosis.remarks.extend(loaded.hints.iter().map(|hint| format!("look at the units: {hint}")));
     let context = ReportContext {
         domain: domain.id().to_owned(),
         recording: arguments.folder.display().to_string(),
@@ -68,17 +65,18 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
         additions: loaded.additions,
         provenance: provenance(&arguments.folder, &arguments.options),
     };
-    if let Some(path) = &arguments.json {
-        write_whole(path, report::json(&diagnosis, &context))?;
+    let mut said = Said::from(report::text(&diagnosis, &context));
+    if let Some(place) = &json {
+        said.write(place, report::json(&diagnosis, &context));
     }
-    if let Some(path) = &arguments.html {
-        write_whole(path, report::html(&diagnosis, &context))?;
+    if let Some(place) = &html {
+        said.write(place, report::html(&diagnosis, &context));
     }
-    if let Some(path) = &arguments.svg {
-        write_whole(path, report::picture(&diagnosis))?;
+    if let Some(place) = &svg {
+        said.write(place, report::picture(&diagnosis));
     }
-    if let Some(path) = &arguments.model {
-        write_whole(path, Repair::new(domain, &diagnosis).to_json())?;
+    if let Some(place) = &model {
+        said.write(place, Repair::new(domain, &diagnosis).to_json());
     }
-    Ok(report::text(&diagnosis, &context))
+    Ok(said)
 }

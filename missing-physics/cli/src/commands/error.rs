@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use missing_physics_domains::recording::quoted;
+
 /// Why a command failed; its text is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
@@ -17,6 +19,17 @@ pub enum CommandError {
     /// The repaired model cannot be read, or does not fit the recording.
     #[error(transparent)]
     Repair(#[from] missing_physics_domains::repair::RepairError),
+    /// A file cannot be imported.
+    #[error(transparent)]
+    Import(#[from] missing_physics_import::ImportError),
+    /// What was imported is no sound recording; nothing is left of it.
+    #[error("{why} (--map, --run and --every settle what was taken for what; without --out it is shown)")]
+    Unsound {
+        /// What was taken for what.
+        text: String,
+        /// What `check` says.
+        why: String,
+    },
     /// The proof cannot go on.
     #[error(transparent)]
     Prove(#[from] missing_physics_prove::ProveError),
@@ -30,6 +43,28 @@ pub enum CommandError {
     #[error("{}: a folder, expected the name of a file", .path.display())]
     NotAFile {
         /// The folder.
+        path: PathBuf,
+    },
+    /// The recording starts a program, and nobody has allowed it.
+    #[error(
+        "{}: starts the program {}; call again with --allow-command where you trust it", .folder.display(), quoted(.program)
+    )]
+    Program {
+        /// The recording's folder.
+        folder: PathBuf,
+        /// The program and its arguments.
+        program: String,
+    },
+    /// A file that is read would be written over.
+    #[error("{}: is read, and cannot be an output as well", .path.display())]
+    IsInput {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Two outputs have one name.
+    #[error("{}: two outputs of one name, expected a name for each", .path.display())]
+    Twice {
+        /// The name.
         path: PathBuf,
     },
     /// The folder of a new recording holds something.
@@ -54,10 +89,4 @@ pub enum CommandError {
         /// What the thread pool says.
         error: rayon::ThreadPoolBuildError,
     },
-}
-
-/// Writes a file whole or not at all.
-pub(super) fn write_whole(path: &std::path::Path, contents: impl AsRef<[u8]>) -> Result<(), CommandError> {
-    missing_physics_report::write_whole(path, contents)
-        .map_err(|error| CommandError::Io { path: path.into(), error })
 }

@@ -56,8 +56,13 @@ pub fn check(folder: &Path) -> Result<String, CommandError> {
     let mut text = String::new();
     let _ = writeln!(text, "{}: a sound recording of the domain {}", folder.display(), domain.id());
     let _ = writeln!(text, "  {} runs, {rows} rows; measured: {}", runs.len(), names.join(", "));
+    for column in &checked.columns {
+        let [low, high] = column.range.map(short);
+        let _ =
+            writeln!(text, "{}", format!("    {}: {low} to {high} {}", column.name, column.unit).trim_end());
+    }
     for run in runs {
-        let [from, to] = run.from_to;
+        let [from, to] = run.from_to.map(short);
         let line = format!("    run {}: {} rows, {from} to {to} {}", run.label, run.rows, variable.unit);
         let _ = writeln!(text, "{}", line.trim_end());
     }
@@ -69,5 +74,13 @@ pub fn check(folder: &Path) -> Result<String, CommandError> {
     let ids: Vec<&str> = spec.mechanisms.iter().map(|m| m.id.as_str()).collect();
     let _ = writeln!(text, "  mechanisms that can show: {}", ids.join(", "));
     let _ = writeln!(text, "  unknowns of the baseline: {} in each run", spec.count(Scope::PerRun));
+    for hint in &checked.hints {
+        let _ = writeln!(text, "  hint: {hint}");
+    }
     Ok(text)
+}
+
+/// A number in six digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }

@@ -1,14 +1,18 @@
-//! What the command line calls. Each command returns its text; only `main` prints.
+//! What the command line calls. Each command returns what it says; only `main` prints.
 
 mod diagnose;
 mod error;
+mod import;
 mod list;
 mod new;
+mod output;
 mod predict;
 mod provenance;
 
 pub use diagnose::{DiagnoseArguments, diagnose};
 pub use error::CommandError;
+pub use import::import;
 pub use list::{check, domains};
 pub use new::new;
+pub use output::Said;
 pub use predict::predict;

@@ -3,20 +3,24 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::error::{CommandError, write_whole};
+use super::error::CommandError;
+use super::output::{Said, places};
 use missing_physics_domains::repair::Repair;
 
 /// Half the width of a 95 % interval of a normal law, in sigmas.
 const SIGMAS: f64 = 1.959_963_984_540_054;
 
-/// Predicts a recording and returns a table, or writes it to a file and says so.
+/// Predicts a recording and returns a table, or has it written to a file and says so.
 ///
 /// Columns: `run`, the inputs, and for each channel its simulated value, one sigma of that, and the bounds between which a
 /// reading lies with 95 %.
 ///
 /// # Errors
-/// [`CommandError`]; nothing is written then.
-pub fn predict(model: &Path, folder: &Path, csv: Option<&Path>) -> Result<String, CommandError> {
+/// [`CommandError`]; an output that cannot be written is refused before the work begins.
+pub fn predict(model: &Path, folder: &Path, csv: Option<&Path>) -> Result<Said, CommandError> {
+    let mut inputs = missing_physics_domains::recording::files_of(folder);
+    inputs.push(model.into());
+    let places = places(&csv.into_iter().collect::<Vec<_>>(), &inputs)?;
     let repair = Repair::read(model)?;
     let predicted = repair.predict(folder)?;
     let recording = &predicted.recording;
@@ -44,13 +48,10 @@ pub fn predict(model: &Path, folder: &Path, csv: Option<&Path>) -> Result<String
             text.push('\n');
         }
     }
-    match csv {
-        None => Ok(text),
-        Some(path) => {
-            write_whole(path, &text)?;
-            Ok(format!("{}: {} runs predicted\n", path.display(), predicted.runs.len()))
-        }
-    }
+    let (Some(path), Some(place)) = (csv, places.first()) else { return Ok(text.into()) };
+    let mut said = Said::from(format!("{}: {} runs predicted\n", path.display(), predicted.runs.len()));
+    said.write(place, text);
+    Ok(said)
 }
 
 /// A label as a cell of a CSV.

@@ -27,6 +27,7 @@ use self::read::{Rig, heard};
 use self::setup::Setup;
 use self::spread::Calibration;
 use crate::domain::{CheckedRecording, Domain, Template};
+use crate::plausible;
 use crate::reading::{GRAVITY_M_S2, number};
 use crate::recording::{Column, Header, ReadError};
 
@@ -67,6 +68,10 @@ impl Domain for Bounce {
             ("[rig] gravity_m_s2", "optional: 9.80665 m/s^2 if absent"),
             ("[noise] t_s, x_m, y_m", "optional: one sigma from a calibration"),
         ]
+    }
+
+    fn columns(&self) -> &'static [Column<'static>] {
+        &COLUMNS
     }
 
     fn spec(&self) -> Spec {
@@ -120,12 +125,16 @@ impl Domain for Bounce {
         }
         header.root().text("data", "the name of a CSV file (or [audio] files)")?;
         let table = header.table("data", &COLUMNS)?;
-        let drops = Drops::new(heard(&table, &rig)?, rig, calibration, Microphones::default());
-        Ok(CheckedRecording::new(drops.contents(), move || {
+        let heard = heard(&table, &rig)?;
+        let times: Vec<Vec<f64>> = heard.iter().map(|h| h.drop.times_s.clone()).collect();
+        let hint = plausible::beat(&times, rig.gravity_m_s2);
+        let drops = Drops::new(heard, rig, calibration, Microphones::default());
+        let checked = CheckedRecording::new(drops.contents(), move || {
             drops.assemble().map_err(|(row, what)| {
                 let time = table.numbers("t_s").map_or(f64::NAN, |t| t[row]);
                 table.cell(row, "t_s", time, what)
             })
-        }))
+        });
+        Ok(checked.with_hints(hint))
     }
 }

@@ -12,11 +12,13 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Experiment, Quantity, Scope, Spec, SpecBuilder};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::plausible;
 use crate::reading::{calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Table, quoted};
 pub use answer::{Failure, read_answer};
 use model::{CustomModel, Program, Simulation};
 use process::Pool;
+pub use process::end_all;
 use terms::Sizes;
 
 /// A run with fewer rows says nothing of a curve.
@@ -123,6 +125,10 @@ impl Domain for Custom {
             None => Simulation::Precomputed(precomputed(&table, &simulated)?),
         };
         let resolution = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution)).collect();
+        let columns = channels.iter().chain(&inputs);
+        let largest =
+            |name: &str| table.numbers(name).unwrap_or_default().iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let hints = plausible::angles(columns.map(|q| (q.name.as_str(), largest(&q.name))));
         let recording = Recording {
             channels,
             variables: inputs,
@@ -132,7 +138,8 @@ impl Domain for Custom {
             resolution,
         };
         let model = CustomModel { spec: b.build_unchecked(), simulation, terms, relative_step };
-        Ok(Loaded::new(recording, model, experiments, Vec::new()).into())
+        let loaded = Loaded::new(recording, model, experiments, Vec::new());
+        Ok(CheckedRecording::from(loaded).with_hints(hints))
     }
 }
 

@@ -15,8 +15,9 @@ use crate::recording::quoted;
 
 /// The longest line that a simulator may answer, bytes.
 const LONGEST_LINE: u64 = 64 << 20;
-/// How many of its last words on stderr are kept.
+/// How many of its last words on stderr are kept, and how many bytes of each.
 const LAST_WORDS: usize = 3;
+const LONGEST_WORDS: u64 = 1 << 12;
 /// How long a simulator has for its first answer beyond the time limit: programs take their time to start.
 const START: Duration = Duration::from_secs(30);
 /// How long a simulator that is no longer needed has for its own end.
@@ -80,9 +81,19 @@ impl Pool {
         out: &mut [f64],
     ) -> Result<(), Failure> {
         let (mut process, id) = self.take()?;
-        let answer = process
-            .ask(&Request { id, run, parameters, inputs }, self.start.limit)
-            .and_then(|line| read_answer(&line, id, channels, out));
+        let request = Request { id, run, parameters, inputs };
+        let mut ask = |process: &mut Process| {
+            process.ask(&request, self.start.limit).and_then(|line| read_answer(&line, id, channels, out))
+        };
+        let mut answer = ask(&mut process);
+        // One that has answered before is asked once more, afresh: a slow answer does not lose all that was worked out.
+        if process.hung
+            && process.answered
+            && let Ok(other) = Process::start(&self.start.command, &self.start.folder)
+        {
+            process = other;
+            answer = ask(&mut process).or(answer);
+        }
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match &answer {
             Err(Failure::Fatal(why)) => {
@@ -133,19 +144,23 @@ struct Process {
     answers: Receiver<Vec<u8>>,
     errors: Arc<Mutex<VecDeque<String>>>,
     fresh: bool,
+    /// Whether it has answered a question, and whether it gave no answer in time.
+    answered: bool,
+    hung: bool,
 }
 
 impl Process {
     fn start(command: &[String], folder: &Path) -> Result<Self, String> {
         let (program, arguments) = command.split_first().ok_or("no command to start")?;
-        let mut child = Command::new(program)
-            .args(arguments)
-            .current_dir(folder)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(|e| format!("the simulator {} cannot be started: {e}", quoted(program)))?;
+        let mut start = Command::new(program);
+        start.args(arguments).current_dir(folder);
+        start.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        // A group of its own: what it starts ends with it.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut start, 0);
+        let mut child =
+            start.spawn().map_err(|e| format!("the simulator {} cannot be started: {e}", quoted(program)))?;
+        running().push(child.id());
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(mut stdin), Some(stdout), Some(stderr)) = pipes else {
             return Err(format!("the simulator {} has no pipes", quoted(program)));
@@ -173,7 +188,14 @@ impl Process {
         let errors = Arc::new(Mutex::new(VecDeque::new()));
         let kept = Arc::clone(&errors);
         std::thread::spawn(move || {
-            for line in BufReader::new(stderr).split(b'\n').map_while(Result::ok) {
+            let mut stderr = BufReader::new(stderr);
+            loop {
+                // What comes without an end of line is taken piece by piece.
+                let mut line = Vec::new();
+                match stderr.by_ref().take(LONGEST_WORDS).read_until(b'\n', &mut line) {
+                    Ok(n) if n > 0 => {}
+                    _ => break,
+                }
                 let line = String::from_utf8_lossy(&line).trim().to_owned();
                 let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
                 if !line.is_empty() {
@@ -184,7 +206,15 @@ impl Process {
                 }
             }
         });
-        Ok(Self { child, questions: Some(questions), answers, errors, fresh: true })
+        Ok(Self {
+            child,
+            questions: Some(questions),
+            answers,
+            errors,
+            fresh: true,
+            answered: false,
+            hung: false,
+        })
     }
 
     /// The line that answers a question.
@@ -197,11 +227,16 @@ impl Process {
             return Err(self.ended());
         }
         match self.answers.recv_timeout(limit) {
-            Ok(line) => String::from_utf8(line).map_err(|e| {
-                let got = String::from_utf8_lossy(e.as_bytes()).into_owned();
-                Failure::Fatal(format!("the simulator answered {}, which is no text", quoted(&got)))
-            }),
+            Ok(line) => {
+                self.answered = true;
+                String::from_utf8(line).map_err(|e| {
+                    let got = String::from_utf8_lossy(e.as_bytes()).into_owned();
+                    Failure::Fatal(format!("the simulator answered {}, which is no text", quoted(&got)))
+                })
+            }
             Err(RecvTimeoutError::Timeout) => {
+                self.hung = true;
+                end_group(self.child.id());
                 let _ = self.child.kill();
                 let limit = limit.as_secs_f64();
                 Err(Failure::Fatal(format!(
@@ -233,6 +268,28 @@ impl Process {
     }
 }
 
+/// The simulators that run, by the number of their process and group.
+static RUNNING: Mutex<Vec<u32>> = Mutex::new(Vec::new());
+
+fn running() -> std::sync::MutexGuard<'static, Vec<u32>> {
+    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends all simulators that run and what they have started, before a program ends that was interrupted.
+pub fn end_all() {
+    running().iter().for_each(|id| end_group(*id));
+}
+
+/// Ends a process with all that it has started; of what is gone already nothing is left to end.
+fn end_group(id: u32) {
+    #[cfg(unix)]
+    if let Some(group) = i32::try_from(id).ok().and_then(rustix::process::Pid::from_raw) {
+        let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
+    }
+    #[cfg(not(unix))]
+    let _ = id;
+}
+
 /// How a process ended, if it does in time.
 fn wait(child: &mut Child, patience: Duration) -> Option<std::process::ExitStatus> {
     let begin = Instant::now();
@@ -249,9 +306,13 @@ impl Drop for Process {
     fn drop(&mut self) {
         // The end of its input tells a simulator to end; one that does not is ended.
         self.questions = None;
-        if wait(&mut self.child, FAREWELL).is_none() {
+        let ended = wait(&mut self.child, FAREWELL).is_some();
+        // What it has started, too.
+        end_group(self.child.id());
+        if !ended {
             let _ = self.child.kill();
             let _ = self.child.wait();
         }
+        running().retain(|id| *id != self.child.id());
     }
 }

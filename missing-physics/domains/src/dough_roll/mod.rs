@@ -19,7 +19,7 @@ use self::model::DoughModel;
 use self::read::Read;
 use self::rolls::{CHANNELS, RunOfRolls, Step};
 use crate::domain::{CheckedRecording, Contents, Domain, Loaded, RunContents, Template};
-use crate::recording::{Header, ReadError};
+use crate::recording::{Column, Header, ReadError};
 
 /// The domain.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +48,10 @@ impl Domain for DoughRoll {
         ]
     }
 
+    fn columns(&self) -> &'static [Column<'static>] {
+        &read::COLUMNS
+    }
+
     fn spec(&self) -> Spec {
         spec::build(Some(1000.0), 3.0, 10.0).0
     }
@@ -62,7 +66,9 @@ impl Domain for DoughRoll {
 
     fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let read = read::read(header)?;
-        Ok(CheckedRecording::new(contents(&read), || prepare(read)))
+        let lengths = read.runs.iter().flat_map(|(_, steps)| steps.iter().map(|s| s.roll.state[0]));
+        let hint = crate::plausible::dough(&lengths.collect::<Vec<f64>>());
+        Ok(CheckedRecording::new(contents(&read), || prepare(read)).with_hints(hint))
     }
 }
 

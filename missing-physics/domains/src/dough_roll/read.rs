@@ -7,7 +7,7 @@ use super::rolls::{CHANNELS, RunOfRolls, Step};
 use crate::reading::{check_runs, number};
 use crate::recording::{Column, Header, ReadError, Table, inside};
 
-const COLUMNS: [Column; 11] = [
+pub(super) const COLUMNS: [Column; 11] = [
     Column { name: "run", what: "label of the run", label: true },
     number("step", "number of the roll in its run"),
     number("length_m", "length in metres"),

@@ -23,7 +23,7 @@ use self::campaign::Campaign;
 use self::model::PourModel;
 use self::read::Read;
 use crate::domain::{CheckedRecording, Contents, Domain, Loaded, RunContents, Template};
-use crate::recording::{Header, ReadError};
+use crate::recording::{Column, Header, ReadError};
 
 /// Pours of a proposed experiment.
 const REPEATS: usize = 3;
@@ -54,12 +54,24 @@ impl Domain for GrainPour {
         ]
     }
 
+    fn columns(&self) -> &'static [Column<'static>] {
+        &read::COLUMNS
+    }
+
     fn spec(&self) -> Spec {
         model::any_spec()
     }
 
     fn template(&self) -> Template {
         Template { header: include_str!("template.toml"), data: ("runs.csv", include_str!("template.csv")) }
+    }
+
+    fn template_files(&self) -> &'static [(&'static str, &'static [u8])] {
+        &[
+            ("pour-1.png", include_bytes!("template/pour-1.png")),
+            ("pour-2.png", include_bytes!("template/pour-2.png")),
+            ("pour-3.png", include_bytes!("template/pour-3.png")),
+        ]
     }
 
     fn predicts(&self) -> bool {

@@ -10,7 +10,7 @@ use granular_infer::seeing::HeightMap;
 use crate::reading::{check_runs, number};
 use crate::recording::{Column, Header, ReadError, Table, inside, one_line, quoted, read_bytes};
 
-const COLUMNS: [Column; 3] = [
+pub(super) const COLUMNS: [Column; 3] = [
     Column { name: "run", what: "label of the run", label: true },
     number("funnel_height_m", "height of the funnel's outlet in metres"),
     Column { name: "depth_image", what: "name of a 16-bit PNG file", label: true },

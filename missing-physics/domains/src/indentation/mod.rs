@@ -12,6 +12,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::plausible;
 use crate::reading::{calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Section, Table, quoted};
 pub use model::IndentationModel;
@@ -64,6 +65,10 @@ impl Domain for Indentation {
             ("[rig] poisson_ratio, thickness_m", "optional: 0.5; the body's thickness on a rigid base"),
             ("[noise] force_n", "optional: one sigma from a calibration"),
         ]
+    }
+
+    fn columns(&self) -> &'static [Column<'static>] {
+        &COLUMNS
     }
 
     fn spec(&self) -> Spec {
@@ -129,7 +134,13 @@ impl Domain for Indentation {
             undetermined
                 .push("without t_s a body that relaxes cannot be told: viscoelasticity was not tried".into());
         }
-        Ok(Loaded::new(recording, model, experiments, undetermined).into())
+        let radius_m = match setup.indenter {
+            Indenter::Sphere { radius_m } | Indenter::Cylinder { radius_m } if radius_known => Some(radius_m),
+            _ => None,
+        };
+        let hint = plausible::press(&recording.runs, radius_m);
+        let loaded = Loaded::new(recording, model, experiments, undetermined);
+        Ok(CheckedRecording::from(loaded).with_hints(hint))
     }
 }
 

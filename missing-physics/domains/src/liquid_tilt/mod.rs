@@ -11,6 +11,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::plausible;
 use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Section, Table, inside, quoted, read_bytes};
 pub use model::LiquidTiltModel;
@@ -60,6 +61,10 @@ impl Domain for LiquidTilt {
             ("[rig] gravity_m_s2", "optional, 9.80665"),
             ("[noise] a channel's name", "optional: one sigma from a calibration"),
         ]
+    }
+
+    fn columns(&self) -> &'static [Column<'static>] {
+        &COLUMNS
     }
 
     fn spec(&self) -> Spec {
@@ -128,6 +133,9 @@ impl Domain for LiquidTilt {
             resolution: channels.iter().map(|c| resolution(c)).collect(),
         };
         let setup = Setup { vessel, grasp, density_kg_m3, volumes_known: volumes.is_some() };
+        let reach_m = setup.vessel.length_m().max(setup.grasp.grasp_height_m.abs());
+        let rig_kg = setup.grasp.container_mass_kg + setup.grasp.gripper_mass_kg;
+        let hint = plausible::weigh(&recording.runs, rig_kg, reach_m, setup.grasp.gravity_m_s2);
         let model = LiquidTiltModel::new(setup, labels.len());
         let experiments = experiments::experiments(&model, &recording);
         let mut undetermined = Vec::new();
@@ -136,7 +144,8 @@ impl Domain for LiquidTilt {
                 "mass and volume are free in each run: a known liquid (density_kg_m3) or measured volumes (volume_m3) would tell more mechanisms apart".into(),
             );
         }
-        Ok(Loaded::new(recording, model, experiments, undetermined).into())
+        let loaded = Loaded::new(recording, model, experiments, undetermined);
+        Ok(CheckedRecording::from(loaded).with_hints(hint))
     }
 }
 

@@ -61,3 +61,33 @@ pub fn inside(folder: &Path, file: &str, key: &str, name: &str) -> Result<PathBu
     }
     Ok(folder.join(path))
 }
+
+/// The program that a recording starts, with its arguments, where it names one.
+pub fn program_of(folder: &Path) -> Option<Vec<String>> {
+    let table = read_text(&folder.join("recording.toml")).ok()?.parse::<toml::Table>().ok()?;
+    let command = table.get("simulator")?.get("command")?.as_array()?;
+    Some(command.iter().filter_map(|word| word.as_str().map(str::to_owned)).collect())
+}
+
+/// The files that a recording's folder is read from: `recording.toml`, what it names, and pictures beside it.
+///
+/// Nothing is checked; a folder without a header has the header's name alone.
+pub fn files_of(folder: &Path) -> Vec<PathBuf> {
+    fn texts(value: &toml::Value, found: &mut Vec<String>) {
+        match value {
+            toml::Value::String(text) => found.push(text.clone()),
+            toml::Value::Array(list) => list.iter().for_each(|inner| texts(inner, found)),
+            toml::Value::Table(table) => table.values().for_each(|inner| texts(inner, found)),
+            _ => {}
+        }
+    }
+    let header = folder.join("recording.toml");
+    let mut names = Vec::new();
+    if let Some(table) = read_text(&header).ok().and_then(|text| text.parse::<toml::Table>().ok()) {
+        table.values().for_each(|value| texts(value, &mut names));
+    }
+    let named = names.iter().map(|name| folder.join(name)).filter(|path| path.is_file());
+    let beside = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let pictures = beside.filter(|path| path.extension().is_some_and(|e| e == "png"));
+    std::iter::once(header.clone()).chain(named).chain(pictures).collect()
+}

@@ -8,8 +8,11 @@ use toml::{Table, Value};
 
 use super::error::ReadError;
 use super::files::{inside, read_text};
-use super::table::{self, Column};
+use super::table::{self, Column, ColumnContents};
 use super::words::{one_line, quoted};
+
+/// What a comment begins with behind a value that is a template's, not a measured one.
+pub const PLACEHOLDER: &str = "placeholder";
 
 /// A parsed `recording.toml`.
 #[derive(Debug)]
@@ -22,6 +25,10 @@ pub struct Header {
     gaps: bool,
     root: Table,
     asked: RefCell<BTreeSet<String>>,
+    /// Keys whose values are a template's.
+    placeholders: Vec<String>,
+    /// What the table holds, once it was read.
+    columns: RefCell<Vec<ColumnContents>>,
 }
 
 /// One section of a header (the root, or `[rig]`).
@@ -64,7 +71,9 @@ impl Header {
             let row = text.as_bytes()[..at].iter().filter(|b| **b == b'\n').count() + 1;
             ReadError::Toml { file: file.clone(), row, why: one_line(e.message()) }
         })?;
-        let header = Self { folder: folder.into(), file, gaps, root, asked: RefCell::default() };
+        let placeholders = placeholders(text);
+        let (asked, columns) = (RefCell::default(), RefCell::default());
+        let header = Self { folder: folder.into(), file, gaps, root, asked, placeholders, columns };
         match header.root().value("format") {
             Some(Value::Integer(1)) => Ok(header),
             Some(other) => Err(header.wrong("format", other, "1")),
@@ -78,7 +87,7 @@ impl Header {
     /// [`ReadError`]: no such key, no such file, or the first thing that is wrong in it.
     pub fn table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<table::Table<'c>, ReadError> {
         let name = self.root().text(key, "the name of a CSV file")?;
-        table::Table::read(&inside(&self.folder, &self.file, key, name)?, known, self.gaps)
+        self.read_table(key, name, known, self.gaps)
     }
 
     /// As [`Header::table`], for a table in which a cell of a number may be empty in any recording.
@@ -87,7 +96,33 @@ impl Header {
     /// As [`Header::table`].
     pub fn sparse_table<'c>(&self, key: &str, known: &[Column<'c>]) -> Result<super::Table<'c>, ReadError> {
         let name = self.root().text(key, "the name of a CSV file")?;
-        super::Table::read(&inside(&self.folder, &self.file, key, name)?, known, true)
+        self.read_table(key, name, known, true)
+    }
+
+    fn read_table<'c>(
+        &self,
+        key: &str,
+        name: &str,
+        known: &[Column<'c>],
+        gaps: bool,
+    ) -> Result<table::Table<'c>, ReadError> {
+        let table = table::Table::read(&inside(&self.folder, &self.file, key, name)?, known, gaps)?;
+        if key == "data" {
+            *self.columns.borrow_mut() = table.contents();
+        }
+        Ok(table)
+    }
+
+    /// What the columns of numbers of the recording's table hold, once it was read.
+    pub(crate) fn columns(&self) -> Vec<ColumnContents> {
+        self.columns.borrow().clone()
+    }
+
+    /// What is to be said of values that are a template's, not this rig's.
+    pub(crate) fn placeholders(&self) -> Option<String> {
+        let keys = self.placeholders.join(", ");
+        let say = || format!("recording.toml holds a template's values for {keys}: write your rig's there");
+        (!keys.is_empty()).then(say)
     }
 
     /// Whether cells of what is to be predicted may be empty.
@@ -152,6 +187,17 @@ impl Header {
     fn missing(&self, key: &str, expected: &str) -> ReadError {
         ReadError::MissingKey { file: self.file.clone(), key: key.into(), expected: expected.into() }
     }
+}
+
+/// Keys behind whose values a comment begins with [`PLACEHOLDER`].
+fn placeholders(text: &str) -> Vec<String> {
+    let marked = |line: &str| {
+        let (before, comment) = line.rsplit_once("# ")?;
+        let (key, _) = before.split_once('=')?;
+        let marked = comment.starts_with(PLACEHOLDER) && !key.trim_start().starts_with('#');
+        marked.then(|| one_line(key.trim()))
+    };
+    text.lines().filter_map(marked).collect()
 }
 
 /// Visits the full name of every key that holds no section.

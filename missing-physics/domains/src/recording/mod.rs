@@ -10,10 +10,10 @@ mod table;
 mod words;
 
 pub use error::{LARGEST_FILE, ReadError};
-pub use files::{inside, read_bytes, read_text};
-pub use header::{Header, Section};
-pub use table::{Column, Table, Values};
+pub use files::{files_of, inside, program_of, read_bytes, read_text};
+pub use header::{Header, PLACEHOLDER, Section};
+pub use table::{Column, ColumnContents, Table, Values};
 #[cfg(feature = "custom")]
 pub(crate) use words::brief;
 pub(crate) use words::one_line;
-pub use words::quoted;
+pub use words::{quoted, unit_of};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::{LARGEST_FILE, ReadError};
 use super::files::read_text;
-use super::words::{one_line, quoted};
+use super::words::{one_line, quoted, unit_of};
 
 /// Numbers beyond this are mistakes of unit or format.
 const LARGEST_NUMBER: f64 = 1e12;
@@ -18,6 +18,17 @@ pub struct Column<'a> {
     pub what: &'a str,
     /// Whether it holds labels rather than numbers.
     pub label: bool,
+}
+
+/// What a column of numbers holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColumnContents {
+    /// Its name.
+    pub name: String,
+    /// The unit that its name ends in, or nothing.
+    pub unit: &'static str,
+    /// The smallest and the largest of its numbers.
+    pub range: [f64; 2],
 }
 
 /// A column's cells.
@@ -122,6 +133,19 @@ impl<'a> Table<'a> {
             Values::Numbers(numbers) => Some(numbers),
             Values::Labels(_) => None,
         }
+    }
+
+    /// What the columns of numbers hold.
+    pub(super) fn contents(&self) -> Vec<ColumnContents> {
+        let column = |(name, values): (&&str, &Values)| match values {
+            Values::Numbers(numbers) if !numbers.is_empty() => {
+                let low = numbers.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                Some(ColumnContents { name: (*name).to_owned(), unit: unit_of(name), range: [low, high] })
+            }
+            _ => None,
+        };
+        self.names.iter().zip(&self.columns).filter_map(column).collect()
     }
 
     /// A column of labels.

@@ -11,6 +11,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Model, Quantity, Spec};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::plausible;
 use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Section};
 pub use model::{FILLS, SloshModel};
@@ -47,6 +48,10 @@ impl Domain for Slosh {
             ("[rig] grasp_height_m, temperature_k", "optional, for the record"),
             ("[noise] the channel's name", "optional: one sigma from a calibration"),
         ]
+    }
+
+    fn columns(&self) -> &'static [Column<'static>] {
+        &COLUMNS
     }
 
     fn spec(&self) -> Spec {
@@ -112,7 +117,10 @@ impl Domain for Slosh {
             "the amplitude of the wave and the lever to the sensor are one number: neither is known alone"
                 .into(),
         ];
-        Ok(Loaded::new(recording, model, experiments, undetermined).into())
+        let expected = self::setup::cylinder(&setup, 1.0).ok().map(|c| c.angular_frequency_rad_s(0, 0.0));
+        let hint = expected.and_then(|expected| plausible::swing(&recording.runs, expected));
+        let loaded = Loaded::new(recording, model, experiments, undetermined);
+        Ok(CheckedRecording::from(loaded).with_hints(hint))
     }
 }
 

@@ -9,6 +9,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Quantity, Spec};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
+use crate::plausible;
 use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Table};
 pub use model::TrajectoryModel;
@@ -56,6 +57,10 @@ impl Domain for Trajectory {
             ("[rig] air_density_kg_m3", "optional, 1.2"),
             ("[noise] a channel's name", "optional: one sigma from a calibration"),
         ]
+    }
+
+    fn columns(&self) -> &'static [Column<'static>] {
+        &COLUMNS
     }
 
     fn spec(&self) -> Spec {
@@ -125,7 +130,12 @@ impl Domain for Trajectory {
             resolution: columns.iter().map(|c| resolution(c)).collect(),
         };
         let experiments = experiments::experiments(axes, gravity_m_s2, &recording);
-        Ok(Loaded::new(recording, model, experiments, undetermined(axes)).into())
+        let hint = match axes {
+            Axes::Accelerometer => None,
+            _ => plausible::fall(&recording.runs, recording.channels.len() - 1, gravity_m_s2),
+        };
+        let loaded = Loaded::new(recording, model, experiments, undetermined(axes));
+        Ok(CheckedRecording::from(loaded).with_hints(hint))
     }
 }
 
