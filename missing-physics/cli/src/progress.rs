@@ -48,19 +48,19 @@ impl Steps {
         let state = State { said: begin, step: String::new(), step_begin: begin };
         Self { loudness, bar, begin, state: Mutex::new(state) }
     }
+}
 
-    /// What is expected to remain, in words.
-    fn remaining(&self, done: f64) -> String {
-        let spent = self.begin.elapsed().as_secs_f64();
-        if !(done > 0.02 && done <= 1.0) || spent < 2.0 {
-            return String::new();
-        }
-        let seconds = spent * (1.0 - done) / done;
-        match seconds {
-            s if s < 90.0 => format!(", about {s:.0} s left"),
-            s if s < 5400.0 => format!(", about {:.0} min left", s / 60.0),
-            s => format!(", about {:.1} h left", s / 3600.0),
-        }
+/// How far a step is that began `spent` seconds ago, and what of it is expected to remain; nothing where its share is not known.
+fn far(done: f64, spent: f64) -> String {
+    if !(done > 0.02 && done < 1.0) {
+        return String::new();
+    }
+    let share = format!(": {:.0} %", 100.0 * done);
+    match spent * (1.0 - done) / done {
+        _ if spent < 2.0 => share,
+        s if s < 90.0 => format!("{share}, about {s:.0} s of it left"),
+        s if s < 5400.0 => format!("{share}, about {:.0} min of it left", s / 60.0),
+        s => format!("{share}, about {:.1} h of it left", s / 3600.0),
     }
 }
 
@@ -71,12 +71,6 @@ fn line(text: &str) {
 
 impl Observer for Steps {
     fn progress(&self, progress: Progress<'_>) -> bool {
-        let left = || self.remaining(progress.done);
-        if let Some(bar) = &self.bar {
-            bar.set_message(format!("{}{}", progress.stage, left()));
-            bar.set_position((100.0 * progress.done) as u64);
-            return true;
-        }
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.step != progress.stage {
             if self.loudness == Loudness::Verbose {
@@ -88,9 +82,14 @@ impl Observer for Steps {
             state.step = progress.stage.to_owned();
             state.step_begin = Instant::now();
         }
-        if self.loudness != Loudness::Quiet && state.said.elapsed() >= EVERY {
+        let said =
+            format!("{}{}", progress.stage, far(progress.done, state.step_begin.elapsed().as_secs_f64()));
+        if let Some(bar) = &self.bar {
+            bar.set_message(said);
+            bar.set_position((100.0 * progress.done) as u64);
+        } else if self.loudness != Loudness::Quiet && state.said.elapsed() >= EVERY {
             state.said = Instant::now();
-            line(&format!("{:.0} %, {}{}", 100.0 * progress.done, progress.stage, left()));
+            line(&format!("{:.0} s so far, {said}", self.begin.elapsed().as_secs_f64()));
         }
         true
     }

@@ -32,7 +32,7 @@ fn answer(folder: &Path, threads: &str) -> Value {
         .arg(&json)
         .arg("--html")
         .arg(&html)
-        .args(["--threads", threads])
+        .args(["--threads", threads, "--quiet"])
         .output()
         .unwrap();
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
