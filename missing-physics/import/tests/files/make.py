@@ -10,7 +10,7 @@ def drop(v0, n, dt=1/60, h=2.0, m=0.0577, d=0.0655, cd=0.5):
     return np.array(out)
 n=34; t=np.arange(n)/60
 runs=[drop(v,n)+rng.normal(0,.002,n) for v in (0.0,0.8,1.5)]
-def g(x,nd): return f"{x:.{nd}f}".replace('.',',')
+def g(x,digits): return f"{x:.{digits}f}".replace('.',',')
 with open('../../../../recordings/throws.csv','wb') as f:
     s='\ufeff# Tracker 6.1, Kamera 60 Hz\r\nVersuch;Zeit [ms];Höhe (mm);Temperatur (°C)\r\n'
     for r,z in enumerate(runs,1):
