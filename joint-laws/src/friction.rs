@@ -41,8 +41,12 @@ impl<T: Number> DryFriction<T> {
     pub fn resistance(&self, forward: bool, velocity: T, load: T) -> T {
         let half = self.forward_less_backward * 0.5;
         let steady = if forward { self.level + half } else { self.level - half };
-        let ratio = velocity / self.stribeck_speed;
-        steady + self.stribeck_level * (-ratio * ratio).exp() + self.load_fraction * load.modulus()
+        let mut all = steady + self.load_fraction * load.modulus();
+        if self.stribeck_level != T::from(0.0) {
+            let ratio = velocity / self.stribeck_speed;
+            all += self.stribeck_level * (-ratio * ratio).exp();
+        }
+        all
     }
 }
 

@@ -7,4 +7,4 @@ pub mod sensor;
 pub mod signal;
 pub mod spring;
 
-pub use number::Number;
+pub use number::{Dual, Number};

@@ -27,14 +27,13 @@ impl<T: Number> Sensor<T> {
         Self { gain: zero, offset: zero, drift_per_s: zero, lag_s: None, upper, lower }
     }
 
-    /// Turns the true values at the times `t` (rising) of a run into readings, in place.
+    /// Turns the true values at the times `t` (rising) of a run that began at a time into readings, in place.
     ///
     /// The lag takes the quantity for a straight line from row to row, and begins in the steady state of the first.
-    pub fn read(&self, t: &[T], values: &mut [T]) {
+    pub fn read(&self, begin: f64, t: &[f64], values: &mut [T]) {
         if let Some(lag_s) = self.lag_s {
             lagging(t, values, lag_s);
         }
-        let begin = t.first().copied().unwrap_or(T::from(0.0));
         for (value, t) in values.iter_mut().zip(t) {
             let read = *value * (self.gain + 1.0) + self.offset + self.drift_per_s * (*t - begin);
             *value = read.within(self.lower, self.upper);
@@ -43,9 +42,9 @@ impl<T: Number> Sensor<T> {
 }
 
 /// A first-order lag of values that run straight from row to row.
-fn lagging<T: Number>(t: &[T], values: &mut [T], lag_s: T) {
+fn lagging<T: Number>(t: &[f64], values: &mut [T], lag_s: T) {
     let Some(mut before) = values.first().copied() else { return };
-    let slope = |a: T, b: T, dt: T| (b - a) / dt;
+    let slope = |a: T, b: T, dt: f64| (b - a) / dt;
     let first = if values.len() > 1 { slope(values[0], values[1], t[1] - t[0]) } else { T::from(0.0) };
     // How far the reading is from the steady state of the line that it follows.
     let mut reading = before - lag_s * first;
@@ -54,7 +53,7 @@ fn lagging<T: Number>(t: &[T], values: &mut [T], lag_s: T) {
         let (now, dt) = (values[i], t[i] - t[i - 1]);
         let steep = slope(before, now, dt);
         let left = reading - before + lag_s * steep;
-        let fades = if lag_s.re() > 0.0 { (-dt / lag_s).exp() } else { T::from(0.0) };
+        let fades = if lag_s.re() > 0.0 { (lag_s.recip() * -dt).exp() } else { T::from(0.0) };
         reading = now - lag_s * steep + left * fades;
         values[i] = reading;
         before = now;
@@ -70,7 +69,7 @@ mod tests {
     fn a_ramp_is_read_late_by_the_lag() {
         let t: Vec<f64> = (0..50).map(|i| 0.1 * f64::from(i)).collect();
         let mut values: Vec<f64> = t.iter().map(|t| 3.0 * t).collect();
-        Sensor { lag_s: Some(0.25), gain: 0.1, offset: -1.0, ..Sensor::perfect() }.read(&t, &mut values);
+        Sensor { lag_s: Some(0.25), gain: 0.1, offset: -1.0, ..Sensor::perfect() }.read(0.0, &t, &mut values);
         for (value, t) in values.iter().zip(&t) {
             assert_relative_eq!(*value, 1.1 * 3.0 * (t - 0.25) - 1.0, epsilon = 1e-12);
         }
@@ -80,7 +79,7 @@ mod tests {
     fn a_sensor_saturates_and_drifts() {
         let t = [10.0, 11.0, 12.0];
         let mut values = [0.0, 1.0, 2.0];
-        Sensor { drift_per_s: 0.5, upper: 1.2, ..Sensor::perfect() }.read(&t, &mut values);
+        Sensor { drift_per_s: 0.5, upper: 1.2, ..Sensor::perfect() }.read(10.0, &t, &mut values);
         assert_eq!(values, [0.0, 1.2, 1.2]);
     }
 }

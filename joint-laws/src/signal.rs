@@ -64,16 +64,26 @@ struct Piece<T> {
 pub struct Signal<T> {
     pieces: Vec<Piece<T>>,
     lag_s: Option<T>,
+    /// Whether every piece is one value.
+    flat: bool,
 }
 
 impl<T: Number> Signal<T> {
-    /// The signal that a drive makes of commands known at rising times; `step_s` is the step of the integration that will use it.
+    /// The signal that a drive makes of commands known at rising times.
     ///
-    /// A lag shorter than half a step is a delay of the same length: the two differ by less than the step resolves. Before the first
-    /// time the first value holds.
-    pub fn new(times: &[f64], commands: &[f64], between: Between, drive: &Drive<T>, step_s: f64) -> Self {
-        let mut knots: Vec<(T, T)> =
-            times.iter().zip(commands).map(|(t, u)| (T::from(*t), T::from(*u))).collect();
+    /// A lag shorter than `shortest_s` is a delay of the same length: the two differ by less than an integration resolves. Before the
+    /// first time the first value holds.
+    pub fn new(times: &[f64], commands: &[f64], between: Between, drive: &Drive<T>, shortest_s: f64) -> Self {
+        // A command that only says what was said before begins nothing.
+        let says = |k: usize| {
+            let before = |k: usize| commands[k] == commands[k - 1];
+            let still = between == Between::Hold || k + 1 == commands.len() || before(k + 1);
+            k == 0 || !before(k) || !still
+        };
+        let mut knots: Vec<(T, T)> = (0..times.len().min(commands.len()))
+            .filter(|k| says(*k))
+            .map(|k| (T::from(times[k]), T::from(commands[k])))
+            .collect();
         let w = drive.dead_zone;
         if between == Between::Linear {
             for kink in [w, -w, drive.upper, drive.lower] {
@@ -97,10 +107,11 @@ impl<T: Number> Signal<T> {
                 *u = follower;
             }
         }
-        let short = drive.lag_s.filter(|lag| lag.re() < 0.5 * step_s);
+        let short = drive.lag_s.filter(|lag| lag.re() < shortest_s);
         let lag_s = if short.is_some() { None } else { drive.lag_s };
         let delay = drive.delay_s + short.unwrap_or(T::from(0.0));
-        Self { pieces: pieces(&knots, between, delay, lag_s), lag_s }
+        let flat = between == Between::Hold && lag_s.is_none();
+        Self { pieces: pieces(&knots, between, delay, lag_s), lag_s, flat }
     }
 
     /// When the signal's pieces begin, rising.
@@ -119,12 +130,15 @@ impl<T: Number> Signal<T> {
     }
 
     /// The value at a time, by the piece of a number: 0 before the first begins, `k` after the `k`-th has begun.
-    pub fn value(&self, piece: usize, t: T) -> T {
+    pub fn value(&self, piece: usize, t: f64) -> T {
         let Some(p) = self.pieces.get(piece.saturating_sub(1)) else { return T::from(0.0) };
+        if self.flat {
+            return p.value;
+        }
         if piece == 0 {
             return p.value + p.transient;
         }
-        let since = t - p.begins;
+        let since = -(p.begins - t);
         let straight = p.value + p.slope * since;
         match self.lag_s {
             Some(lag) => straight + p.transient * (-since / lag).exp(),

@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 use super::*;
+use crate::Dual;
 use crate::friction::DryFriction;
 use approx::assert_relative_eq;
-use num_dual::DualSVec64;
 
 /// A mass on a spring that rubs, pushed by a constant force: x'' = push - omega^2 x - friction.
 struct Rubbing<T> {
@@ -26,23 +26,27 @@ impl<T: Number> Machine<T> for Rubbing<T> {
     fn ceilings(&self) -> &[Ceiling<T>] {
         &[]
     }
-    fn smooth(&mut self, _: T, x: &[T], rates: &mut [T]) {
+    fn smooth(&mut self, _: f64, x: &[T], rates: &mut [T]) {
         rates[0] = x[1];
         rates[1] = self.push - self.omega * self.omega * x[0];
     }
-    fn direction(&mut self, _: usize, _: T, _: &[T], direction: &mut [T]) {
+    fn direction(&mut self, _: usize, _: f64, _: &[T], direction: &mut [T]) {
         direction.copy_from_slice(&[T::from(0.0), T::from(1.0)]);
     }
-    fn resistance(&mut self, _: usize, forward: bool, _: T, x: &[T]) -> T {
+    fn resistance(&mut self, _: usize, forward: bool, _: f64, x: &[T]) -> T {
         self.law.resistance(forward, x[1], T::from(0.0))
     }
 }
 
-fn follow<T: Number>(machine: &mut Rubbing<T>, x: &mut [T; 2], until: f64) {
-    let mut integrator = Integrator::new(2, 0.02);
-    let mut t = T::from(0.0);
+fn follow_by<T: Number>(method: Method, step_s: f64, machine: &mut Rubbing<T>, x: &mut [T; 2], until: f64) {
+    let mut integrator = Integrator::new(method, 2, step_s);
+    let mut t = 0.0;
     integrator.settle(machine, t, x);
-    integrator.advance(machine, &mut t, x, T::from(until)).unwrap();
+    integrator.advance(machine, &mut t, x, until, &[], &[], |_, _, _| ()).unwrap();
+}
+
+fn follow<T: Number>(machine: &mut Rubbing<T>, x: &mut [T; 2], until: f64) {
+    follow_by(Method::Kutta, 0.02, machine, x, until);
 }
 
 /// Each half swing is a cosine about a centre moved by friction; the amplitude falls by twice level / omega^2, and the mass stays
@@ -82,14 +86,14 @@ fn a_force_below_the_friction_moves_nothing() {
 /// Derivatives with respect to frequency, push, friction and start, across turning points, against differences.
 #[test]
 fn derivatives_are_exact_across_events() {
-    type D = DualSVec64<4>;
+    type D = Dual<4>;
     let at = |p: [f64; 4]| {
         let mut x = [p[3], 0.3];
         follow(&mut Rubbing::new(p[0], p[1], p[2]), &mut x, 4.3);
         x
     };
     for p in [[3.0, 0.2, 0.5, 1.0], [3.0, 0.0, 0.0, 1.0], [5.0, -0.4, 0.1, 0.2], [2.0, 0.3, 1.5, 2.0]] {
-        let dual = |k: usize| D::from(p[k]).derivative(k);
+        let dual = |k: usize| D::parameter(p[k], k);
         let mut x = [dual(3), D::from(0.3)];
         follow(&mut Rubbing::new(dual(0), dual(1), dual(2)), &mut x, 4.3);
         for k in 0..4 {
@@ -101,7 +105,7 @@ fn derivatives_are_exact_across_events() {
             let (up, down) = (at(up), at(down));
             for i in 0..2 {
                 let expected = (up[i] - down[i]) / width;
-                let got = x[i].eps.unwrap_generic(nalgebra::Const::<4>, nalgebra::Const::<1>)[k];
+                let got = x[i].eps[k];
                 assert_relative_eq!(got, expected, epsilon = 2e-4, max_relative = 2e-4);
             }
         }
@@ -133,16 +137,94 @@ impl Machine<f64> for Tank {
 #[test]
 fn a_level_stays_at_its_ceiling_while_more_comes_in_than_leaves() {
     let mut tank = Tank { inflow: 2.0, ceiling: [Ceiling { state: 0, height: 0.5 }] };
-    let mut integrator = Integrator::new(1, 0.01);
+    let mut integrator = Integrator::new(Method::Kutta, 1, 0.01);
     let (mut t, mut x) = (0.0, [0.0]);
     integrator.settle(&mut tank, t, &mut x);
-    integrator.advance(&mut tank, &mut t, &mut x, 0.9).unwrap();
+    integrator.advance(&mut tank, &mut t, &mut x, 0.9, &[], &[], |_, _, _| ()).unwrap();
     assert_eq!(x[0], 0.5);
     // It leaves the brim when 2 (1 - t) = 0.05, t = 0.975.
-    integrator.advance(&mut tank, &mut t, &mut x, 1.475).unwrap();
+    integrator.advance(&mut tank, &mut t, &mut x, 1.475, &[], &[], |_, _, _| ()).unwrap();
     // From then on x' = -2 s + 0.05 - 0.1 x, s = t - 0.975.
     let (a, s): (f64, f64) = (0.1, 0.5);
     let particular = |s: f64| -2.0 * s / a + 2.0 / (a * a) + 0.05 / a;
     let expected = particular(s) + (0.5 - particular(0.0)) * (-a * s).exp();
     assert_relative_eq!(x[0], expected, epsilon = 1e-9);
+}
+
+/// Long steps read at many times give what short steps give, with and without friction, and readings that come a moment later differ by
+/// the rates.
+#[test]
+fn readings_within_long_steps_are_those_of_short_ones() {
+    for level in [0.0, 0.3] {
+        let mut integrator = Integrator::new(Method::DormandPrince, 2, 0.05);
+        let mut machine = Rubbing::new(Dual::<1>::from(3.0), Dual::from(0.2), Dual::from(level));
+        let reads: Vec<Reading> =
+            (0..40).map(|k| Reading { t_s: 0.1 * f64::from(k), row: k as usize, shift: 0 }).collect();
+        let (mut t, mut x) = (0.0, [Dual::from(1.0), Dual::from(0.0)]);
+        integrator.settle(&mut machine, t, &mut x);
+        let mut read = vec![[Dual::from(0.0); 2]; reads.len()];
+        let later = [Dual::parameter(0.0, 0)];
+        integrator
+            .advance(&mut machine, &mut t, &mut x, 4.0, &reads, &later, |_, r, x| read[r.row] = [x[0], x[1]])
+            .unwrap();
+        for (reading, got) in reads.iter().zip(&read).skip(1) {
+            let mut x = [1.0, 0.0];
+            follow_by(Method::Kutta, 1e-3, &mut Rubbing::new(3.0, 0.2, level), &mut x, reading.t_s);
+            for i in 0..2 {
+                assert_relative_eq!(got[i].re, x[i], epsilon = 1e-5);
+            }
+            assert_relative_eq!(got[0].eps[0], x[1], epsilon = 2e-4);
+        }
+    }
+}
+
+/// A mass that bounces on a stop: its law changes at the stop's position.
+struct Stopped<T> {
+    stiffness: T,
+    edge: [Edge<T>; 1],
+    beyond: bool,
+}
+
+impl<T: Number> Machine<T> for Stopped<T> {
+    fn contacts(&self) -> &[Contact] {
+        &[]
+    }
+    fn ceilings(&self) -> &[Ceiling<T>] {
+        &[]
+    }
+    fn edges(&self) -> &[Edge<T>] {
+        &self.edge
+    }
+    fn cross(&mut self, _: usize, beyond: bool) {
+        self.beyond = beyond;
+    }
+    fn smooth(&mut self, _: f64, x: &[T], rates: &mut [T]) {
+        rates[0] = x[1];
+        rates[1] = if self.beyond { -self.stiffness * (x[0] - self.edge[0].at) } else { T::from(0.0) };
+    }
+    fn direction(&mut self, _: usize, _: f64, _: &[T], _: &mut [T]) {}
+    fn resistance(&mut self, _: usize, _: bool, _: f64, _: &[T]) -> T {
+        T::from(0.0)
+    }
+}
+
+/// Thrown at the stop with a velocity `v`, the mass is with it for half a period and comes back as fast; where it is then depends on the
+/// stop's position twice, on its stiffness through that time.
+#[test]
+fn a_law_that_changes_its_form_is_followed_across_the_edge() {
+    let (v, at, k, until) = (2.0, 0.5, 400.0_f64, 1.0);
+    let mut machine = Stopped {
+        stiffness: Dual::parameter(k, 0),
+        edge: [Edge { state: 0, at: Dual::<2>::parameter(at, 1) }],
+        beyond: false,
+    };
+    let mut integrator = Integrator::new(Method::DormandPrince, 2, 0.005);
+    let (mut t, mut x) = (0.0, [Dual::from(0.0), Dual::from(v)]);
+    integrator.settle(&mut machine, t, &mut x);
+    integrator.advance(&mut machine, &mut t, &mut x, until, &[], &[], |_, _, _| ()).unwrap();
+    let half = std::f64::consts::PI / k.sqrt();
+    assert_relative_eq!(x[0].re, at - v * (until - at / v - half), epsilon = 1e-6);
+    assert_relative_eq!(x[1].re, -v, epsilon = 1e-6);
+    assert_relative_eq!(x[0].eps[0], -v * 0.5 * half / k, max_relative = 1e-4);
+    assert_relative_eq!(x[0].eps[1], 2.0, epsilon = 1e-5);
 }

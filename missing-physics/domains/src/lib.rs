@@ -6,7 +6,7 @@ pub mod custom;
 mod domain;
 #[cfg(feature = "dough-roll")]
 pub mod dough_roll;
-#[cfg(any(feature = "indentation", feature = "motion", feature = "trajectory"))]
+#[cfg(any(feature = "indentation", feature = "trajectory"))]
 mod dual;
 #[cfg(feature = "grain-pour")]
 pub mod grain_pour;

@@ -66,6 +66,7 @@ pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     feature = "custom",
     feature = "indentation",
     feature = "liquid-tilt",
+    feature = "motion",
     feature = "slosh",
     feature = "trajectory"
 ))]

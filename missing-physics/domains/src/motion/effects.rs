@@ -11,6 +11,8 @@ use missing_physics::model::{Mechanism, ParameterRef, SpecBuilder, UNBOUNDED};
 pub(super) enum Role {
     /// A parameter of the recording's.
     Stated(usize),
+    /// The same of one run, where runs are cut into windows.
+    OfRun(usize, usize),
     /// A joint's.
     Joint(usize, OfJoint),
     /// An input's.
@@ -111,17 +113,23 @@ impl<'a> Effects<'a> {
         at
     }
 
-    /// Declares what the recording says: its parameters, and the states that are free at each run's start.
-    pub(super) fn stated(&mut self, starts: &[f64]) {
+    /// Declares what the recording says: its parameters, and the states that are free at each run's start. Of runs that are cut into
+    /// windows these are their labels: windows share what is of a run, and begin anywhere.
+    pub(super) fn stated(&mut self, starts: &[f64], cut: Option<&[String]>) {
         for (k, p) in self.equations.parameters.iter().enumerate().filter(|(_, p)| !p.known) {
-            if p.per_run {
+            if let (true, Some(labels)) = (p.per_run, cut) {
+                for (run, label) in labels.iter().enumerate() {
+                    let name = format!("{} of run {label}", p.name);
+                    self.add(Role::OfRun(k, run), &name, &p.unit, starts[k], p.bounds, p.scale);
+                }
+            } else if p.per_run {
                 self.builder.nuisance_from(&p.name, &p.unit, starts[k], p.bounds, p.scale);
             } else {
                 self.add(Role::Stated(k), &p.name, &p.unit, starts[k], p.bounds, p.scale);
             }
         }
         for (state, scale) in self.equations.states.iter().zip(&self.scales.states) {
-            if state.start == super::equations::Start::Free {
+            if cut.is_some() || state.start == super::equations::Start::Free {
                 let unit = super::units::text(&state.name);
                 self.builder.nuisance(&format!("{}_at_start", state.name), &unit, UNBOUNDED, *scale);
             }
@@ -345,8 +353,7 @@ impl<'a> Effects<'a> {
     fn ends(&mut self, joint: usize) {
         let s = self.scales.joints[joint].clone();
         let role = |r| Role::Joint(joint, r);
-        let joint_ = &self.equations.joints[joint];
-        if self.equations.follows(joint_) {
+        if self.equations.joints[joint].follows {
             let gap = self.add(
                 role(OfJoint::Gap),
                 "gap",
@@ -430,7 +437,7 @@ impl<'a> Effects<'a> {
             "yield",
             &s.position_unit,
             0.03 * s.reach,
-            [1e-4 * s.reach, 2.0 * s.reach],
+            [s.least_yield(self.scales.step_s), 2.0 * s.reach],
             0.03 * s.reach,
         );
         self.joint_mechanism(
@@ -485,8 +492,7 @@ impl<'a> Effects<'a> {
             &[gain],
             ["the input's gain", "What acts is the command times a factor.", "(1 + gain) u", CONTROL],
             &["sensor-gain", "inertia"],
-        )
-        .may_be_open = vec![upper.index, lower.index];
+        );
         self.mechanism(
             "input-offset",
             of,

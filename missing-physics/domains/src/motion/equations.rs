@@ -5,6 +5,7 @@ use std::path::Path;
 use joint_laws::signal::Between;
 
 use super::expression::Expression;
+use super::tape::Tape;
 use super::units;
 use crate::recording::{Header, ReadError, Section, quoted};
 
@@ -65,6 +66,10 @@ pub(super) struct Joint {
     /// The input that drives it.
     pub(super) drive: Option<usize>,
     pub(super) turns: bool,
+    /// Whether it is driven by the command of a position: the joint is to follow it.
+    pub(super) follows: bool,
+    /// Other states that its drive acts on: the joint's forces do as well.
+    pub(super) reacts: Vec<usize>,
 }
 
 /// The equations, and where effects may act.
@@ -79,6 +84,9 @@ pub(super) struct Equations {
     pub(super) joints: Vec<Joint>,
     /// States that hold an amount.
     pub(super) levels: Vec<usize>,
+    /// The states' derivatives, and the outputs, to be evaluated.
+    pub(super) rates: Tape,
+    pub(super) readings: Tape,
 }
 
 impl Equations {
@@ -141,8 +149,15 @@ impl Equations {
                 Ok(Output { name: name.clone(), expression, state: bare.filter(|b| *b < states.len()) })
             })
             .collect::<Result<Vec<_>, ReadError>>()?;
-        let mut equations =
-            Self { states, outputs, inputs, parameters, joints: Vec::new(), levels: Vec::new() };
+        let of_motion = states.len() + inputs.len();
+        let mut known: Vec<Option<f64>> = vec![None; of_motion];
+        known.extend(parameters.iter().map(|p| (p.known && !p.per_run).then_some(p.value)));
+        known.push(None);
+        let stays: Vec<bool> = (0..known.len()).map(|n| n >= of_motion && n + 1 < known.len()).collect();
+        let rates = Tape::new(states.iter().map(|s| &s.rate), &known, &stays);
+        let readings = Tape::new(outputs.iter().map(|o| &o.expression), &known, &stays);
+        let (joints, levels) = (Vec::new(), Vec::new());
+        let mut equations = Self { states, outputs, inputs, parameters, joints, levels, rates, readings };
         equations.read_starts(&header.section("start")?)?;
         for section in header.root().sections("joint")? {
             let joint = equations.read_joint(&section)?;
@@ -166,6 +181,8 @@ impl Equations {
             parameters: Vec::new(),
             joints: Vec::new(),
             levels: Vec::new(),
+            rates: Tape::new(std::iter::empty(), &[], &[]),
+            readings: Tape::new(std::iter::empty(), &[], &[]),
         })
     }
 
@@ -189,14 +206,6 @@ impl Equations {
     /// Number of names in expressions.
     pub(super) fn names(&self) -> usize {
         self.states.len() + self.inputs.len() + self.parameters.len() + 1
-    }
-
-    /// Whether a joint is driven by the command of a position: the joint is to follow it.
-    pub(super) fn follows(&self, joint: &Joint) -> bool {
-        joint.drive.is_some_and(|d| {
-            let unit = units::of(&self.inputs[d].name);
-            unit.is_some() && unit == units::of(&self.states[joint.position].name)
-        })
     }
 
     fn read_starts(&mut self, section: &Section<'_>) -> Result<(), ReadError> {
@@ -243,7 +252,17 @@ impl Equations {
                 None => return Err(section.unfit("drive", quoted(drive), "the name of an input")),
             },
         };
-        Ok(Joint { name, position, velocity, drive, turns: section.flag("turns")?.unwrap_or(false) })
+        let turns = section.flag("turns")?.unwrap_or(false);
+        let acts = |state: usize| drive.is_some_and(|d| self.states[state].rate.has(self.input_name(d)));
+        let mut reacts: Vec<usize> = (0..self.states.len()).filter(|s| *s != velocity && acts(*s)).collect();
+        if !acts(velocity) {
+            reacts.clear();
+        }
+        let follows = drive.is_some_and(|d| {
+            let unit = units::of(&self.inputs[d].name);
+            unit.is_some() && unit == units::of(&self.states[position].name)
+        });
+        Ok(Joint { name, position, velocity, drive, turns, follows, reacts })
     }
 
     fn state(&self, section: &Section<'_>, key: &str) -> Result<usize, ReadError> {
@@ -341,6 +360,6 @@ mod tests {
     fn the_example_has_one_of_everything() {
         let example = Equations::example();
         assert!(!example.joints.is_empty() && !example.levels.is_empty() && !example.inputs.is_empty());
-        assert!(example.follows(&example.joints[0]) && example.joints[0].turns);
+        assert!(example.joints[0].follows && example.joints[0].turns);
     }
 }

@@ -6,7 +6,7 @@ use joint_laws::Number;
 
 /// Functions of one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum One {
+pub(super) enum One {
     Sin,
     Cos,
     Tan,
@@ -25,7 +25,7 @@ enum One {
 
 /// Functions of two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Two {
+pub(super) enum Two {
     Add,
     Subtract,
     Multiply,
@@ -38,7 +38,7 @@ enum Two {
 
 /// A step of an evaluation on a stack.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Step {
+pub(super) enum Step {
     Number(f64),
     Name(usize),
     Negate,
@@ -107,7 +107,13 @@ impl Expression {
         self.steps.contains(&Step::Name(name))
     }
 
-    /// Its value where the names have these values; `stack` is room.
+    /// The steps of its evaluation on a stack.
+    pub(super) fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Its value where the names have these values, step by step; `stack` is room.
+    #[cfg(test)]
     pub(super) fn value<T: Number>(&self, values: &[T], stack: &mut Vec<T>) -> T {
         stack.clear();
         for step in &self.steps {
@@ -127,13 +133,15 @@ impl Expression {
     }
 }
 
+#[cfg(test)]
 fn change<T: Number>(stack: &mut [T], f: impl FnOnce(T) -> T) {
     if let Some(top) = stack.last_mut() {
         *top = f(*top);
     }
 }
 
-fn one<T: Number>(f: One, a: T) -> T {
+/// A function of one number.
+pub(super) fn one<T: Number>(f: One, a: T) -> T {
     match f {
         One::Sin => a.sin(),
         One::Cos => a.cos(),
@@ -160,7 +168,8 @@ fn one<T: Number>(f: One, a: T) -> T {
     }
 }
 
-fn two<T: Number>(f: Two, a: T, b: T) -> T {
+/// A function of two numbers.
+pub(super) fn two<T: Number>(f: Two, a: T, b: T) -> T {
     match f {
         Two::Add => a + b,
         Two::Subtract => a - b,

@@ -3,63 +3,63 @@
 use joint_laws::Number;
 use joint_laws::friction::DryFriction;
 use joint_laws::hysteresis::bouc_wen_rate;
-use joint_laws::integrate::{Ceiling, Contact, Machine};
+use joint_laws::integrate::{Ceiling, Contact, Edge, Machine};
 use joint_laws::signal::Signal;
 use joint_laws::spring::{cogging, end_stop};
 
 use super::equations::{Equations, Joint};
 
-/// What acts on a joint beside the equations; every coefficient is 0 where it is off.
+/// A smooth force on a joint.
 #[derive(Debug, Clone, Copy)]
+pub(super) enum Force<T> {
+    /// `-c v`, `-c |v| v` or `-c v^3`, by the number of further speeds.
+    Damping(usize, T),
+    /// `-k x`, `-k x^2` or `-k x^3`, by the number of further positions.
+    Stiffness(usize, T),
+    Constant(T),
+    /// Amplitude, phase, periods a turn.
+    Cogging([T; 3]),
+    /// Position, stiffness, whether it stands above the free range, and the edge.
+    Stop(T, T, bool, usize),
+    /// Stiffness and yield of a spring that yields, the state of its deflection, the edges of velocity and deflection.
+    Yielding(T, T, usize, [usize; 2]),
+}
+
+/// What acts on a joint beside the equations.
+#[derive(Debug, Clone)]
 pub(super) struct JointLaws<T> {
     /// Dry friction, where any is on.
     pub(super) dry: Option<DryFriction<T>>,
-    /// Coefficients of -v, -|v| v, -v^3.
-    pub(super) damping: [T; 3],
-    /// Coefficients of -x, -x^2, -x^3.
-    pub(super) stiffness: [T; 3],
-    pub(super) constant: T,
-    /// Amplitude, phase, periods a turn.
-    pub(super) cogging: Option<[T; 3]>,
-    /// Position and stiffness of a stop, and whether it stands above the free range.
-    pub(super) stop: Option<(T, T, bool)>,
+    pub(super) forces: Vec<Force<T>>,
     /// All accelerations are smaller by 1 plus this.
-    pub(super) inertia: T,
-    /// Stiffness and yield of a spring that yields, and the state of its deflection.
-    pub(super) hysteresis: Option<(T, T, usize)>,
+    pub(super) inertia: Option<T>,
 }
 
 impl<T: Number> JointLaws<T> {
     pub(super) fn none() -> Self {
-        let zero = T::from(0.0);
-        Self {
-            dry: None,
-            damping: [zero; 3],
-            stiffness: [zero; 3],
-            constant: zero,
-            cogging: None,
-            stop: None,
-            inertia: zero,
-            hysteresis: None,
-        }
+        Self { dry: None, forces: Vec::new(), inertia: None }
     }
 
-    /// The smooth force on the joint.
-    fn force(&self, x: T, v: T, states: &[T]) -> T {
-        let [d1, d2, d3] = self.damping;
-        let [k1, k2, k3] = self.stiffness;
-        let mut force =
-            self.constant - v * (d1 + d2 * v.modulus() + d3 * v * v) - x * (k1 + x * (k2 + k3 * x));
-        if let Some([amplitude, phase, periods]) = self.cogging {
-            force += cogging(x, amplitude, phase, periods);
+    /// The smooth force on the joint at a position with a velocity.
+    fn force(&self, x: T, v: T, states: &[T], beyond: &[bool]) -> T {
+        let mut sum = T::from(0.0);
+        for force in &self.forces {
+            match *force {
+                Force::Damping(0, c) => sum -= c * v,
+                Force::Damping(1, c) => sum -= c * v * v.modulus(),
+                Force::Damping(_, c) => sum -= c * v * v * v,
+                Force::Stiffness(0, k) => sum -= k * x,
+                Force::Stiffness(1, k) => sum -= k * x * x,
+                Force::Stiffness(_, k) => sum -= k * x * x * x,
+                Force::Constant(f) => sum += f,
+                Force::Cogging([amplitude, phase, periods]) => sum += cogging(x, amplitude, phase, periods),
+                Force::Stop(at, stiffness, above, edge) => {
+                    sum += end_stop(x, at, stiffness, beyond[edge] == above);
+                }
+                Force::Yielding(stiffness, _, state, _) => sum -= stiffness * states[state],
+            }
         }
-        if let Some((position, stiffness, above)) = self.stop {
-            force += end_stop(x, position, stiffness, above);
-        }
-        if let Some((stiffness, _, state)) = self.hysteresis {
-            force -= stiffness * states[state];
-        }
-        force
+        sum
     }
 }
 
@@ -68,60 +68,96 @@ pub(super) struct Driven<'a, T> {
     pub(super) equations: &'a Equations,
     pub(super) laws: Vec<JointLaws<T>>,
     /// Rates of leaks, by level.
-    pub(super) leaks: Vec<T>,
+    pub(super) leaks: Vec<Option<T>>,
     pub(super) signals: Vec<Signal<T>>,
     /// How many pieces of each signal have begun.
     pub(super) begun: Vec<usize>,
-    /// True seconds in a second of the clock.
-    pub(super) pace: T,
+    /// True seconds in a second of the clock, where the two differ.
+    pub(super) pace: Option<T>,
     pub(super) contacts: Vec<Contact>,
     /// The joint of each contact.
     pub(super) joint_of: Vec<usize>,
     pub(super) ceilings: Vec<Ceiling<T>>,
-    /// States, inputs, parameters and time, as expressions name them.
+    pub(super) edges: Vec<Edge<T>>,
+    /// Which of them are passed.
+    pub(super) beyond: Vec<bool>,
+    /// Registers of the rates' tape and of the outputs': states, inputs, parameters and time first, as expressions name them.
     pub(super) values: Vec<T>,
-    pub(super) stack: Vec<T>,
+    pub(super) seen: Vec<T>,
+    /// Room for derivatives under another command.
+    pub(super) other: Vec<T>,
 }
 
 impl<T: Number> Driven<'_, T> {
-    /// Puts states, inputs and time where expressions find them.
-    fn look(&mut self, t: T, x: &[T]) {
+    /// Puts states, inputs and time where expressions find them, and computes the equations' derivatives.
+    fn look(&mut self, t: f64, x: &[T]) {
         let states = self.equations.states.len();
         self.values[..states].copy_from_slice(&x[..states]);
         for (k, signal) in self.signals.iter().enumerate() {
             self.values[states + k] = signal.value(self.begun[k], t);
         }
-        if let Some(last) = self.values.last_mut() {
-            *last = t;
+        let last = self.equations.names() - 1;
+        self.values[last] = T::from(t);
+        self.equations.rates.run(&mut self.values);
+    }
+
+    fn rate(&self, state: usize) -> T {
+        self.equations.rates.result(&self.values, state)
+    }
+
+    /// What the outputs should read: `read` gets the number and the value of each of those that are `wanted`.
+    pub(super) fn outputs(
+        &mut self,
+        t: f64,
+        x: &[T],
+        wanted: impl Fn(usize) -> bool,
+        mut read: impl FnMut(usize, T),
+    ) {
+        let states = self.equations.states.len();
+        self.seen[..states].copy_from_slice(&x[..states]);
+        for (k, signal) in self.signals.iter().enumerate() {
+            self.seen[states + k] = signal.value(self.begun[k], t);
+        }
+        let last = self.equations.names() - 1;
+        self.seen[last] = T::from(t);
+        self.equations.readings.run(&mut self.seen);
+        for c in (0..self.equations.outputs.len()).filter(|c| wanted(*c)) {
+            read(c, self.equations.readings.result(&self.seen, c));
         }
     }
 
-    fn rate(&mut self, state: usize) -> T {
-        self.equations.states[state].rate.value(&self.values, &mut self.stack)
-    }
-
-    /// What output `output` should read.
-    pub(super) fn output(&mut self, output: usize, t: T, x: &[T]) -> T {
-        self.look(t, x);
-        self.equations.outputs[output].expression.value(&self.values, &mut self.stack)
-    }
-
-    /// The derivative of a state where an input has another value.
-    fn rate_at(&mut self, state: usize, input: usize, value: T) -> T {
+    /// The equations' derivatives where an input has another value, into `other`.
+    fn under(&mut self, input: usize, value: T) {
         let place = self.equations.input_name(input);
         let before = std::mem::replace(&mut self.values[place], value);
-        let rate = self.rate(state);
+        self.equations.rates.run(&mut self.values);
+        for (state, other) in self.other.iter_mut().enumerate().take(self.equations.states.len()) {
+            *other = self.equations.rates.result(&self.values, state);
+        }
         self.values[place] = before;
-        rate
+        self.equations.rates.run(&mut self.values);
     }
 
     /// The force by which its drive moves a joint: the derivative of its velocity less what it were without the drive (a command of
     /// zero, or of the position where the joint is).
     fn load(&mut self, joint: &Joint) -> T {
         let Some(drive) = joint.drive else { return T::from(0.0) };
-        let idle = if self.equations.follows(joint) { self.values[joint.position] } else { T::from(0.0) };
-        let without = self.rate_at(joint.velocity, drive, idle);
-        self.rate(joint.velocity) - without
+        let idle = if joint.follows { self.values[joint.position] } else { T::from(0.0) };
+        self.under(drive, idle);
+        self.rate(joint.velocity) - self.other[joint.velocity]
+    }
+
+    /// By how much a unit of a joint's force changes other states' derivatives: in proportion to what its drive does there. The shares
+    /// stand in `other` for the states that the drive acts on.
+    fn shares(&mut self, joint: &Joint) {
+        let Some(drive) = joint.drive else { return };
+        let now = self.values[self.equations.input_name(drive)];
+        self.under(drive, now + 1.0);
+        let own = self.other[joint.velocity] - self.rate(joint.velocity);
+        for &state in &joint.reacts {
+            let change = self.other[state] - self.rate(state);
+            self.other[state] = if own.re() == 0.0 { T::from(0.0) } else { change / own };
+        }
     }
 }
 
@@ -134,85 +170,75 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         &self.ceilings
     }
 
-    fn smooth(&mut self, t: T, x: &[T], rates: &mut [T]) {
+    fn edges(&self) -> &[Edge<T>] {
+        &self.edges
+    }
+
+    fn cross(&mut self, edge: usize, beyond: bool) {
+        self.beyond[edge] = beyond;
+    }
+
+    fn smooth(&mut self, t: f64, x: &[T], rates: &mut [T]) {
         self.look(t, x);
-        let states = self.equations.states.len();
-        for (state, rate) in rates.iter_mut().enumerate().take(states) {
+        let equations = self.equations;
+        for (state, rate) in rates.iter_mut().enumerate().take(equations.states.len()) {
             *rate = self.rate(state);
         }
-        let equations = self.equations;
         for (k, joint) in equations.joints.iter().enumerate() {
-            let laws = self.laws[k];
-            let (position, v) = (x[joint.position], x[joint.velocity]);
-            let force = laws.force(position, v, x);
-            if reacts(self.equations, joint) {
-                for (state, rate) in rates.iter_mut().enumerate().take(states) {
-                    *rate += self.share(joint, state) * force;
-                }
-            } else {
+            if !self.laws[k].forces.is_empty() {
+                let v = x[joint.velocity];
+                let force = self.laws[k].force(x[joint.position], v, x, &self.beyond);
                 rates[joint.velocity] += force;
+                if !joint.reacts.is_empty() {
+                    self.shares(joint);
+                    joint.reacts.iter().for_each(|&state| rates[state] += self.other[state] * force);
+                }
+                for law in &self.laws[k].forces {
+                    if let Force::Yielding(_, yields, state, [forward, stretched]) = *law {
+                        let signs = (self.beyond[forward], self.beyond[stretched]);
+                        rates[state] = bouc_wen_rate(v, x[state], yields, signs.0, signs.1);
+                    }
+                }
             }
-            rates[joint.velocity] /= laws.inertia + 1.0;
-            if let Some((_, yields, state)) = laws.hysteresis {
-                rates[state] = bouc_wen_rate(v, x[state], yields);
+            if let Some(inertia) = self.laws[k].inertia {
+                rates[joint.velocity] = rates[joint.velocity] / (inertia + 1.0);
             }
         }
-        for (leak, &level) in self.leaks.iter().zip(&self.equations.levels) {
-            rates[level] -= *leak * x[level];
+        for (leak, &level) in self.leaks.iter().zip(&equations.levels) {
+            if let Some(leak) = leak {
+                rates[level] -= *leak * x[level];
+            }
         }
-        for rate in rates.iter_mut() {
-            *rate *= self.pace;
+        if let Some(pace) = self.pace {
+            rates.iter_mut().for_each(|rate| *rate = *rate * pace);
         }
     }
 
-    fn direction(&mut self, contact: usize, t: T, x: &[T], direction: &mut [T]) {
-        let equations = self.equations;
-        let joint = &equations.joints[self.joint_of[contact]];
+    fn direction(&mut self, contact: usize, t: f64, x: &[T], direction: &mut [T]) {
+        let joint = &self.equations.joints[self.joint_of[contact]];
         direction.fill(T::from(0.0));
-        if reacts(self.equations, joint) {
+        if !joint.reacts.is_empty() {
             self.look(t, x);
-            for (state, d) in direction.iter_mut().enumerate().take(self.equations.states.len()) {
-                *d = self.share(joint, state);
-            }
+            self.shares(joint);
+            joint.reacts.iter().for_each(|&state| direction[state] = self.other[state]);
         }
         direction[joint.velocity] = T::from(1.0);
     }
 
-    fn resistance(&mut self, contact: usize, forward: bool, t: T, x: &[T]) -> T {
+    fn resistance(&mut self, contact: usize, forward: bool, t: f64, x: &[T]) -> T {
         let k = self.joint_of[contact];
-        let laws = self.laws[k];
-        let Some(dry) = laws.dry else { return T::from(0.0) };
-        let equations = self.equations;
-        let joint = &equations.joints[k];
-        self.look(t, x);
-        let load = self.load(joint);
-        dry.resistance(forward, x[joint.velocity], load) * self.pace / (laws.inertia + 1.0)
-    }
-}
-
-impl<T: Number> Driven<'_, T> {
-    /// By how much a unit of a joint's force changes a state's derivative: in proportion to what its drive does there.
-    fn share(&mut self, joint: &Joint, state: usize) -> T {
-        let one = T::from(1.0);
-        let Some(drive) = joint.drive.filter(|_| state != joint.velocity) else {
-            return if state == joint.velocity { one } else { T::from(0.0) };
+        let Some(dry) = self.laws[k].dry else { return T::from(0.0) };
+        let joint = &self.equations.joints[k];
+        let load = if dry.load_fraction == T::from(0.0) {
+            T::from(0.0)
+        } else {
+            self.look(t, x);
+            self.load(joint)
         };
-        let place = self.equations.input_name(drive);
-        if !self.equations.states[state].rate.has(place) {
-            return T::from(0.0);
+        let mut resistance = dry.resistance(forward, x[joint.velocity], load);
+        if let Some(inertia) = self.laws[k].inertia {
+            resistance = resistance / (inertia + 1.0);
         }
-        let now = self.values[place];
-        let (a, b) = (self.rate(state), self.rate_at(state, drive, now + 1.0));
-        let (c, d) = (self.rate(joint.velocity), self.rate_at(joint.velocity, drive, now + 1.0));
-        if (d - c).re() == 0.0 { T::from(0.0) } else { (b - a) / (d - c) }
+        self.pace.map_or(resistance, |pace| resistance * pace)
     }
-}
-
-/// Whether a joint's drive acts on other states than the joint's velocity too.
-pub(super) fn reacts(equations: &Equations, joint: &Joint) -> bool {
-    joint.drive.is_some_and(|drive| {
-        let place = equations.input_name(drive);
-        let mut others = equations.states.iter().enumerate().filter(|(s, _)| *s != joint.velocity);
-        others.any(|(_, s)| s.rate.has(place)) && equations.states[joint.velocity].rate.has(place)
-    })
 }

@@ -3,13 +3,17 @@
 mod effects;
 mod equations;
 mod expression;
+mod growth;
 mod machine;
 mod model;
 mod read;
 mod scales;
+mod setting;
 mod start;
+mod tape;
 mod tune;
 mod units;
+mod windows;
 
 use missing_physics::model::{Model as _, Spec};
 
@@ -58,7 +62,7 @@ impl Domain for Motion {
         let all = equations::Equations::example();
         let scales = scales::Scales::of_example(&all);
         let starts: Vec<f64> = all.parameters.iter().map(|p| p.value).collect();
-        MotionModel::baseline(all, 0.01).full(scales, &starts).spec().clone()
+        MotionModel::baseline(all, model::Pace::default()).full(scales, &starts, None).spec().clone()
     }
 
     fn template(&self) -> Template {
@@ -67,7 +71,7 @@ impl Domain for Motion {
 
     fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let (equations, recording) = read::read(header)?;
-        let first = MotionModel::baseline(equations.clone(), 1.0);
+        let first = MotionModel::baseline(equations.clone(), model::Pace::default());
         let contents = Contents {
             channels: recording.channels.clone(),
             calibration: recording.calibration.clone(),
@@ -77,13 +81,13 @@ impl Domain for Motion {
         };
         let file = header.file.clone();
         Ok(CheckedRecording::new(contents, move || {
-            let model = tune::model(equations, &recording).map_err(|why| ReadError::Value {
+            let tuned = tune::tuned(equations, recording).map_err(|why| ReadError::Value {
                 file,
                 key: "model".into(),
                 got: "without an answer".into(),
                 expected: format!("equations that can be followed from their starts ({why})"),
             })?;
-            Ok(Loaded::new(recording, model, Vec::new(), Vec::new()))
+            Ok(Loaded::new(tuned.recording, tuned.model, Vec::new(), tuned.remarks))
         }))
     }
 }

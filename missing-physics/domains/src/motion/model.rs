@@ -1,18 +1,37 @@
 //! The full model of a recording of the domain `motion`.
 
-use joint_laws::Number;
-use joint_laws::friction::DryFriction;
-use joint_laws::integrate::{Ceiling, Contact, Integrator, Machine as _};
-use joint_laws::sensor::Sensor;
-use joint_laws::signal::{Drive, Signal};
+use joint_laws::integrate::{Contact, Integrator, Machine as _, Method, Reading};
+use joint_laws::signal::Signal;
+use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
-use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Spec};
+use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Scope, Spec};
 
-use super::effects::{Effects, OfInput, OfJoint, OfOutput, Role};
+use super::effects::{Effects, Role};
 use super::equations::{Equations, Start};
-use super::machine::{Driven, JointLaws};
+use super::machine::Driven;
 use super::scales::Scales;
-use crate::dual::{DualModel, JacobianRequest};
+use super::setting::{Setting, Shared};
+use super::windows;
+
+/// Steps of the integration in the shortest time in which a law changes.
+const STEPS_IN_SHORTEST: f64 = 2.0;
+/// Steps are cut at the most to this part of the time between rows for a law's sake.
+const FINEST_FOR_LAWS: f64 = 0.125;
+
+/// How the motion is followed: by which method, in which steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pace {
+    pub(super) method: Method,
+    /// Largest step, s.
+    pub(super) step_s: f64,
+}
+
+impl Default for Pace {
+    /// For a model that predicts nothing yet.
+    fn default() -> Self {
+        Self { method: Method::Kutta, step_s: 0.01 }
+    }
+}
 
 /// The model: equations, and every effect that may act beside them.
 #[derive(Debug)]
@@ -25,11 +44,13 @@ pub struct MotionModel {
     /// Nuisance slots of the recording's parameters of each run, and of the states that are free at its start.
     per_run: Vec<Option<usize>>,
     free_states: Vec<Option<usize>>,
-    /// Middle of each joint's range: a stop stands on the side where its position is.
+    /// Middle of each joint's range, and its typical speed.
     middles: Vec<f64>,
-    /// Largest step of the integration, s.
-    step_s: f64,
+    speeds: Vec<f64>,
+    pace: Pace,
     scales: Scales,
+    /// Where runs are cut into windows: when each run begins.
+    cut: Option<Vec<f64>>,
 }
 
 /// States and their derivatives along a run.
@@ -38,34 +59,44 @@ pub(super) struct Course {
     pub(super) rates: Vec<Vec<f64>>,
 }
 
+/// A place in time on the way through a run where a piece of an input begins.
+struct Break<T> {
+    t: T,
+    input: usize,
+}
+
 impl MotionModel {
     /// The equations alone, from the parameters' stated starts.
-    pub(super) fn baseline(equations: Equations, step_s: f64) -> Self {
+    pub(super) fn baseline(equations: Equations, pace: Pace) -> Self {
         let starts: Vec<f64> = equations.parameters.iter().map(|p| p.value).collect();
-        let scales = Scales { states: vec![1.0; equations.states.len()], step_s, ..Scales::default() };
-        Self::build(equations, scales, step_s, &starts, false)
+        let scales =
+            Scales { states: vec![1.0; equations.states.len()], step_s: pace.step_s, ..Scales::default() };
+        Self::build(equations, scales, pace, &starts, (false, None))
     }
 
-    /// The full model: fits of the recording's parameters begin at `starts` (one for each of them).
-    pub(super) fn full(self, scales: Scales, starts: &[f64]) -> Self {
-        Self::build(self.equations, scales, self.step_s, starts, true)
+    /// The full model: fits of the recording's parameters begin at `starts` (one for each of them). `cut` are the runs, where they are
+    /// cut into windows.
+    pub(super) fn full(self, scales: Scales, starts: &[f64], cut: Option<&[Run]>) -> Self {
+        Self::build(self.equations, scales, self.pace, starts, (true, cut))
     }
 
-    fn build(equations: Equations, scales: Scales, step_s: f64, starts: &[f64], all: bool) -> Self {
+    fn build(
+        equations: Equations,
+        scales: Scales,
+        pace: Pace,
+        starts: &[f64],
+        (all, cut): (bool, Option<&[Run]>),
+    ) -> Self {
+        let labels: Option<Vec<String>> = cut.map(|runs| runs.iter().map(|r| r.label.clone()).collect());
         let (spec, roles) = {
             let mut effects = Effects::new(&equations, &scales);
-            effects.stated(starts);
+            effects.stated(starts, labels.as_deref());
             if all {
                 effects.all();
             }
             (effects.builder.build_unchecked(), effects.roles)
         };
-        let off = spec
-            .parameters
-            .iter()
-            .filter(|p| p.scope == missing_physics::model::Scope::Shared)
-            .map(|p| p.start)
-            .collect();
+        let off = spec.parameters.iter().filter(|p| p.scope == Scope::Shared).map(|p| p.start).collect();
         let mut next = 0;
         let mut slot = |taken: bool| {
             taken.then(|| {
@@ -73,10 +104,14 @@ impl MotionModel {
                 next - 1
             })
         };
-        let per_run = equations.parameters.iter().map(|p| slot(p.per_run && !p.known)).collect();
-        let free_states = equations.states.iter().map(|s| slot(s.start == Start::Free)).collect();
+        let per_run =
+            equations.parameters.iter().map(|p| slot(p.per_run && !p.known && cut.is_none())).collect();
+        let free_states =
+            equations.states.iter().map(|s| slot(cut.is_some() || s.start == Start::Free)).collect();
         let middles = scales.joints.iter().map(|j| 0.5 * (j.range[0] + j.range[1])).collect();
-        Self { equations, spec, roles, off, per_run, free_states, middles, step_s, scales }
+        let speeds = scales.joints.iter().map(|j| j.speed).collect();
+        let cut = cut.map(|runs| runs.iter().map(|r| r.inputs[0].first().copied().unwrap_or(0.0)).collect());
+        Self { equations, spec, roles, off, per_run, free_states, middles, speeds, pace, scales, cut }
     }
 
     /// The equations.
@@ -84,14 +119,14 @@ impl MotionModel {
         &self.equations
     }
 
-    /// Sets the largest step of the integration, s.
-    pub(super) fn set_step(&mut self, step_s: f64) {
-        self.step_s = step_s;
+    /// Sets how the motion is followed.
+    pub(super) fn set_pace(&mut self, pace: Pace) {
+        self.pace = pace;
     }
 
-    /// The largest step of the integration, s.
-    pub(super) fn step_s(&self) -> f64 {
-        self.step_s
+    /// How the motion is followed.
+    pub(super) fn pace(&self) -> Pace {
+        self.pace
     }
 
     /// The recording's parameters from the shared ones.
@@ -112,34 +147,109 @@ impl MotionModel {
             rates: vec![Vec::with_capacity(run.len()); self.equations.states.len()],
         };
         let mut rates = Vec::new();
-        self.follow(run, shared, nuisance, &[], |machine, _, t, x, row| {
-            if row.channel.is_none_or(|c| c == 0) {
-                rates.resize(x.len(), 0.0);
-                machine.smooth(t, x, &mut rates);
-                for (k, (states, list)) in course.states.iter_mut().zip(&mut course.rates).enumerate() {
-                    states.push(x[k]);
-                    list.push(rates[k]);
-                }
+        let setting = self.setting(run, shared, nuisance, &[]);
+        self.follow(run, setting, nuisance, |machine, reading, x| {
+            rates.resize(x.len(), 0.0);
+            machine.smooth(reading.t_s, x, &mut rates);
+            for (k, (states, list)) in course.states.iter_mut().zip(&mut course.rates).enumerate() {
+                states.push(x[k]);
+                list.push(rates[k]);
             }
         })?;
         Ok(course)
     }
 
-    /// Sets up the machine of these parameters and leads it through a run; `at_row` is called wherever a row is read.
+    fn setting<T: Number>(&self, run: &Run, shared: &[T], nuisance: &[T], moving: &[usize]) -> Setting<T> {
+        let equations = &self.equations;
+        let mut values = vec![T::from(0.0); equations.rates.registers()];
+        for (k, p) in equations.parameters.iter().enumerate() {
+            let place = equations.parameter_name(k);
+            values[place] = self.per_run[k].map_or(T::from(p.value), |slot| nuisance[slot]);
+        }
+        let on = |slot: usize| shared[slot].re() != self.off[slot] || moving.contains(&slot);
+        let shared = Shared {
+            equations,
+            roles: &self.roles,
+            values: shared,
+            on: &on,
+            run: windows::of_run(run),
+            middles: &self.middles,
+            speeds: &self.speeds,
+        };
+        shared.setting(values)
+    }
+
+    /// The largest step under these laws, s: halved until it resolves them.
+    fn step_s<T>(&self, setting: &Setting<T>) -> f64 {
+        let wanted = (setting.shortest_s / STEPS_IN_SHORTEST).max(FINEST_FOR_LAWS * self.scales.step_s);
+        let halvings = (self.pace.step_s / wanted).log2().ceil();
+        self.pace.step_s * 0.5_f64.powi(halvings.max(0.0) as i32)
+    }
+
+    /// Leads a machine through a run; `at_row` is called wherever a row is read: of all outputs without a delay (shift 0), or of one
+    /// output (its number is one less than the shift).
     fn follow<T: Number>(
         &self,
         run: &Run,
-        shared: &[T],
+        setting: Setting<T>,
         nuisance: &[T],
-        moving: &[usize],
-        mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading<T>, T, &[T], &Stop<T>),
+        mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading, &[T]),
     ) -> Result<(), String> {
+        let times = &run.inputs[0];
+        let Some(&begin) = times.first() else { return Ok(()) };
+        let step_s = self.step_s(&setting);
+        let states = self.equations.states.len() + setting.further_states;
+        let mut x = self.start(run, nuisance, states);
+        let delayed = setting.drives.iter().any(|d| d.1);
+        let (reads, shifts) = readings(times, &setting.delays);
+        let mut machine = self.machine(run, setting, &x);
+        let breaks = self.breaks(&mut machine, begin, delayed);
+        let mut integrator = Integrator::new(self.pace.method, states, step_s);
+        let blown = |e: joint_laws::integrate::Diverged| {
+            let name = self.equations.states.get(e.state).map_or("a deflection", |s| s.name.as_str());
+            format!("{name} is {:.3e} at t = {:.6} s", e.value, e.t_s)
+        };
+        let mut t = begin;
+        integrator.settle(&mut machine, t, &mut x);
+        // Readings that are older than the run: along the tangent.
+        let mut next = 0;
+        while let Some(read) = reads.get(next).filter(|r| r.t_s < begin) {
+            let away = shifts[read.shift] + (read.t_s - begin);
+            let early = integrator.along_tangent(&mut machine, t, &x, away);
+            at_row(&mut machine, read, early);
+            next += 1;
+        }
+        // A row is read under its own commands; where jumps may move, what jumps a moment later has not acted yet.
+        for change in breaks.iter().map(Some).chain([None]) {
+            let until = change.map_or_else(|| reads.last().map_or(begin, |r| r.t_s), |b| b.t.re());
+            let before = |r: &Reading| change.is_none() || r.t_s < until || delayed && r.t_s == until;
+            let end = next + reads[next..].partition_point(before);
+            if until > t || end > next {
+                let to = until.max(t);
+                integrator
+                    .advance(&mut machine, &mut t, &mut x, to, &reads[next..end], &shifts, &mut at_row)
+                    .map_err(blown)?;
+            }
+            next = end;
+            if let Some(change) = change {
+                let late = change.t.infinitesimal();
+                integrator.nudge(&mut machine, t, &mut x, late);
+                machine.begun[change.input] += 1;
+                integrator.settle(&mut machine, t, &mut x);
+                integrator.nudge(&mut machine, t, &mut x, -late);
+            }
+        }
+        Ok(())
+    }
+
+    /// The states at a run's first row.
+    fn start<T: Number>(&self, run: &Run, nuisance: &[T], states: usize) -> Vec<T> {
         let zero = T::from(0.0);
-        let setting = self.setting(shared, nuisance, moving);
-        let states = self.equations.states.len() + setting.yielding;
         let mut x = vec![zero; states];
+        let free = self.cut.is_some() && windows::continues(run);
         for (state, s) in self.equations.states.iter().enumerate() {
-            x[state] = match s.start {
+            let start = if free { Start::Free } else { s.start };
+            x[state] = match start {
                 Start::Known(value) => T::from(value),
                 Start::Measured(output) => {
                     T::from(run.outputs[output].iter().copied().find(|v| v.is_finite()).unwrap_or(0.0))
@@ -147,31 +257,34 @@ impl MotionModel {
                 Start::Free => self.free_states[state].map_or(zero, |slot| nuisance[slot]),
             };
         }
-        let times = &run.inputs[0];
-        let Some(&begin) = times.first() else { return Ok(()) };
-        let delayed = setting.drives.iter().any(|d| d.1);
-        let signals: Vec<Signal<T>> = setting
-            .drives
-            .iter()
-            .enumerate()
-            .map(|(k, (drive, _))| {
-                let mut drive = *drive;
+        x
+    }
+
+    fn machine<T: Number>(&self, run: &Run, setting: Setting<T>, x: &[T]) -> Driven<'_, T> {
+        let equations = &self.equations;
+        let shortest_s = 0.25 * self.scales.step_s;
+        let signals: Vec<Signal<T>> = (0..equations.inputs.len())
+            .map(|k| {
+                let mut drive = setting.drives[k].0;
                 if let (Some((_, follower)), Some(joint)) =
-                    (&mut drive.play, self.equations.joints.iter().find(|j| j.drive == Some(k)))
+                    (&mut drive.play, equations.joints.iter().find(|j| j.drive == Some(k)))
                 {
                     *follower = x[joint.position];
                 }
-                let between = self.equations.inputs[k].between;
-                Signal::new(times, &run.inputs[1 + k], between, &drive, self.step_s)
+                let between = equations.inputs[k].between;
+                Signal::new(&run.inputs[0], &run.inputs[1 + k], between, &drive, shortest_s)
             })
             .collect();
-        let stops = stops(times, &signals, &setting.reading, delayed);
-        let joints = self.equations.joints.len();
-        let joint_of: Vec<usize> = (0..joints).filter(|&j| setting.laws[j].dry.is_some()).collect();
-        let contacts =
-            joint_of.iter().map(|&j| Contact { velocity: self.equations.joints[j].velocity }).collect();
-        let mut machine = Driven {
-            equations: &self.equations,
+        let joint_of: Vec<usize> =
+            (0..setting.laws.len()).filter(|&j| setting.laws[j].dry.is_some()).collect();
+        let contacts = joint_of.iter().map(|&j| Contact { velocity: equations.joints[j].velocity }).collect();
+        let mut values = setting.values;
+        let mut seen = vec![T::from(0.0); equations.readings.registers()];
+        seen[..equations.names()].copy_from_slice(&values[..equations.names()]);
+        equations.rates.prepare(&mut values);
+        equations.readings.prepare(&mut seen);
+        Driven {
+            equations,
             laws: setting.laws,
             leaks: setting.leaks,
             begun: vec![0; signals.len()],
@@ -180,272 +293,34 @@ impl MotionModel {
             contacts,
             joint_of,
             ceilings: setting.ceilings,
-            values: setting.values,
-            stack: Vec::with_capacity(16),
-        };
-        let mut integrator = Integrator::new(states, self.step_s);
-        let mut t = T::from(begin);
-        let hybrid = !machine.contacts.is_empty() || !machine.ceilings.is_empty();
-        let mut settled = false;
-        let mut rates = vec![zero; states];
-        let mut early = vec![zero; states];
-        for stop in &stops {
-            if let Some(input) = stop.input {
-                if stop.t.re() > begin || delayed {
-                    self.go(&mut integrator, &mut machine, &mut t, &mut x, stop.t, &mut settled)?;
-                }
-                machine.begun[input] += 1;
-                settled = !hybrid;
-                continue;
-            }
-            if stop.t.re() < begin {
-                // A reading that is older than the run: along the tangent.
-                machine.smooth(t, &x, &mut rates);
-                for (e, (x, r)) in early.iter_mut().zip(x.iter().zip(&rates)) {
-                    *e = *x + *r * (stop.t - t);
-                }
-                at_row(&mut machine, &setting.reading, stop.t, &early, stop);
-                continue;
-            }
-            self.go(&mut integrator, &mut machine, &mut t, &mut x, stop.t, &mut settled)?;
-            at_row(&mut machine, &setting.reading, stop.t, &x, stop);
-        }
-        Ok(())
-    }
-
-    fn go<T: Number>(
-        &self,
-        integrator: &mut Integrator<T>,
-        machine: &mut Driven<'_, T>,
-        t: &mut T,
-        x: &mut [T],
-        to: T,
-        settled: &mut bool,
-    ) -> Result<(), String> {
-        if !*settled {
-            integrator.settle(machine, *t, x);
-            *settled = true;
-        }
-        integrator.advance(machine, t, x, to).map_err(|e| {
-            let name = self.equations.states.get(e.state).map_or("a deflection", |s| s.name.as_str());
-            format!("{name} is {:.3e} at t = {:.6} s", e.value, e.t_s)
-        })
-    }
-
-    /// What all parameters make of the machine.
-    fn setting<T: Number>(&self, shared: &[T], nuisance: &[T], moving: &[usize]) -> Setting<T> {
-        let equations = &self.equations;
-        let zero = T::from(0.0);
-        let mut values = vec![zero; equations.names()];
-        for (k, p) in equations.parameters.iter().enumerate() {
-            let place = equations.parameter_name(k);
-            values[place] = self.per_run[k].map_or(T::from(p.value), |slot| nuisance[slot]);
-        }
-        let mut setting = Setting {
+            beyond: vec![false; setting.edges.len()],
+            edges: setting.edges,
             values,
-            laws: vec![JointLaws::none(); equations.joints.len()],
-            leaks: vec![zero; equations.levels.len()],
-            ceilings: Vec::new(),
-            drives: vec![(Drive::perfect(), false); equations.inputs.len()],
-            reading: Reading {
-                sensors: vec![Sensor::perfect(); equations.outputs.len()],
-                delays: vec![None; equations.outputs.len()],
-            },
-            pace: T::from(1.0),
-            yielding: 0,
-        };
-        for (slot, (role, value)) in self.roles.iter().zip(shared).enumerate() {
-            let on = value.re() != self.off[slot] || moving.contains(&slot);
-            match *role {
-                Role::Stated(k) => setting.values[equations.parameter_name(k)] = *value,
-                _ if !on => {}
-                Role::Joint(joint, what) => self.joint(&mut setting, joint, what, *value, shared),
-                Role::Input(input, what) => {
-                    let (drive, delayed) = &mut setting.drives[input];
-                    match what {
-                        OfInput::Gain => drive.gain = *value,
-                        OfInput::Offset => drive.offset = *value,
-                        OfInput::Delay => {
-                            drive.delay_s = *value;
-                            *delayed = true;
-                        }
-                        OfInput::Lag => {
-                            drive.lag_s = Some(*value);
-                            *delayed = true;
-                        }
-                        OfInput::Upper => drive.upper = *value,
-                        OfInput::Lower => drive.lower = *value,
-                        OfInput::DeadZone => drive.dead_zone = *value,
-                    }
+            seen,
+            other: vec![T::from(0.0); equations.states.len()],
+        }
+    }
+
+    /// Where pieces of inputs begin behind a run's start, in order; what holds from the start on has begun.
+    fn breaks<T: Number>(&self, machine: &mut Driven<'_, T>, begin: f64, delayed: bool) -> Vec<Break<T>> {
+        let mut breaks = Vec::new();
+        for (input, signal) in machine.signals.iter().enumerate() {
+            for t in signal.begins() {
+                if t.re() <= begin && !delayed {
+                    machine.begun[input] += 1;
+                } else {
+                    breaks.push(Break { t, input });
                 }
-                Role::Output(output, what) => {
-                    let sensor = &mut setting.reading.sensors[output];
-                    match what {
-                        OfOutput::Gain => sensor.gain = *value,
-                        OfOutput::Offset => sensor.offset = *value,
-                        OfOutput::Drift => sensor.drift_per_s = *value,
-                        OfOutput::Delay => setting.reading.delays[output] = Some(*value),
-                        OfOutput::Lag => sensor.lag_s = Some(*value),
-                        OfOutput::Upper => sensor.upper = *value,
-                        OfOutput::Lower => sensor.lower = *value,
-                    }
-                }
-                Role::Overflow(level) => {
-                    setting.ceilings.push(Ceiling { state: equations.levels[level], height: *value });
-                }
-                Role::Leak(level) => setting.leaks[level] = *value,
-                Role::Clock => setting.pace = (*value + 1.0).recip(),
             }
         }
-        // A gap is between the command and its joint.
-        for (slot, role) in self.roles.iter().enumerate() {
-            if let Role::Joint(joint, OfJoint::Gap) = role
-                && (shared[slot].re() != self.off[slot] || moving.contains(&slot))
-                && let Some(drive) = equations.joints[*joint].drive
-            {
-                setting.drives[drive].0.play = Some((shared[slot], zero));
-            }
+        if machine.signals.len() > 1 {
+            breaks.sort_by(|a, b| a.t.re().total_cmp(&b.t.re()));
         }
-        setting
+        breaks
     }
 
-    /// The value of another parameter of the same joint.
-    fn of_joint<T: Number>(&self, joint: usize, what: OfJoint, shared: &[T]) -> T {
-        let at = self.roles.iter().position(|r| *r == Role::Joint(joint, what));
-        at.map_or(T::from(0.0), |slot| shared[slot])
-    }
-
-    fn joint<T: Number>(
-        &self,
-        setting: &mut Setting<T>,
-        joint: usize,
-        what: OfJoint,
-        value: T,
-        shared: &[T],
-    ) {
-        let laws = &mut setting.laws[joint];
-        let speed = || self.of_joint(joint, OfJoint::StribeckSpeed, shared);
-        match what {
-            OfJoint::Coulomb => laws.dry.get_or_insert_with(|| DryFriction::none(speed())).level = value,
-            OfJoint::Asymmetry => {
-                laws.dry.get_or_insert_with(|| DryFriction::none(speed())).forward_less_backward = value;
-            }
-            OfJoint::StribeckLevel => {
-                laws.dry.get_or_insert_with(|| DryFriction::none(speed())).stribeck_level = value;
-            }
-            OfJoint::LoadFraction => {
-                laws.dry.get_or_insert_with(|| DryFriction::none(speed())).load_fraction = value;
-            }
-            OfJoint::Damping(power) => laws.damping[power] = value,
-            OfJoint::Stiffness(power) => laws.stiffness[power] = value,
-            OfJoint::Constant => laws.constant = value,
-            OfJoint::CogAmplitude => {
-                let phase = self.of_joint(joint, OfJoint::CogPhase, shared);
-                let periods = self.of_joint(joint, OfJoint::CogPeriods, shared);
-                laws.cogging = Some([value, phase, periods]);
-            }
-            OfJoint::StopStiffness => {
-                let position = self.of_joint(joint, OfJoint::StopPosition, shared);
-                laws.stop = Some((position, value, position.re() > self.middles[joint]));
-            }
-            OfJoint::Inertia => laws.inertia = value,
-            OfJoint::YieldStiffness => {
-                let yields = self.of_joint(joint, OfJoint::Yield, shared);
-                let state = self.equations.states.len() + setting.yielding;
-                setting.yielding += 1;
-                setting.laws[joint].hysteresis = Some((value, yields, state));
-            }
-            // They shape what others switch on; a gap is the drive's.
-            OfJoint::StribeckSpeed
-            | OfJoint::CogPhase
-            | OfJoint::CogPeriods
-            | OfJoint::StopPosition
-            | OfJoint::Yield
-            | OfJoint::Gap => {}
-        }
-    }
-}
-
-/// What a sensor and its delay make of each output.
-struct Reading<T> {
-    sensors: Vec<Sensor<T>>,
-    delays: Vec<Option<T>>,
-}
-
-/// All that parameters decide.
-struct Setting<T> {
-    values: Vec<T>,
-    laws: Vec<JointLaws<T>>,
-    leaks: Vec<T>,
-    ceilings: Vec<Ceiling<T>>,
-    /// What acts on each input, and whether its jumps are moved in time.
-    drives: Vec<(Drive<T>, bool)>,
-    reading: Reading<T>,
-    pace: T,
-    /// Springs that yield, each with a state.
-    yielding: usize,
-}
-
-/// A time at which something is done on the way through a run.
-struct Stop<T> {
-    t: T,
-    /// A piece of this input begins.
-    input: Option<usize>,
-    /// This row is read: of one channel, or of all that have no delay.
-    row: usize,
-    channel: Option<usize>,
-}
-
-/// Times at which inputs jump or rows are read, in order.
-///
-/// At one time, inputs come first: a row is read under its own commands. Where jumps may move, rows come first: what jumps a moment later
-/// has not acted yet.
-fn stops<T: Number>(
-    times: &[f64],
-    signals: &[Signal<T>],
-    reading: &Reading<T>,
-    delayed: bool,
-) -> Vec<Stop<T>> {
-    let mut stops = Vec::new();
-    let inputs = |stops: &mut Vec<Stop<T>>| {
-        for (k, signal) in signals.iter().enumerate() {
-            stops.extend(signal.begins().map(|t| Stop { t, input: Some(k), row: 0, channel: None }));
-        }
-    };
-    let rows = |stops: &mut Vec<Stop<T>>| {
-        if reading.delays.iter().any(Option::is_none) {
-            stops.extend((0..times.len()).map(|row| Stop {
-                t: T::from(times[row]),
-                input: None,
-                row,
-                channel: None,
-            }));
-        }
-        for (c, delay) in reading.delays.iter().enumerate() {
-            if let Some(delay) = delay {
-                let late = |row: usize| T::from(times[row]) - *delay;
-                stops.extend((0..times.len()).map(|row| Stop {
-                    t: late(row),
-                    input: None,
-                    row,
-                    channel: Some(c),
-                }));
-            }
-        }
-    };
-    if delayed {
-        rows(&mut stops);
-        inputs(&mut stops);
-    } else {
-        inputs(&mut stops);
-        rows(&mut stops);
-    }
-    stops.sort_by(|a, b| a.t.re().total_cmp(&b.t.re()));
-    stops
-}
-
-impl DualModel for MotionModel {
-    fn predict_dual<T: num_dual::DualNum<Primitive = f64, Real = f64> + Copy>(
+    /// Predicts in any numbers; `moving` are the shared slots that carry a derivative.
+    fn predict_in<T: Number>(
         &self,
         run: &Run,
         shared: &[T],
@@ -454,24 +329,18 @@ impl DualModel for MotionModel {
         out: &mut [T],
     ) -> Result<(), String> {
         let n = run.len();
-        let mut sensors = Vec::new();
-        let outputs = self.equations.outputs.len();
-        self.follow(run, shared, nuisance, moving, |machine, reading, t, x, stop| {
-            if sensors.is_empty() {
-                sensors.clone_from(&reading.sensors);
-            }
-            match stop.channel {
-                Some(c) => out[c * n + stop.row] = machine.output(c, t, x),
-                None => {
-                    for c in (0..outputs).filter(|c| reading.delays[*c].is_none()) {
-                        out[c * n + stop.row] = machine.output(c, t, x);
-                    }
-                }
-            }
+        let setting = self.setting(run, shared, nuisance, moving);
+        let sensors = setting.sensors.clone();
+        let delayed: Vec<bool> = setting.delays.iter().map(Option::is_some).collect();
+        self.follow(run, setting, nuisance, |machine, reading, x| {
+            let wanted = |c: usize| if reading.shift == 0 { !delayed[c] } else { c + 1 == reading.shift };
+            machine.outputs(reading.t_s, x, wanted, |c, value| out[c * n + reading.row] = value);
         })?;
-        let times: Vec<T> = run.inputs[0].iter().map(|t| T::from(*t)).collect();
+        let times = &run.inputs[0];
+        let of_run = self.cut.as_ref().and_then(|begins| begins.get(windows::of_run(run)));
+        let begin = of_run.or(times.first()).copied().unwrap_or(0.0);
         for (sensor, column) in sensors.iter().zip(out.chunks_mut(n.max(1))) {
-            sensor.read(&times, column);
+            sensor.read(begin, times, column);
         }
         match out.iter().position(|v| !v.re().is_finite()) {
             None => Ok(()),
@@ -481,6 +350,52 @@ impl DualModel for MotionModel {
             }
         }
     }
+
+    /// The columns of at most `N` free parameters: (column, whether it is shared, slot).
+    fn columns<const N: usize>(
+        &self,
+        (run, shared, nuisance): (&Run, &[f64], &[f64]),
+        free: &[(usize, bool, usize)],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), String> {
+        let mut shared: Vec<Dual<N>> = shared.iter().map(|v| (*v).into()).collect();
+        let mut nuisance: Vec<Dual<N>> = nuisance.iter().map(|v| (*v).into()).collect();
+        for (number, &(_, is_shared, slot)) in free.iter().enumerate() {
+            let target = if is_shared { &mut shared[slot] } else { &mut nuisance[slot] };
+            *target = Dual::parameter(target.re, number);
+        }
+        let moving: Vec<usize> = free.iter().filter(|f| f.1).map(|f| f.2).collect();
+        let rows = out.len();
+        let mut values = vec![Dual::<N>::from(0.0); rows];
+        self.predict_in(run, &shared, &nuisance, &moving, &mut values)?;
+        for (row, value) in values.iter().enumerate() {
+            out[row] = value.re;
+            for (derivative, (column, ..)) in value.eps.iter().zip(free) {
+                jacobian[column * rows + row] = *derivative;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// When each row is read, in order, and by which infinitesimals: together where outputs have no delay, else each output by itself.
+fn readings<T: Number>(times: &[f64], delays: &[Option<T>]) -> (Vec<Reading>, Vec<T>) {
+    let mut reads = Vec::with_capacity(times.len());
+    let mut shifts = vec![T::from(0.0)];
+    if delays.iter().any(Option::is_none) {
+        reads.extend(times.iter().enumerate().map(|(row, &t_s)| Reading { t_s, row, shift: 0 }));
+    }
+    for (c, delay) in delays.iter().enumerate() {
+        let delay = delay.unwrap_or(T::from(0.0));
+        shifts.push(-delay.infinitesimal());
+        if delays[c].is_some() {
+            let late = |(row, t): (usize, &f64)| Reading { t_s: t - delay.re(), row, shift: c + 1 };
+            reads.extend(times.iter().enumerate().map(late));
+        }
+    }
+    reads.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    (reads, shifts)
 }
 
 impl Model for MotionModel {
@@ -495,12 +410,13 @@ impl Model for MotionModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict_dual(run, shared, nuisance, &[], out)
+        self.predict_in(run, shared, nuisance, &[], out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
     fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
-        super::start::states(&self.equations, run, &self.free_states, nuisance);
+        let knows = self.cut.is_none() || !windows::continues(run);
+        super::start::states(&self.equations, run, knows, &self.free_states, nuisance);
     }
 
     fn extensions(&self) -> Extensions<'_> {
@@ -517,7 +433,24 @@ impl Model for MotionModel {
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        JacobianRequest { run, shared, nuisance, shared_free, nuisance_free }.fill(self, out, jacobian)
+        let of_run = nuisance_free.iter().enumerate().map(|(k, &s)| (shared_free.len() + k, false, s));
+        let free: Vec<(usize, bool, usize)> =
+            shared_free.iter().enumerate().map(|(k, &s)| (k, true, s)).chain(of_run).collect();
+        if free.is_empty() {
+            return self.predict(run, shared, nuisance, out);
+        }
+        let at = (run, shared, nuisance);
+        // Numbers no longer than needed: most time goes into their derivatives.
+        for chunk in free.chunks(8) {
+            match chunk.len() {
+                1 => self.columns::<1>(at, chunk, out, jacobian),
+                2 | 3 => self.columns::<3>(at, chunk, out, jacobian),
+                4 | 5 => self.columns::<5>(at, chunk, out, jacobian),
+                _ => self.columns::<8>(at, chunk, out, jacobian),
+            }
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+        }
+        Ok(())
     }
 }
 

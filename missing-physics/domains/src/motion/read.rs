@@ -5,7 +5,7 @@ use missing_physics::model::Quantity;
 
 use super::equations::Equations;
 use super::units;
-use crate::reading::{calibration, check_runs, number, resolution};
+use crate::reading::{calibration, check_runs, number};
 use crate::recording::{Column, Header, ReadError};
 
 /// A run with fewer rows says nothing beyond its own start.
@@ -82,8 +82,39 @@ pub(super) fn read(header: &Header) -> Result<(Equations, Recording), ReadError>
         runs,
         noise_along: Some(0),
         calibration: calibration(header, &names)?,
-        resolution: measured.iter().map(|c| resolution(c)).collect(),
+        resolution: measured.into_iter().map(quantum).collect(),
     };
     drop(table);
     Ok((equations, recording))
+}
+
+/// Gaps between readings are multiples of a step to this part of it, where readings come in steps.
+const EVEN: f64 = 0.1;
+
+/// The step in which a column's readings come, else 0: an encoder's step is no round number, and readings are rounded once more when they
+/// are written.
+fn quantum(mut readings: Vec<f64>) -> f64 {
+    readings.sort_by(f64::total_cmp);
+    let largest = readings.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let gaps: Vec<f64> = readings.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1e-9 * largest).collect();
+    let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let steps: f64 = gaps.iter().map(|g| (g / least).round()).sum();
+    let step = gaps.iter().sum::<f64>() / steps;
+    let even = |g: &f64| (g / step - (g / step).round()).abs() < EVEN;
+    if gaps.len() > 2 && gaps.iter().all(even) { step } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantum;
+
+    /// An encoder of 40,000 steps a turn, written to the micrometre; and readings that come in no steps.
+    #[test]
+    fn the_step_of_an_encoder_is_found_although_it_is_rounded() {
+        let step = std::f64::consts::TAU / 40_000.0;
+        let written = |k: i32| (f64::from(k * k % 997) * step * 1e6).round() / 1e6;
+        let found = quantum((0..300).map(written).collect());
+        assert!((found / step - 1.0).abs() < 1e-4, "{found}");
+        assert_eq!(quantum((0..300).map(|k| f64::from(k).sin()).collect()), 0.0);
+    }
 }

@@ -39,6 +39,13 @@ pub(super) struct OfJoint {
     pub(super) force_unit: String,
 }
 
+impl OfJoint {
+    /// The smallest displacement at which a spring can be seen to yield: a part of what passes between rows. Below it is dry friction.
+    pub(super) fn least_yield(&self, step_s: f64) -> f64 {
+        (0.25 * self.speed * step_s).clamp(1e-4 * self.reach, 0.03 * self.reach)
+    }
+}
+
 /// Smallest and largest of the finite values; a unit apart where they are all the same.
 pub(super) fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values

@@ -7,10 +7,16 @@ use super::effects::{OfInput, OfJoint, OfOutput, Role};
 use super::equations::{Equations, Start};
 use super::scales::Scales;
 
-/// Fills in the free states at a run's start: what is measured as it stands from the first rows, its derivative from their slope.
-pub(super) fn states(equations: &Equations, run: &Run, free: &[Option<usize>], nuisance: &mut [f64]) {
-    let mut known: Vec<Option<f64>> =
-        equations.states.iter().map(|s| if let Start::Known(v) = s.start { Some(v) } else { None }).collect();
+/// Fills in the free states at a run's start (of which the recording may know some): what is measured as it stands from the first rows, its derivative from their slope.
+pub(super) fn states(
+    equations: &Equations,
+    run: &Run,
+    knows: bool,
+    free: &[Option<usize>],
+    nuisance: &mut [f64],
+) {
+    let stated = |start: Start| if let Start::Known(v) = start { Some(v).filter(|_| knows) } else { None };
+    let mut known: Vec<Option<f64>> = equations.states.iter().map(|s| stated(s.start)).collect();
     for (c, output) in equations.outputs.iter().enumerate() {
         let Some(state) = output.state else { continue };
         let Some([value, slope]) = beginning(&run.inputs[0], &run.outputs[c]) else { continue };
@@ -69,11 +75,11 @@ pub(super) fn mechanism(
             let (force, [low, high]) = (s.acceleration, s.range);
             match what {
                 OfJoint::Coulomb | OfJoint::Asymmetry | OfJoint::Constant => {
-                    [0.01, 0.1, 0.4].map(|f| vec![(first, f * force)]).to_vec()
+                    [1e-3, 0.01, 0.1, 0.4].map(|f| vec![(first, f * force)]).to_vec()
                 }
                 OfJoint::StribeckLevel => [0.01, 0.05, 0.3]
                     .iter()
-                    .flat_map(|v| [0.05, 0.3].map(|f| vec![(first, f * force), (own[1], v * s.speed)]))
+                    .flat_map(|v| [3e-3, 0.05, 0.3].map(|f| vec![(first, f * force), (own[1], v * s.speed)]))
                     .collect(),
                 OfJoint::LoadFraction => [0.05, 0.3].map(|f| vec![(first, f)]).to_vec(),
                 // In proportion to its amplitude, a wave of any phase is a sum of these two: the better one leads to it.
@@ -93,7 +99,8 @@ pub(super) fn mechanism(
                     .collect(),
                 OfJoint::YieldStiffness => [3e-3, 0.02, 0.1, 0.4]
                     .iter()
-                    .map(|y| vec![(first, 0.05 * force / (y * s.reach)), (own[1], y * s.reach)])
+                    .map(|y| (y * s.reach).max(s.least_yield(scales.step_s)))
+                    .map(|y| vec![(first, 0.05 * force / y), (own[1], y)])
                     .collect(),
                 _ => Vec::new(),
             }

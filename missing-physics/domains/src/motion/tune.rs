@@ -1,40 +1,104 @@
 //! From a recording to its model: a fit of the equations alone that does not lose the phase, the step of the integration, and the sizes
 //! of the motion.
 
+use joint_laws::integrate::Method;
 use missing_physics::data::{Recording, Run};
 use missing_physics::fit::least_squares;
 use missing_physics::model::Model as _;
 use missing_physics::noise::rough_sigma;
 
 use super::equations::Equations;
-use super::model::MotionModel;
+use super::growth::too_long;
+use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range};
+use super::windows::{cut, rows, thin};
 
-/// The finest step of the integration, in parts of the time between rows.
-const FINEST: f64 = 64.0;
-/// Errors of the integration that are put up with, in parts of a channel's noise.
-const TOLERANCE: f64 = 0.02;
-/// And where there is next to no noise, in parts of its range.
-const LEAST_TOLERANCE: f64 = 1e-7;
+/// The coarsest step of the integration, in rows.
+const COARSEST: f64 = 16.0;
+/// The finest, in parts of the time between rows.
+const FINEST: f64 = 256.0;
+/// Where inputs change in fewer rows than this, steps are short anyway.
+const OFTEN: f64 = 3.0;
+/// Errors of the integration that are put up with, in sigmas of all rows together.
+const UNSEEN: f64 = 0.3;
+/// By how much one step a row has to fit better than the exact motion, as a sum of squares.
+const BETTER: f64 = 20.0;
+/// The least noise of a channel that is reckoned with, in parts of its range.
+const LEAST_SIGMA: f64 = 3e-5;
+/// Rows by which the step is judged.
+const RESOLVED_ROWS: usize = 4000;
 /// Rows that windows shorter than a run have together, at the most: enough to fit the equations by.
 const WINDOWED_ROWS: usize = 3000;
 /// Rows of the shortest windows in which the equations are fitted first.
 const FIRST_WINDOW: usize = 40;
 
-/// The full model.
+/// A recording as it is diagnosed.
+pub(super) struct Tuned {
+    pub(super) model: MotionModel,
+    pub(super) recording: Recording,
+    /// What was done to the rows, one sentence each.
+    pub(super) remarks: Vec<String>,
+}
+
+/// The full model, and the recording as it can be followed.
 ///
 /// # Errors
 /// Why the equations give no prediction, in words.
-pub(super) fn model(equations: Equations, recording: &Recording) -> Result<MotionModel, String> {
-    let step_s = median_step(recording);
-    let mut model = MotionModel::baseline(equations, step_s);
+pub(super) fn tuned(equations: Equations, mut recording: Recording) -> Result<Tuned, String> {
+    let mut remarks = Vec::new();
+    if let Some(every) = thin(&equations, &mut recording) {
+        remarks.push(format!("one of {every} measured values counts: more would take longer than they tell"));
+    }
+    let mut model = MotionModel::baseline(equations, first_pace(&recording));
     let starts: Vec<f64> = shared_starts(&model);
-    resolve(&mut model, recording, &starts)?;
-    let fitted = windows(&model, recording, starts);
-    resolve(&mut model, recording, &fitted)?;
+    resolve(&mut model, &recording, &starts)?;
+    let (fitted, followed) = windows(&model, &recording, starts)?;
+    resolve(&mut model, &recording, &fitted)?;
+    let (mut fitted, followed) = (fitted, followed);
+    if followed.is_none()
+        && let Some(better) = by_the_rows(&mut model, &recording, &fitted)
+    {
+        fitted = better;
+    }
     let stated = model.stated(&fitted);
-    let scales = sizes(&model, recording, &fitted)?;
-    Ok(model.full(scales, &stated))
+    let Some(length) = followed else {
+        let scales = sizes(&model, &recording, &fitted)?;
+        return Ok(Tuned { model: model.full(scales, &stated, None), recording, remarks });
+    };
+    let free = MotionModel::baseline(model.equations().free(), model.pace());
+    let whole = recording;
+    let recording = cut(&whole, length);
+    let scales = sizes(&free, &recording, &fitted)?;
+    let span = |r: &Run| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0].first().unwrap_or(&0.0);
+    let longest = recording.runs.iter().map(span).fold(0.0, f64::max);
+    remarks.push(format!(
+        "runs are followed in windows of {longest:.3} s with free starts: over more, a small deviation of the start grows until the \
+         motion tells nothing of the physics"
+    ));
+    Ok(Tuned { model: model.full(scales, &stated, Some(&whole.runs)), recording, remarks })
+}
+
+/// A recording may come from a simulator that takes one step of Runge and Kutta's a row: where that fits better than the exact motion,
+/// and differs from it by less than the noise of a reading, the motion is followed like that. The parameters fitted then.
+fn by_the_rows(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Option<Vec<f64>> {
+    let exact = model.pace();
+    let rows = Pace { method: Method::Kutta, step_s: median_step(recording) };
+    if exact == rows {
+        return None;
+    }
+    let before = least_squares(&*model, recording, shared).ok()?;
+    model.set_pace(rows);
+    let values =
+        recording.runs.iter().flat_map(|r| r.outputs.iter().flatten()).filter(|v| v.is_finite()).count();
+    match least_squares(&*model, recording, shared) {
+        Ok(after) if after.chi2 < before.chi2 - BETTER && before.chi2 - after.chi2 < 0.1 * values as f64 => {
+            Some(after.shared)
+        }
+        _ => {
+            model.set_pace(exact);
+            None
+        }
+    }
 }
 
 fn shared_starts(model: &MotionModel) -> Vec<f64> {
@@ -56,33 +120,51 @@ fn median_step(recording: &Recording) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Halves the step of the integration until the predictions of the first rows no longer depend on it.
+/// The coarsest pace that is worth a try: long steps where inputs do not end them.
+fn first_pace(recording: &Recording) -> Pace {
+    let rows = median_step(recording);
+    let changes = |column: &Vec<f64>| column.windows(2).filter(|w| w[0] != w[1]).count();
+    let (mut all, mut changing) = (0, 0);
+    for run in &recording.runs {
+        all += run.len();
+        changing += run.inputs[1..].iter().map(changes).max().unwrap_or(0);
+    }
+    let spacing = all as f64 / (changing + recording.runs.len()) as f64;
+    if spacing < OFTEN {
+        Pace { method: Method::Kutta, step_s: rows }
+    } else {
+        Pace { method: Method::DormandPrince, step_s: rows * COARSEST.min(spacing) }
+    }
+}
+
+/// Halves the step of the integration until what predictions of the liveliest rows change by can be told from the noise in no test: an
+/// error of the integration is the same in all rows, and what is far below the noise in each shows in all of them together.
 fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Result<(), String> {
-    let coarsest = median_step(recording);
-    let Some(run) = recording.runs.iter().max_by_key(|r| r.len()) else { return Ok(()) };
-    let run = rows(run, 0, run.len().min(400));
+    let mut pace = first_pace(recording);
+    let Some(run) = liveliest(recording) else { return Ok(()) };
     let start = nuisance(model, &run);
     let n = run.len();
-    let tolerances: Vec<f64> = (0..recording.channels.len()).map(|c| tolerance(recording, &run, c)).collect();
+    let rows: usize = recording.runs.iter().map(Run::len).sum();
+    let sigmas: Vec<f64> = (0..recording.channels.len()).map(|c| sigma(recording, &run, c)).collect();
     let predict = |model: &MotionModel| {
         let mut out = vec![0.0; n * recording.channels.len()];
         model.predict(&run, shared, &start, &mut out).map(|()| out).map_err(|e| e.reason)
     };
-    let mut step = coarsest;
-    model.set_step(step);
+    model.set_pace(pace);
     let mut before = predict(model);
-    while step > coarsest / FINEST {
-        step *= 0.5;
-        model.set_step(step);
+    let finest = median_step(recording) / FINEST;
+    while pace.step_s > finest {
+        let coarser = pace;
+        pace.step_s *= 0.5;
+        model.set_pace(pace);
         let now = predict(model);
         if let (Ok(before), Ok(now)) = (&before, &now) {
-            let close = before
-                .chunks(n)
-                .zip(now.chunks(n))
-                .zip(&tolerances)
-                .all(|((a, b), tolerance)| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= *tolerance));
-            if close {
-                model.set_step(2.0 * step);
+            let columns = before.chunks(n).zip(now.chunks(n)).zip(&sigmas);
+            let seen: f64 = columns
+                .map(|((a, b), sigma)| a.iter().zip(b).map(|(a, b)| ((a - b) / sigma).powi(2)).sum::<f64>())
+                .sum();
+            if seen * rows as f64 / n as f64 <= UNSEEN.powi(2) {
+                model.set_pace(coarser);
                 return Ok(());
             }
         }
@@ -91,45 +173,52 @@ fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Re
     before.map(|_| ())
 }
 
-/// By how much the integration may be off in a channel: little beside the rough part of its rows, or its calibration.
-fn tolerance(recording: &Recording, run: &Run, channel: usize) -> f64 {
+/// The rows by which the step is judged: of the run in which most happens, from its beginning on.
+fn liveliest(recording: &Recording) -> Option<Run> {
+    let happens = |run: &Run| -> f64 {
+        let spread = |c: usize| {
+            let [low, high] = range(run.outputs[c].iter().copied());
+            let [lowest, highest] = range(recording.runs.iter().flat_map(|r| r.outputs[c].iter().copied()));
+            (high - low) / (highest - lowest)
+        };
+        (0..run.outputs.len()).map(spread).sum()
+    };
+    let run = recording.runs.iter().max_by(|a, b| happens(a).total_cmp(&happens(b)))?;
+    Some(rows(run, 0, run.len().min(RESOLVED_ROWS)))
+}
+
+/// A channel's noise: its calibration, or the rough part of its rows, and where there is next to none a little of its range.
+fn sigma(recording: &Recording, run: &Run, channel: usize) -> f64 {
     let measured = run.inputs[0].iter().zip(&run.outputs[channel]).filter(|(_, v)| v.is_finite());
     let (times, column): (Vec<f64>, Vec<f64>) = measured.unzip();
     let rough = || rough_sigma(&times, &column).unwrap_or(0.0);
     let known = recording.calibration[channel].unwrap_or_else(rough);
     let sigma = known.max(recording.resolution[channel] / 12_f64.sqrt());
     let [low, high] = range(column.iter().copied());
-    (TOLERANCE * sigma).max(LEAST_TOLERANCE * (high - low))
-}
-
-/// The rows `from..to` of a run, as a run of its own.
-fn rows(run: &Run, from: usize, to: usize) -> Run {
-    let pick = |columns: &[Vec<f64>]| columns.iter().map(|c| c[from..to].to_vec()).collect();
-    Run { label: run.label.clone(), inputs: pick(&run.inputs), outputs: pick(&run.outputs), kind: run.kind }
+    sigma.max(LEAST_SIGMA * (high - low))
 }
 
 /// Fits the equations in short windows, then in longer ones: a fit over a whole run from far off would lose the phase and settle in a
-/// wrong place.
-fn windows(model: &MotionModel, recording: &Recording, mut shared: Vec<f64>) -> Vec<f64> {
-    let free = MotionModel::baseline(model.equations().free(), model.step_s());
+/// wrong place. The second is the number of rows of the longest windows that can be followed, where whole runs cannot.
+fn windows(
+    model: &MotionModel,
+    recording: &Recording,
+    mut shared: Vec<f64>,
+) -> Result<(Vec<f64>, Option<usize>), String> {
+    let free = MotionModel::baseline(model.equations().free(), model.pace());
     let longest = recording.runs.iter().map(Run::len).max().unwrap_or(0);
     let mut length = FIRST_WINDOW;
+    let mut followed = FIRST_WINDOW;
     loop {
-        let mut windowed = recording.clone();
-        windowed.runs = recording
-            .runs
-            .iter()
-            .flat_map(|run| {
-                let count = (run.len() / length).max(1);
-                (0..count).map(move |k| {
-                    let to = if k + 1 == count { run.len() } else { (k + 1) * length };
-                    let mut window = rows(run, k * length, to);
-                    window.label = format!("{} {k}", run.label);
-                    window
-                })
-            })
-            .collect();
         let whole = length >= longest;
+        if length > FIRST_WINDOW {
+            let sizes = sizes(&free, &cut(recording, followed), &shared)?;
+            if too_long(&free, recording, &shared, &sizes.states, length.min(longest)) {
+                return Ok((shared, Some(followed)));
+            }
+        }
+        followed = length;
+        let mut windowed = if whole { recording.clone() } else { cut(recording, length) };
         if !whole {
             // Evenly spread, not all of them.
             let most =
@@ -142,9 +231,9 @@ fn windows(model: &MotionModel, recording: &Recording, mut shared: Vec<f64>) -> 
             shared = fit.shared;
         }
         if whole {
-            return shared;
+            return Ok((shared, None));
         }
-        length = length.saturating_mul(3);
+        length = length.saturating_mul(2);
     }
 }
 

@@ -35,13 +35,24 @@ pub(crate) fn solve(
     shared: &[f64],
     nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
+    solve_within(MAX_ITERATIONS, problem, selection, noise, (shared, nuisance))
+}
+
+/// The same in at most so many iterations.
+pub(crate) fn solve_within(
+    iterations: usize,
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    (shared, nuisance): (&[f64], &[Vec<f64>]),
+) -> Result<Fit, PredictError> {
     let n_shared = selection.shared.len();
     let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
     let mut linear = linearise(problem, selection, noise, &shared, &nuisance)?;
     let mut damping = 0.0;
     let mut converged = false;
     let mut held = vec![false; n_shared];
-    for _ in 0..MAX_ITERATIONS {
+    for _ in 0..iterations {
         let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping);
         let predicted = step.predicted;
         held = step.held;

@@ -1,10 +1,11 @@
-//! Which mechanisms are worth a fit beside others, by what one step of a fit would gain: for models that know so many that fitting each
+//! Which mechanisms are worth a fit beside others, by what the first steps of a fit gain: for models that know so many that fitting each
 //! in every company would take too long.
 
 use rayon::prelude::*;
 
-use crate::fit::gauss_newton::linearise;
+use crate::fit::gauss_newton::{linearise, solve_within};
 use crate::fit::step::Step;
+use crate::model::Scope;
 use crate::problem::Problem;
 use crate::selection::candidate::{Candidate, Guess};
 
@@ -12,6 +13,10 @@ use crate::selection::candidate::{Candidate, Guess};
 pub(crate) const MANY: usize = 20;
 /// Mechanisms that are fitted beside one set.
 const KEPT: usize = 6;
+/// Mechanisms that are followed some steps on, of those whose first step promises most: one step may promise what no fit keeps.
+const FOLLOWED: usize = 14;
+/// So many.
+const STEPS: usize = 4;
 /// Starts of a mechanism that are looked at again beside others: those that promised most beside nothing.
 const STARTS: usize = 2;
 
@@ -31,7 +36,7 @@ impl Screening {
         Self(mechanisms.map(|(m, starts)| (m, near_off(starts))).collect())
     }
 
-    /// The mechanisms whose first step beside a fitted set promises most, most promising first; forgets starts that promise least.
+    /// The mechanisms whose first steps beside a fitted set gain most, most gaining first; forgets starts that promise least.
     pub(crate) fn promising(&mut self, problem: &Problem<'_>, parent: &Candidate) -> Vec<Promising> {
         let tried: Vec<(usize, usize)> = (0..self.0.len())
             .filter(|&k| !parent.set.contains(&self.0[k].0))
@@ -45,18 +50,24 @@ impl Screening {
             })
             .collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut kept: Vec<Promising> = Vec::new();
-        for &(chi2, k, start) in &scored {
-            let (mechanism, starts) = &self.0[k];
-            if chi2 > parent.fit.chi2 - 1.0 || kept.len() == KEPT {
+        let mut first: Vec<(usize, usize)> = Vec::new();
+        for &(left, k, start) in &scored {
+            if first.len() == FOLLOWED || left.is_infinite() {
                 break;
             }
-            if kept.iter().all(|p| p.mechanism != *mechanism) {
-                kept.push(Promising { mechanism: *mechanism, start: starts[start].clone() });
+            if first.iter().all(|(other, _)| *other != k) {
+                first.push((k, start));
             }
         }
+        let mut followed: Vec<(f64, Promising)> = first
+            .into_par_iter()
+            .filter_map(|(k, start)| follow(problem, parent, self.0[k].0, &self.0[k].1[start]))
+            .collect();
         self.forget(&scored);
-        kept
+        followed.retain(|(left, _)| *left < parent.fit.chi2 - 1.0);
+        followed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        followed.truncate(KEPT);
+        followed.into_iter().map(|(_, promising)| promising).collect()
     }
 
     fn forget(&mut self, scored: &[(f64, usize, usize)]) {
@@ -88,4 +99,25 @@ fn after_one_step(
     let step = Step::new(problem, &selection, &linear, (&shared, &parent.fit.nuisance), 0.0);
     let left = linear.chi2 - step.predicted;
     left.is_finite().then_some(left)
+}
+
+/// The sum of squares that is left after some steps from a start, and where they lead the mechanism.
+fn follow(
+    problem: &Problem<'_>,
+    parent: &Candidate,
+    mechanism: usize,
+    start: &[(usize, f64)],
+) -> Option<(f64, Promising)> {
+    let set: Vec<usize> = parent.set.iter().copied().chain([mechanism]).collect();
+    let selection = problem.select(&set, &[]);
+    let mut shared = parent.fit.shared.clone();
+    start.iter().for_each(|&(slot, value)| shared[slot] = value);
+    let at = (&shared[..], &parent.fit.nuisance[..]);
+    let fit = solve_within(STEPS, problem, &selection, &parent.fit.noise, at).ok()?;
+    let of = &problem.spec().mechanisms[mechanism];
+    let shared = |p: &&usize| problem.spec().parameters[**p].scope == Scope::Shared;
+    let own = of.parameters.iter().chain(&of.companions).filter(shared).map(|&p| problem.slots[p]);
+    // Whole numbers stay where the start has them.
+    let start: Guess = own.map(|slot| (slot, fit.shared[slot])).collect();
+    fit.chi2.is_finite().then_some((fit.chi2, Promising { mechanism, start }))
 }

@@ -9,6 +9,7 @@ use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
 use crate::selection::candidate::{Candidate, Guess, candidate};
 use crate::selection::screening::{MANY, Screening};
+use crate::statistics::median;
 
 /// How many sets of one size are tried with one more mechanism.
 const BEAM: usize = 3;
@@ -16,6 +17,8 @@ const BEAM: usize = 3;
 const POLISHED: f64 = 6.0;
 /// The largest set tried.
 const MOST: usize = 3;
+/// A set that leaves less than this many sigmas of the data's rough part explains them to the noise.
+const NOISE: f64 = 1.05;
 
 /// Tries sets of mechanisms: each alone, then the best ones with one more, to three.
 pub(crate) fn search(
@@ -49,10 +52,27 @@ pub(crate) fn search(
             break;
         }
         order.truncate(BEAM);
+        if let Some(&best) = order.first().filter(|_| screening.is_some())
+            && down_to_noise(problem, rule, &all[best])
+        {
+            // Nothing is left that another set could explain better with one more.
+            order.retain(|&i| all[i].evidence > all[best].evidence - POLISHED);
+        }
         layer = order;
     }
     polish(problem, rule, &mut all);
     Some(all)
+}
+
+/// Whether a set leaves no more than the noise.
+fn down_to_noise(problem: &Problem<'_>, rule: &NoiseRule, candidate: &Candidate) -> bool {
+    let Ok(left) = residuals(problem, &candidate.fit) else { return false };
+    (0..problem.channels()).all(|c| {
+        let rough = rule.fixed_sigma[c].or_else(|| median(&mut problem.rough_sigmas(c)));
+        let squares: f64 = left.iter().flat_map(|run| &run[c]).map(|v| v * v).sum();
+        let rms = (squares / problem.count(c).max(1) as f64).sqrt();
+        rough.is_some_and(|rough| rms < NOISE * rough.max(rule.floor[c]))
+    })
 }
 
 /// The sets of a layer with one more mechanism each, every set once, and where its parent stands.
@@ -101,7 +121,8 @@ fn want(wanted: &mut Vec<Wanted>, all: &[Candidate], parent: usize, mechanism: u
     }
 }
 
-/// A set fitted from its parent's fit, and where it has several mechanisms from the fits of each of them alone too.
+/// A set fitted from its parent's fit, and where it has several mechanisms from the fits of each of them alone too, unless it is known
+/// where the new one begins beside the others.
 fn fitted(
     problem: &Problem<'_>,
     rule: &NoiseRule,
@@ -111,7 +132,7 @@ fn fitted(
     let parent = &all[*parent];
     let guesses = start.clone().map_or_else(|| guesses(problem, parent, set), |start| vec![start]);
     let found = candidate(problem, rule, set, &[], &parent.fit, &guesses).ok();
-    if set.len() == 1 {
+    if set.len() == 1 || start.is_some() {
         return found;
     }
     let other = candidate(problem, rule, set, &[], &parent.fit, &[hints(problem, all, set)]).ok();

@@ -1,0 +1,596 @@
+//! Motion with dry friction and ceilings, integrated from event to event.
+//!
+//! Between events the motion is smooth, and a Runge-Kutta scheme of high order follows it ([`Method`]). An event (a joint comes to rest, a
+//! force overcomes what holds it, a level reaches its ceiling, a law changes its form) is found to rounding, and the next step begins
+//! there: no smoothed sign function, no width that decides the answer (Filippov 1988, doi:10.1007/978-94-015-7793-9).
+//!
+//! Times are real. In dual numbers the time of an event has an infinitesimal part: the motion is led there by the rates before it and
+//! back by those behind it, so that its derivatives are exact across the event (the saltation matrix; Leine and Nijmeijer 2004,
+//! doi:10.1007/978-3-540-44398-8).
+
+mod scheme;
+
+use crate::Number;
+pub use scheme::Method;
+use scheme::Scheme;
+
+/// A joint that dry friction may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Contact {
+    /// Index of the state that is its velocity.
+    pub velocity: usize,
+}
+
+/// A state that cannot exceed a value; what comes beyond it is lost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ceiling<T> {
+    /// Index of the state.
+    pub state: usize,
+    /// Its largest value.
+    pub height: T,
+}
+
+/// A value of a state where a law changes its form, continuously.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge<T> {
+    /// Index of the state.
+    pub state: usize,
+    /// The value.
+    pub at: T,
+}
+
+/// The equations of motion of a machine.
+pub trait Machine<T: Number> {
+    /// Joints with dry friction.
+    fn contacts(&self) -> &[Contact];
+
+    /// States with a ceiling.
+    fn ceilings(&self) -> &[Ceiling<T>];
+
+    /// Where laws change their form: a step ends there.
+    fn edges(&self) -> &[Edge<T>] {
+        &[]
+    }
+
+    /// The motion is now beyond an edge, or before it; the laws keep the form of that side until the next call.
+    fn cross(&mut self, _edge: usize, _beyond: bool) {}
+
+    /// The states' derivatives without dry friction.
+    fn smooth(&mut self, t: f64, x: &[T], rates: &mut [T]);
+
+    /// By how much a unit of a contact's force changes each state's derivative; 1 for its own velocity.
+    fn direction(&mut self, contact: usize, t: f64, x: &[T], direction: &mut [T]);
+
+    /// The friction that opposes sliding forward or backward.
+    fn resistance(&mut self, contact: usize, forward: bool, t: f64, x: &[T]) -> T;
+}
+
+/// A motion that could not be followed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("state {state} is {value} at t = {t_s} s")]
+pub struct Diverged {
+    /// Index of the state that is no number, or beyond all bounds.
+    pub state: usize,
+    /// Its value.
+    pub value: f64,
+    /// When, s.
+    pub t_s: f64,
+}
+
+/// A time at which the motion is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// When, s.
+    pub t_s: f64,
+    /// What for, in the caller's numbers.
+    pub row: usize,
+    /// Which of the caller's infinitesimal shifts in time it has.
+    pub shift: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    Forward,
+    Backward,
+    Rest,
+}
+
+/// What ends a smooth stretch.
+#[derive(Debug, Clone, Copy)]
+enum Event {
+    /// A sliding contact comes to rest.
+    Stops(usize),
+    /// A resting contact is overcome, forward or backward.
+    Slips(usize, bool),
+    /// A state reaches its ceiling.
+    Fills(usize),
+    /// A state leaves its ceiling.
+    Falls(usize),
+    /// A state passes an edge.
+    Crosses(usize),
+}
+
+/// Events in one step that are located; more are a chatter below the step's resolution.
+const MOST_EVENTS: usize = 40;
+/// A state beyond this has blown up.
+const LARGEST: f64 = 1e12;
+
+/// Follows a machine's motion; holds the room that this takes.
+#[derive(Debug, Clone)]
+pub struct Integrator<T> {
+    scheme: Scheme,
+    /// Largest step, s.
+    step_s: f64,
+    modes: Vec<Mode>,
+    full: Vec<bool>,
+    beyond: Vec<bool>,
+    /// Rates at each stage of the last trial step.
+    rates: Vec<Vec<T>>,
+    /// Whether the first of them are those at the present point.
+    fresh: bool,
+    stage: Vec<T>,
+    direction: Vec<T>,
+    trial: Vec<T>,
+    point: Vec<T>,
+    spare: Vec<T>,
+}
+
+impl<T: Number> Integrator<T> {
+    /// An integrator with steps of at most `step_s` for a machine of `states` states.
+    pub fn new(method: Method, states: usize, step_s: f64) -> Self {
+        let room = || vec![T::from(0.0); states];
+        let scheme = method.scheme();
+        Self {
+            scheme,
+            step_s,
+            modes: Vec::new(),
+            full: Vec::new(),
+            beyond: Vec::new(),
+            rates: scheme.nodes.iter().map(|_| room()).collect(),
+            fresh: false,
+            stage: room(),
+            direction: room(),
+            trial: room(),
+            point: room(),
+            spare: room(),
+        }
+    }
+
+    /// Finds out which joints rest, which levels are full and which edges are passed: at the beginning, and wherever an input jumps.
+    pub fn settle(&mut self, machine: &mut impl Machine<T>, t: f64, x: &mut [T]) {
+        self.fresh = false;
+        let (contacts, ceilings) = (machine.contacts().len(), machine.ceilings().len());
+        self.modes.resize(contacts, Mode::Rest);
+        self.full.resize(ceilings, false);
+        self.beyond.resize(machine.edges().len(), false);
+        for e in 0..self.beyond.len() {
+            let Edge { state, at } = machine.edges()[e];
+            let mut beyond = x[state].re() > at.re();
+            if x[state].re() == at.re() {
+                let rate = self.smooth_rate(machine, t, x, state).re();
+                beyond = rate > 0.0;
+            }
+            self.beyond[e] = beyond;
+            machine.cross(e, beyond);
+        }
+        for c in 0..ceilings {
+            let Ceiling { state, height } = machine.ceilings()[c];
+            self.full[c] = x[state].re() >= height.re();
+            if self.full[c] {
+                x[state] = height;
+                self.full[c] = self.smooth_rate(machine, t, x, state).re() > 0.0;
+            }
+        }
+        for c in 0..contacts {
+            let v = x[machine.contacts()[c].velocity].re();
+            self.modes[c] = if v > 0.0 {
+                Mode::Forward
+            } else if v < 0.0 {
+                Mode::Backward
+            } else {
+                self.at_rest(machine, c, t, x)
+            };
+        }
+    }
+
+    /// Moves the states by an infinitesimal time.
+    pub fn nudge(&mut self, machine: &mut impl Machine<T>, t: f64, x: &mut [T], by: T) {
+        if by == T::from(0.0) {
+            return;
+        }
+        let mut rates = std::mem::take(&mut self.spare);
+        self.derivative(machine, t, x, &mut rates);
+        x.iter_mut().zip(&rates).for_each(|(x, r)| *x += *r * by);
+        self.spare = rates;
+        self.fresh = false;
+    }
+
+    /// The states along the tangent of the motion, a time away.
+    pub fn along_tangent(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], away: T) -> &[T] {
+        let mut rates = std::mem::take(&mut self.spare);
+        self.derivative(machine, t, x, &mut rates);
+        self.point.clear();
+        self.point.extend(x.iter().zip(&rates).map(|(x, r)| *x + *r * away));
+        self.spare = rates;
+        &self.point
+    }
+
+    fn smooth_rate(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], state: usize) -> T {
+        machine.smooth(t, x, &mut self.spare);
+        self.spare[state]
+    }
+
+    /// What a contact does whose velocity is zero.
+    fn at_rest(&mut self, machine: &mut impl Machine<T>, c: usize, t: f64, x: &[T]) -> Mode {
+        self.modes[c] = Mode::Rest;
+        let force = -self.holding(machine, c, t, x).re();
+        if force > machine.resistance(c, true, t, x).re() {
+            Mode::Forward
+        } else if force < -machine.resistance(c, false, t, x).re() {
+            Mode::Backward
+        } else {
+            Mode::Rest
+        }
+    }
+
+    /// The force that keeps a resting contact where it is.
+    fn holding(&mut self, machine: &mut impl Machine<T>, c: usize, t: f64, x: &[T]) -> T {
+        let at = machine.contacts()[c].velocity;
+        let mut rates = std::mem::take(&mut self.spare);
+        machine.smooth(t, x, &mut rates);
+        for other in (0..self.modes.len()).filter(|o| *o != c) {
+            if self.modes[other] != Mode::Rest {
+                self.slide(machine, other, t, x, &mut rates);
+            }
+        }
+        let force = -rates[at];
+        self.spare = rates;
+        force
+    }
+
+    /// Adds the friction of a sliding contact.
+    fn slide(&mut self, machine: &mut impl Machine<T>, c: usize, t: f64, x: &[T], rates: &mut [T]) {
+        let forward = self.modes[c] == Mode::Forward;
+        let friction = machine.resistance(c, forward, t, x);
+        self.push(machine, c, if forward { -friction } else { friction }, (t, x), rates);
+    }
+
+    /// Adds a force of a contact.
+    fn push(
+        &mut self,
+        machine: &mut impl Machine<T>,
+        c: usize,
+        force: T,
+        (t, x): (f64, &[T]),
+        rates: &mut [T],
+    ) {
+        machine.direction(c, t, x, &mut self.direction);
+        rates.iter_mut().zip(&self.direction).for_each(|(rate, d)| *rate += *d * force);
+    }
+
+    /// The states' derivatives, friction and ceilings included.
+    fn derivative(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], rates: &mut [T]) {
+        machine.smooth(t, x, rates);
+        for c in 0..self.modes.len() {
+            if self.modes[c] != Mode::Rest {
+                self.slide(machine, c, t, x, rates);
+            }
+        }
+        let resting = self.modes.iter().filter(|m| **m == Mode::Rest).count();
+        // Forces that hold one contact may load another: a few sweeps settle them.
+        for _ in 0..if resting > 1 { 20 } else { resting } {
+            for c in 0..self.modes.len() {
+                if self.modes[c] == Mode::Rest {
+                    let force = -rates[machine.contacts()[c].velocity];
+                    self.push(machine, c, force, (t, x), rates);
+                }
+            }
+        }
+        for (c, mode) in self.modes.iter().enumerate() {
+            if *mode == Mode::Rest {
+                rates[machine.contacts()[c].velocity] = T::from(0.0);
+            }
+        }
+        for (c, full) in self.full.iter().enumerate() {
+            if *full {
+                rates[machine.ceilings()[c].state] = T::from(0.0);
+            }
+        }
+    }
+
+    /// One step, whatever happens in it, into `trial`.
+    fn step(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], h: f64) {
+        let mut rates = std::mem::take(&mut self.rates);
+        let mut stage = std::mem::take(&mut self.stage);
+        if !self.fresh {
+            self.derivative(machine, t, x, &mut rates[0]);
+            self.fresh = true;
+        }
+        for (k, row) in self.scheme.stages.iter().enumerate() {
+            stage.copy_from_slice(x);
+            let (before, at) = rates.split_at_mut(k + 1);
+            for (rates, part) in before.iter().zip(*row).filter(|(_, part)| **part != 0.0) {
+                stage.iter_mut().zip(rates).for_each(|(s, r)| s.add_scaled(*r, part * h));
+            }
+            self.derivative(machine, t + self.scheme.nodes[k + 1] * h, &stage, &mut at[0]);
+        }
+        self.rates = rates;
+        self.stage = stage;
+        if self.scheme.last_is_end {
+            self.trial.copy_from_slice(&self.stage);
+        } else {
+            let mut trial = std::mem::take(&mut self.trial);
+            self.within(x, h, 1.0, &mut trial);
+            self.trial = trial;
+        }
+    }
+
+    /// The states a part of the way through the trial step.
+    fn within(&self, x: &[T], h: f64, part: f64, into: &mut [T]) {
+        into.copy_from_slice(x);
+        for (w, rates) in self.scheme.weights.iter().zip(&self.rates) {
+            let weight = h * part * (w[0] + part * (w[1] + part * (w[2] + part * w[3])));
+            if weight != 0.0 {
+                into.iter_mut().zip(rates).for_each(|(s, r)| s.add_scaled(*r, weight));
+            }
+        }
+    }
+
+    /// The same, moved on by an infinitesimal time.
+    fn within_moved(&self, x: &[T], h: f64, part: f64, by: T, into: &mut [T]) {
+        self.within(x, h, part, into);
+        if by != T::from(0.0) {
+            for (w, rates) in self.scheme.weights.iter().zip(&self.rates) {
+                let slope = w[0] + part * (2.0 * w[1] + part * (3.0 * w[2] + part * 4.0 * w[3]));
+                into.iter_mut().zip(rates).for_each(|(s, r)| *s += *r * by * slope);
+            }
+        }
+    }
+
+    /// What an event's sign says at a point: above 0 before it, below 0 after.
+    fn sign(&mut self, machine: &mut impl Machine<T>, event: Event, t: f64, x: &[T]) -> T {
+        match event {
+            Event::Stops(c) => {
+                let v = x[machine.contacts()[c].velocity];
+                if self.modes[c] == Mode::Forward { v } else { -v }
+            }
+            Event::Slips(c, forward) => {
+                let held = self.holding(machine, c, t, x);
+                let most = machine.resistance(c, forward, t, x);
+                if forward { most + held } else { most - held }
+            }
+            Event::Fills(c) => {
+                let Ceiling { state, height } = machine.ceilings()[c];
+                height - x[state]
+            }
+            Event::Falls(c) => {
+                let state = machine.ceilings()[c].state;
+                self.smooth_rate(machine, t, x, state)
+            }
+            Event::Crosses(e) => {
+                let Edge { state, at } = machine.edges()[e];
+                if self.beyond[e] { x[state] - at } else { at - x[state] }
+            }
+        }
+    }
+
+    /// The `k`-th of the events that may end a step.
+    fn possible(&self, k: usize) -> Option<Event> {
+        let (contacts, ceilings) = (self.modes.len(), self.full.len());
+        if k < 2 * contacts {
+            let (c, forward) = (k / 2, k.is_multiple_of(2));
+            return match self.modes[c] {
+                Mode::Rest => Some(Event::Slips(c, forward)),
+                _ => forward.then_some(Event::Stops(c)),
+            };
+        }
+        let c = k - 2 * contacts;
+        if c < ceilings {
+            return Some(if self.full[c] { Event::Falls(c) } else { Event::Fills(c) });
+        }
+        Some(Event::Crosses(c - ceilings))
+    }
+
+    /// Moves the states from `*t` to `to`, between which inputs must not jump, and reads them on the way.
+    ///
+    /// `reads` rise in time and lie between the two; each has one of the infinitesimal `shifts`. `read` gets the machine, the reading and
+    /// the states.
+    ///
+    /// # Errors
+    /// [`Diverged`].
+    #[allow(clippy::too_many_arguments, reason = "from, to, and what is read on the way")]
+    pub fn advance<M: Machine<T>>(
+        &mut self,
+        machine: &mut M,
+        t: &mut f64,
+        x: &mut [T],
+        to: f64,
+        reads: &[Reading],
+        shifts: &[T],
+        mut read: impl FnMut(&mut M, &Reading, &[T]),
+    ) -> Result<(), Diverged> {
+        let mut reads = reads.iter().peekable();
+        let shift = |r: &Reading| shifts.get(r.shift).copied().unwrap_or(T::from(0.0));
+        let steps = ((to - *t) / self.step_s - 1e-9).ceil().max(1.0);
+        let from = *t;
+        for k in 1..=steps as u64 {
+            let until = if k as f64 >= steps { to } else { from + (to - from) * (k as f64 / steps) };
+            let mut events = 0;
+            while *t < until {
+                let h = until - *t;
+                self.step(machine, *t, x, h);
+                check(&self.trial, until)?;
+                let first = if events < MOST_EVENTS { self.first(machine, *t, x, h) } else { None };
+                let end = first.map_or(until, |(_, part)| *t + part * h);
+                while let Some(r) = reads.next_if(|r| r.t_s <= end) {
+                    let mut point = std::mem::take(&mut self.point);
+                    self.within_moved(x, h, (r.t_s - *t) / h, shift(r), &mut point);
+                    read(machine, r, &point);
+                    self.point = point;
+                }
+                if let Some((event, part)) = first {
+                    events += 1;
+                    self.step(machine, *t, x, part * h);
+                    x.copy_from_slice(&self.trial);
+                    *t = end + self.happen(machine, event, end, x, h);
+                    self.fresh = false;
+                } else {
+                    x.copy_from_slice(&self.trial);
+                    *t = until;
+                    self.fresh = self.scheme.last_is_end;
+                    if self.fresh {
+                        let last = self.rates.len() - 1;
+                        self.rates.swap(0, last);
+                    }
+                }
+            }
+        }
+        for r in reads {
+            let by = shift(r);
+            let mut point = std::mem::take(&mut self.point);
+            point.copy_from_slice(x);
+            self.nudge(machine, *t, &mut point, by);
+            read(machine, r, &point);
+            self.point = point;
+        }
+        Ok(())
+    }
+
+    /// The first event within the trial step, and in which part of it.
+    fn first(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], h: f64) -> Option<(Event, f64)> {
+        let mut first: Option<(Event, f64)> = None;
+        for k in 0..2 * self.modes.len() + self.full.len() + self.beyond.len() {
+            let Some(event) = self.possible(k) else { continue };
+            let trial = std::mem::take(&mut self.trial);
+            let end = self.sign(machine, event, t + h, &trial).re();
+            self.trial = trial;
+            if end < 0.0 {
+                let at = self.root(machine, event, (t, x, h), end);
+                if first.is_none_or(|(_, before)| at < before) {
+                    first = Some((event, at));
+                }
+            }
+        }
+        first
+    }
+
+    /// In which part of the trial step the sign of an event vanishes that is below zero at its end (the Illinois method).
+    fn root(
+        &mut self,
+        machine: &mut impl Machine<T>,
+        event: Event,
+        (t, x, h): (f64, &[T], f64),
+        end: f64,
+    ) -> f64 {
+        let mut point = std::mem::take(&mut self.point);
+        let mut at = |this: &mut Self, part: f64| {
+            this.within(x, h, part, &mut point);
+            this.sign(machine, event, t + part * h, &point).re()
+        };
+        let (mut a, mut b, mut fb) = (0.0, 1.0, end);
+        let mut fa = at(self, a);
+        if fa <= 0.0 {
+            // A joint that has just begun to slip has no velocity yet, but will have in a moment.
+            a = 1e-3;
+            fa = at(self, a);
+        }
+        let mut found = if fa <= 0.0 { Some(0.0) } else { None };
+        let mut side = 0;
+        for _ in 0..60 {
+            if found.is_some() || b - a <= 1e-12 {
+                break;
+            }
+            let mid = (a * fb - b * fa) / (fb - fa);
+            let f = at(self, mid);
+            if f.abs() < 1e-13 * end.abs() {
+                found = Some(mid);
+            } else if f < 0.0 {
+                (b, fb) = (mid, f);
+                if side == -1 {
+                    fa *= 0.5;
+                }
+                side = -1;
+            } else {
+                (a, fa) = (mid, f);
+                if side == 1 {
+                    fb *= 0.5;
+                }
+                side = 1;
+            }
+        }
+        self.point = point;
+        found.unwrap_or(b)
+    }
+
+    /// Lets an event happen near `t`; how much later it was.
+    fn happen(&mut self, machine: &mut impl Machine<T>, event: Event, t: f64, x: &mut [T], h: f64) -> f64 {
+        let zero = T::from(0.0);
+        let miss = self.sign(machine, event, t, x);
+        let slope = self.slope(machine, event, t, x, h);
+        let mut late = if slope != 0.0 && slope.is_finite() { -miss / slope } else { zero };
+        if !(late.re().abs() <= 1e-3 * h) {
+            late = late.infinitesimal();
+        }
+        self.nudge(machine, t, x, late);
+        match event {
+            Event::Stops(c) => {
+                x[machine.contacts()[c].velocity] = zero;
+                self.modes[c] = self.at_rest(machine, c, t, x);
+            }
+            Event::Slips(c, forward) => self.modes[c] = if forward { Mode::Forward } else { Mode::Backward },
+            Event::Fills(c) => {
+                let Ceiling { state, height } = machine.ceilings()[c];
+                x[state] = height;
+                self.full[c] = true;
+            }
+            Event::Falls(c) => self.full[c] = false,
+            Event::Crosses(e) => {
+                self.beyond[e] = !self.beyond[e];
+                machine.cross(e, self.beyond[e]);
+            }
+        }
+        self.nudge(machine, t, x, -late.infinitesimal());
+        late.re()
+    }
+
+    /// How fast the sign of an event changes.
+    fn slope(&mut self, machine: &mut impl Machine<T>, event: Event, t: f64, x: &[T], h: f64) -> f64 {
+        let mut rates = std::mem::take(&mut self.stage);
+        self.derivative(machine, t, x, &mut rates);
+        let slope = match event {
+            Event::Stops(c) => {
+                let rate = rates[machine.contacts()[c].velocity].re();
+                if self.modes[c] == Mode::Forward { rate } else { -rate }
+            }
+            Event::Fills(c) => -rates[machine.ceilings()[c].state].re(),
+            Event::Crosses(e) => {
+                let rate = rates[machine.edges()[e].state].re();
+                if self.beyond[e] { rate } else { -rate }
+            }
+            Event::Slips(..) | Event::Falls(_) => {
+                let d = (1e-4 * h).max(1e-10);
+                let mut moved = std::mem::take(&mut self.point);
+                let mut at = |this: &mut Self, d: f64| {
+                    moved.copy_from_slice(x);
+                    moved.iter_mut().zip(&rates).for_each(|(m, r)| m.add_scaled(*r, d));
+                    this.sign(machine, event, t + d, &moved).re()
+                };
+                let slope = (at(self, d) - at(self, -d)) / (2.0 * d);
+                self.point = moved;
+                slope
+            }
+        };
+        self.stage = rates;
+        slope
+    }
+}
+
+fn check<T: Number>(x: &[T], t_s: f64) -> Result<(), Diverged> {
+    match x.iter().position(|v| !(v.re().abs() <= LARGEST)) {
+        Some(state) => Err(Diverged { state, value: x[state].re(), t_s }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

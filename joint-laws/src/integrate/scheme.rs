@@ -1,0 +1,112 @@
+//! Runge-Kutta schemes with their interpolants.
+
+/// How a smooth stretch of the motion is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Runge and Kutta's of the fourth order with its interpolant of the third: four evaluations a step, for steps that inputs keep short.
+    Kutta,
+    /// Dormand and Prince's of the fifth order with their interpolant of the fourth, the last evaluation of a step the first of the next
+    /// (Hairer, Norsett and Wanner 1993, Solving Ordinary Differential Equations I, section II.6): six evaluations, for long steps.
+    DormandPrince,
+}
+
+/// The numbers of a method.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scheme {
+    /// Where in the step each stage is evaluated.
+    pub(super) nodes: &'static [f64],
+    /// What each stage after the first takes of the rates before it.
+    pub(super) stages: &'static [&'static [f64]],
+    /// Each stage's weight in the state at a part of the step: coefficients of its powers from the first.
+    pub(super) weights: &'static [[f64; 4]],
+    /// Whether the last stage stands at the end of the step.
+    pub(super) last_is_end: bool,
+}
+
+impl Method {
+    pub(super) fn scheme(self) -> Scheme {
+        match self {
+            Self::Kutta => Scheme {
+                nodes: &[0.0, 0.5, 0.5, 1.0],
+                stages: &[&[0.5], &[0.0, 0.5], &[0.0, 0.0, 1.0]],
+                weights: &[
+                    [1.0, -1.5, 2.0 / 3.0, 0.0],
+                    [0.0, 1.0, -2.0 / 3.0, 0.0],
+                    [0.0, 1.0, -2.0 / 3.0, 0.0],
+                    [0.0, -0.5, 2.0 / 3.0, 0.0],
+                ],
+                last_is_end: false,
+            },
+            Self::DormandPrince => Scheme {
+                nodes: &[0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0],
+                stages: &[
+                    &[0.2],
+                    &[3.0 / 40.0, 9.0 / 40.0],
+                    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
+                    &[19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0],
+                    &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
+                    &[END[0], END[1], END[2], END[3], END[4], END[5]],
+                ],
+                weights: &WEIGHTS,
+                last_is_end: true,
+            },
+        }
+    }
+}
+
+/// Dormand and Prince's weights at the end of a step.
+const END: [f64; 7] = [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0, 0.0];
+/// What their interpolant has beyond Hermite's.
+const BEYOND: [f64; 7] = [
+    -12715105075.0 / 11282082432.0,
+    0.0,
+    87487479700.0 / 32700410799.0,
+    -10690763975.0 / 1880347072.0,
+    701980252875.0 / 199316789632.0,
+    -1453857185.0 / 822651844.0,
+    69997945.0 / 29380423.0,
+];
+const WEIGHTS: [[f64; 4]; 7] = {
+    let mut weights = [[0.0; 4]; 7];
+    let mut i = 0;
+    while i < 7 {
+        let first = if i == 0 { 1.0 } else { 0.0 };
+        let last = if i == 6 { 1.0 } else { 0.0 };
+        let (a, b, d) = (first - END[i], 2.0 * END[i] - last - first, BEYOND[i]);
+        weights[i] = [first, b - a + d, -b - 2.0 * d, d];
+        i += 1;
+    }
+    weights
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest error of dx/dt = x cos(t) over one step of a length, at its end and within it.
+    fn errors(method: Method, h: f64) -> [f64; 2] {
+        let scheme = method.scheme();
+        let rate = |t: f64, x: f64| x * t.cos();
+        let mut rates = vec![rate(0.0, 1.0)];
+        for (k, row) in scheme.stages.iter().enumerate() {
+            let x = 1.0 + h * row.iter().zip(&rates).map(|(a, r)| a * r).sum::<f64>();
+            rates.push(rate(h * scheme.nodes[k + 1], x));
+        }
+        let error = |part: f64| {
+            let weight = |w: &[f64; 4]| part * (w[0] + part * (w[1] + part * (w[2] + part * w[3])));
+            let x = 1.0 + h * scheme.weights.iter().zip(&rates).map(|(w, r)| weight(w) * r).sum::<f64>();
+            (x - (part * h).sin().exp()).abs()
+        };
+        [error(1.0), (1..20).map(|k| error(f64::from(k) / 20.0)).fold(0.0, f64::max)]
+    }
+
+    /// Halving the step divides a step's error by two to the power of the order and one more.
+    #[test]
+    fn errors_fall_as_the_orders_say() {
+        for (method, at_end, within) in [(Method::Kutta, 5.0, 4.0), (Method::DormandPrince, 6.0, 5.0)] {
+            let (coarse, fine) = (errors(method, 0.2), errors(method, 0.1));
+            assert!((coarse[0] / fine[0]).log2() > at_end - 0.4, "{method:?}: {coarse:?}, {fine:?}");
+            assert!((coarse[1] / fine[1]).log2() > within - 0.4, "{method:?}: {coarse:?}, {fine:?}");
+        }
+    }
+}

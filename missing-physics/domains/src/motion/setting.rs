@@ -1,0 +1,187 @@
+//! What the parameters of the full model make of a machine.
+
+use joint_laws::Number;
+use joint_laws::friction::DryFriction;
+use joint_laws::integrate::{Ceiling, Edge};
+use joint_laws::sensor::Sensor;
+use joint_laws::signal::Drive;
+
+use super::effects::{OfInput, OfJoint, OfOutput, Role};
+use super::equations::Equations;
+use super::machine::{Force, JointLaws};
+
+/// All that parameters decide.
+pub(super) struct Setting<T> {
+    /// States, inputs, parameters and time, as expressions name them: the parameters are filled in.
+    pub(super) values: Vec<T>,
+    pub(super) laws: Vec<JointLaws<T>>,
+    pub(super) leaks: Vec<Option<T>>,
+    pub(super) ceilings: Vec<Ceiling<T>>,
+    pub(super) edges: Vec<Edge<T>>,
+    /// What acts on each input, and whether its jumps are moved in time.
+    pub(super) drives: Vec<(Drive<T>, bool)>,
+    pub(super) sensors: Vec<Sensor<T>>,
+    /// Delays of outputs.
+    pub(super) delays: Vec<Option<T>>,
+    pub(super) pace: Option<T>,
+    /// States beside the equations': deflections of springs that yield.
+    pub(super) further_states: usize,
+    /// The shortest time in which the laws change, s.
+    pub(super) shortest_s: f64,
+}
+
+/// The shared parameters, what they are, which of them are on, and what else is known of the joints.
+pub(super) struct Shared<'a, T> {
+    pub(super) equations: &'a Equations,
+    pub(super) roles: &'a [Role],
+    pub(super) values: &'a [T],
+    pub(super) on: &'a dyn Fn(usize) -> bool,
+    /// The number of the run, where runs are cut into windows.
+    pub(super) run: usize,
+    /// Middle of each joint's range: a stop stands on the side where its position is.
+    pub(super) middles: &'a [f64],
+    /// Typical speed of each joint.
+    pub(super) speeds: &'a [f64],
+}
+
+impl<T: Number> Shared<'_, T> {
+    /// The value of a parameter of a joint.
+    fn of_joint(&self, joint: usize, what: OfJoint) -> T {
+        let at = self.roles.iter().position(|r| *r == Role::Joint(joint, what));
+        at.map_or(T::from(0.0), |slot| self.values[slot])
+    }
+
+    /// What they make of the machine; `values` are those of the names that the recording's own parameters do not give.
+    pub(super) fn setting(&self, values: Vec<T>) -> Setting<T> {
+        let equations = self.equations;
+        let zero = T::from(0.0);
+        let mut setting = Setting {
+            values,
+            laws: vec![JointLaws::none(); equations.joints.len()],
+            leaks: vec![None; equations.levels.len()],
+            ceilings: Vec::new(),
+            edges: Vec::new(),
+            drives: vec![(Drive::perfect(), false); equations.inputs.len()],
+            sensors: vec![Sensor::perfect(); equations.outputs.len()],
+            delays: vec![None; equations.outputs.len()],
+            pace: None,
+            further_states: 0,
+            shortest_s: f64::INFINITY,
+        };
+        for (slot, role) in self.roles.iter().enumerate() {
+            let value = self.values[slot];
+            match *role {
+                Role::Stated(k) => setting.values[equations.parameter_name(k)] = value,
+                Role::OfRun(k, run) => {
+                    if run == self.run {
+                        setting.values[equations.parameter_name(k)] = value;
+                    }
+                }
+                _ if !(self.on)(slot) => {}
+                Role::Joint(joint, OfJoint::Gap) => {
+                    if let Some(drive) = equations.joints[joint].drive {
+                        setting.drives[drive].0.play = Some((value, zero));
+                    }
+                }
+                Role::Joint(joint, what) => self.joint(&mut setting, joint, what, value),
+                Role::Input(input, what) => setting.input(input, what, value),
+                Role::Output(output, what) => setting.output(output, what, value),
+                Role::Overflow(level) => {
+                    setting.ceilings.push(Ceiling { state: equations.levels[level], height: value });
+                }
+                Role::Leak(level) => setting.leaks[level] = Some(value),
+                Role::Clock => setting.pace = Some((value + 1.0).recip()),
+            }
+        }
+        setting
+    }
+
+    fn joint(&self, setting: &mut Setting<T>, joint: usize, what: OfJoint, value: T) {
+        let states = &self.equations.joints[joint];
+        let laws = &mut setting.laws[joint];
+        let without = DryFriction::none(self.of_joint(joint, OfJoint::StribeckSpeed));
+        let dry = &mut laws.dry;
+        match what {
+            OfJoint::Coulomb => dry.get_or_insert(without).level = value,
+            OfJoint::Asymmetry => dry.get_or_insert(without).forward_less_backward = value,
+            OfJoint::StribeckLevel => dry.get_or_insert(without).stribeck_level = value,
+            OfJoint::LoadFraction => dry.get_or_insert(without).load_fraction = value,
+            OfJoint::Damping(power) => laws.forces.push(Force::Damping(power, value)),
+            OfJoint::Stiffness(power) => laws.forces.push(Force::Stiffness(power, value)),
+            OfJoint::Constant => laws.forces.push(Force::Constant(value)),
+            OfJoint::CogAmplitude => {
+                let phase = self.of_joint(joint, OfJoint::CogPhase);
+                let periods = self.of_joint(joint, OfJoint::CogPeriods);
+                laws.forces.push(Force::Cogging([value, phase, periods]));
+                setting.no_slower_than((periods.re() * self.speeds[joint]).recip());
+            }
+            OfJoint::StopStiffness => {
+                let at = self.of_joint(joint, OfJoint::StopPosition);
+                let above = at.re() > self.middles[joint];
+                laws.forces.push(Force::Stop(at, value, above, setting.edges.len()));
+                setting.edges.push(Edge { state: states.position, at });
+                setting.no_slower_than(value.re().max(0.0).sqrt().recip());
+            }
+            OfJoint::Inertia => laws.inertia = Some(value),
+            OfJoint::YieldStiffness => {
+                let yields = self.of_joint(joint, OfJoint::Yield);
+                let state = self.equations.states.len() + setting.further_states;
+                setting.further_states += 1;
+                let edge = setting.edges.len();
+                laws.forces.push(Force::Yielding(value, yields, state, [edge, edge + 1]));
+                setting.edges.push(Edge { state: states.velocity, at: T::from(0.0) });
+                setting.edges.push(Edge { state, at: T::from(0.0) });
+                setting.no_slower_than(value.re().max(0.0).sqrt().recip());
+                setting.no_slower_than(yields.re() / self.speeds[joint]);
+            }
+            // They shape what others switch on; a gap is the drive's.
+            OfJoint::StribeckSpeed
+            | OfJoint::CogPhase
+            | OfJoint::CogPeriods
+            | OfJoint::StopPosition
+            | OfJoint::Yield
+            | OfJoint::Gap => {}
+        }
+    }
+}
+
+impl<T: Number> Setting<T> {
+    fn no_slower_than(&mut self, time_s: f64) {
+        if time_s > 0.0 {
+            self.shortest_s = self.shortest_s.min(time_s);
+        }
+    }
+
+    fn input(&mut self, input: usize, what: OfInput, value: T) {
+        let (drive, delayed) = &mut self.drives[input];
+        match what {
+            OfInput::Gain => drive.gain = value,
+            OfInput::Offset => drive.offset = value,
+            OfInput::Delay => {
+                drive.delay_s = value;
+                *delayed = true;
+            }
+            OfInput::Lag => {
+                drive.lag_s = Some(value);
+                *delayed = true;
+                self.no_slower_than(value.re());
+            }
+            OfInput::Upper => drive.upper = value,
+            OfInput::Lower => drive.lower = value,
+            OfInput::DeadZone => drive.dead_zone = value,
+        }
+    }
+
+    fn output(&mut self, output: usize, what: OfOutput, value: T) {
+        let sensor = &mut self.sensors[output];
+        match what {
+            OfOutput::Gain => sensor.gain = value,
+            OfOutput::Offset => sensor.offset = value,
+            OfOutput::Drift => sensor.drift_per_s = value,
+            OfOutput::Delay => self.delays[output] = Some(value),
+            OfOutput::Lag => sensor.lag_s = Some(value),
+            OfOutput::Upper => sensor.upper = value,
+            OfOutput::Lower => sensor.lower = value,
+        }
+    }
+}
