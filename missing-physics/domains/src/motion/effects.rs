@@ -467,22 +467,7 @@ impl<'a> Effects<'a> {
         let offset = self.add(role(OfInput::Offset), "offset", &unit, 0.0, UNBOUNDED, 0.1 * span);
         let delay = self.add(role(OfInput::Delay), "delay_s", "s", 0.0, [0.0, longest], self.scales.step_s);
         let lag = self.add(role(OfInput::Lag), "tau_s", "s", 0.0, [0.0, longest], self.scales.step_s);
-        let upper = self.add(
-            role(OfInput::Upper),
-            "upper",
-            &unit,
-            high + 0.1 * span,
-            [low, high + 0.2 * span],
-            0.1 * span,
-        );
-        let lower = self.add(
-            role(OfInput::Lower),
-            "lower",
-            &unit,
-            low - 0.1 * span,
-            [low - 0.2 * span, high],
-            0.1 * span,
-        );
+        let [upper, lower] = self.bounds([role(OfInput::Upper), role(OfInput::Lower)], &unit, s.range);
         let most = low.abs().max(high.abs());
         let zone = self.add(role(OfInput::DeadZone), "width", &unit, 0.0, [0.0, most], 0.05 * most);
         let of = several.then_some(name.as_str());
@@ -569,22 +554,7 @@ impl<'a> Effects<'a> {
         );
         let delay = self.add(role(OfOutput::Delay), "delay_s", "s", 0.0, [0.0, longest], self.scales.step_s);
         let lag = self.add(role(OfOutput::Lag), "tau_s", "s", 0.0, [0.0, longest], self.scales.step_s);
-        let upper = self.add(
-            role(OfOutput::Upper),
-            "upper",
-            &unit,
-            high + 0.1 * span,
-            [low, high + 0.2 * span],
-            0.1 * span,
-        );
-        let lower = self.add(
-            role(OfOutput::Lower),
-            "lower",
-            &unit,
-            low - 0.1 * span,
-            [low - 0.2 * span, high],
-            0.1 * span,
-        );
+        let [upper, lower] = self.bounds([role(OfOutput::Upper), role(OfOutput::Lower)], &unit, s.range);
         let of = several.then_some(name.as_str());
         self.mechanism(
             "sensor-gain",
@@ -643,6 +613,13 @@ impl<'a> Effects<'a> {
             ],
             &["end-stop"],
         );
+    }
+
+    /// An upper and a lower bound of what comes between two values: open a tenth beyond them.
+    fn bounds(&mut self, [above, below]: [Role; 2], unit: &str, [low, high]: [f64; 2]) -> [ParameterRef; 2] {
+        let tenth = 0.1 * (high - low);
+        let upper = self.add(above, "upper", unit, high + tenth, [low, high + 2.0 * tenth], tenth);
+        [upper, self.add(below, "lower", unit, low - tenth, [low - 2.0 * tenth, high], tenth)]
     }
 
     fn level(&mut self, level: usize) {
