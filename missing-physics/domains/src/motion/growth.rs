@@ -23,21 +23,15 @@ pub(super) fn too_long(
     let windows = cut(recording, length).runs;
     let every = windows.len().div_ceil(LOOKED_AT).max(1);
     let mut grown: Vec<f64> =
-        windows.iter().step_by(every).filter_map(|w| growth(free, recording, w, shared, sizes)).collect();
+        windows.iter().step_by(every).map(|w| growth(free, recording, w, shared, sizes)).collect();
     grown.sort_by(f64::total_cmp);
     // One window among many may begin at a wrong guess.
     grown.get(grown.len() * 3 / 4).is_some_and(|g| !(*g < MOST_GROWTH))
 }
 
 /// The largest deviation of an output in a window, in parts of its spread, that a deviation of a state at the start brings, in parts of
-/// that state's size.
-fn growth(
-    free: &MotionModel,
-    recording: &Recording,
-    window: &Run,
-    shared: &[f64],
-    sizes: &[f64],
-) -> Option<f64> {
+/// that state's size; infinite where the motion cannot be followed to the window's end.
+fn growth(free: &MotionModel, recording: &Recording, window: &Run, shared: &[f64], sizes: &[f64]) -> f64 {
     let parameters = &free.spec().parameters;
     let mut nuisance: Vec<f64> =
         parameters.iter().filter(|p| p.scope == Scope::PerRun).map(|p| p.start).collect();
@@ -47,7 +41,9 @@ fn growth(
     let n = window.len();
     let channels = recording.channels.len();
     let (mut out, mut jacobian) = (vec![0.0; n * channels], vec![0.0; n * channels * states.len()]);
-    free.jacobian(window, shared, &nuisance, &[], &states, &mut out, &mut jacobian).ok()?;
+    if free.jacobian(window, shared, &nuisance, &[], &states, &mut out, &mut jacobian).is_err() {
+        return f64::INFINITY;
+    }
     let mut most = 0.0_f64;
     for c in 0..channels {
         let spread = deviation(recording.runs.iter().flat_map(|r| &r.outputs[c]).copied());
@@ -57,7 +53,7 @@ fn growth(
             most = most.max(steepest * size / spread);
         }
     }
-    Some(most)
+    most
 }
 
 /// Standard deviation of the finite values.

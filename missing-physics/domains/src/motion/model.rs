@@ -140,6 +140,11 @@ impl MotionModel {
         values
     }
 
+    /// The states at a run's first row.
+    pub(super) fn begins(&self, run: &Run, nuisance: &[f64]) -> Vec<f64> {
+        self.start(run, nuisance, self.equations.states.len())
+    }
+
     /// States and derivatives at each row of a run.
     pub(super) fn course(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Course, String> {
         let mut course = Course {
@@ -242,7 +247,7 @@ impl MotionModel {
         Ok(())
     }
 
-    /// The states at a run's first row.
+    /// The same in any numbers, with room for as many states.
     fn start<T: Number>(&self, run: &Run, nuisance: &[T], states: usize) -> Vec<T> {
         let zero = T::from(0.0);
         let mut x = vec![zero; states];

@@ -21,7 +21,7 @@ const FINEST: f64 = 256.0;
 const OFTEN: f64 = 3.0;
 /// Errors of the integration that are put up with, in sigmas of all rows together.
 const UNSEEN: f64 = 0.3;
-/// By how much one step a row has to fit better than the exact motion, as a sum of squares.
+/// By how much one step a row has to fit better than the exact motion, as a sum of squares in parts of what is left of a reading.
 const BETTER: f64 = 20.0;
 /// The least noise of a channel that is reckoned with, in parts of its range.
 const LEAST_SIGMA: f64 = 3e-5;
@@ -52,13 +52,21 @@ pub(super) fn tuned(equations: Equations, mut recording: Recording) -> Result<Tu
     let mut model = MotionModel::baseline(equations, first_pace(&recording));
     let starts: Vec<f64> = shared_starts(&model);
     resolve(&mut model, &recording, &starts)?;
-    let (fitted, followed) = windows(&model, &recording, starts)?;
-    resolve(&mut model, &recording, &fitted)?;
-    let (mut fitted, followed) = (fitted, followed);
-    if followed.is_none()
-        && let Some(better) = by_the_rows(&mut model, &recording, &fitted)
-    {
-        fitted = better;
+    let (mut fitted, followed) = windows(&model, &recording, starts)?;
+    if let Some(length) = followed {
+        let mut free = MotionModel::baseline(model.equations().free(), model.pace());
+        resolve(&mut free, &cut(&recording, length), &fitted)?;
+        model.set_pace(free.pace());
+    } else {
+        resolve(&mut model, &recording, &fitted)?;
+        if let Some(better) = by_the_rows(&mut model, &recording, &fitted) {
+            fitted = better;
+            remarks.push(
+                "the motion is followed by one Runge-Kutta step a row, as a simulator may have done it: this fits better than the exact \
+                 motion"
+                    .into(),
+            );
+        }
     }
     let stated = model.stated(&fitted);
     let Some(length) = followed else {
@@ -78,23 +86,27 @@ pub(super) fn tuned(equations: Equations, mut recording: Recording) -> Result<Tu
     Ok(Tuned { model: model.full(scales, &stated, Some(&whole.runs)), recording, remarks })
 }
 
-/// A recording may come from a simulator that takes one step of Runge and Kutta's a row: where that fits better than the exact motion,
-/// and differs from it by less than the noise of a reading, the motion is followed like that. The parameters fitted then.
+/// A recording may come from a simulator that takes one step of Runge and Kutta's a row: where that fits better than the exact motion by
+/// more than what is left anyway leaves open, and differs from it by less than the noise of a reading, the motion is followed like that.
+/// The parameters fitted then.
 fn by_the_rows(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Option<Vec<f64>> {
     let exact = model.pace();
     let rows = Pace { method: Method::Kutta, step_s: median_step(recording) };
     if exact == rows {
         return None;
     }
-    let before = least_squares(&*model, recording, shared).ok()?;
+    let before = least_squares(&*model, recording, shared).ok()?.chi2;
     model.set_pace(rows);
     let values =
         recording.runs.iter().flat_map(|r| r.outputs.iter().flatten()).filter(|v| v.is_finite()).count();
-    match least_squares(&*model, recording, shared) {
-        Ok(after) if after.chi2 < before.chi2 - BETTER && before.chi2 - after.chi2 < 0.1 * values as f64 => {
-            Some(after.shared)
-        }
-        _ => {
+    let after = least_squares(&*model, recording, shared).ok();
+    let better = |after: f64| {
+        let (gain, left) = (before - after, after / values as f64);
+        gain > BETTER * left.max(1.0) && gain < 0.1 * values as f64
+    };
+    match after.filter(|after| better(after.chi2)) {
+        Some(after) => Some(after.shared),
+        None => {
             model.set_pace(exact);
             None
         }
@@ -138,17 +150,34 @@ fn first_pace(recording: &Recording) -> Pace {
 }
 
 /// Halves the step of the integration until what predictions of the liveliest rows change by can be told from the noise in no test: an
-/// error of the integration is the same in all rows, and what is far below the noise in each shows in all of them together.
+/// error of the integration is the same in all rows, and what is far below the noise in each shows in all of them together. Of a motion
+/// that cannot be followed so far only the beginning is looked at.
 fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Result<(), String> {
+    let Some(mut run) = liveliest(recording) else { return Ok(()) };
+    loop {
+        let Err(why) = resolve_by(model, recording, &run, shared) else { return Ok(()) };
+        if run.len() <= FIRST_WINDOW {
+            return Err(format!("{why} in run {}, {}", run.label, begun(model, &run, shared)));
+        }
+        run = rows(&run, 0, run.len() / 2);
+    }
+}
+
+/// The same by a run's rows.
+fn resolve_by(
+    model: &mut MotionModel,
+    recording: &Recording,
+    run: &Run,
+    shared: &[f64],
+) -> Result<(), String> {
     let mut pace = first_pace(recording);
-    let Some(run) = liveliest(recording) else { return Ok(()) };
-    let start = nuisance(model, &run);
+    let start = nuisance(model, run);
     let n = run.len();
     let rows: usize = recording.runs.iter().map(Run::len).sum();
-    let sigmas: Vec<f64> = (0..recording.channels.len()).map(|c| sigma(recording, &run, c)).collect();
+    let sigmas: Vec<f64> = (0..recording.channels.len()).map(|c| sigma(recording, run, c)).collect();
     let predict = |model: &MotionModel| {
         let mut out = vec![0.0; n * recording.channels.len()];
-        model.predict(&run, shared, &start, &mut out).map(|()| out).map_err(|e| e.reason)
+        model.predict(run, shared, &start, &mut out).map(|()| out).map_err(|e| e.reason)
     };
     model.set_pace(pace);
     let mut before = predict(model);
@@ -171,6 +200,16 @@ fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Re
         before = now;
     }
     before.map(|_| ())
+}
+
+/// From which states and by which parameters a motion was followed, in words.
+fn begun(model: &MotionModel, run: &Run, shared: &[f64]) -> String {
+    let equations = model.equations();
+    let states = model.begins(run, &nuisance(model, run));
+    let named = |name: &str, value: f64| format!("{name} = {}", (value * 1e6).round() / 1e6);
+    let states = equations.states.iter().zip(states).map(|(s, v)| named(&s.name, v));
+    let parameters = equations.parameters.iter().zip(model.stated(shared)).map(|(p, v)| named(&p.name, v));
+    format!("from {}", states.chain(parameters).collect::<Vec<_>>().join(", "))
 }
 
 /// The rows by which the step is judged: of the run in which most happens, from its beginning on.
@@ -246,6 +285,14 @@ fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) -> Result<S
         for k in 0..states {
             all[k].extend(&course.states[k]);
             rates[k].extend(&course.rates[k]);
+        }
+    }
+    // Where a state is measured as it stands, the equations alone may lead it elsewhere.
+    for (c, output) in model.equations().outputs.iter().enumerate() {
+        let measured: Vec<f64> =
+            recording.runs.iter().flat_map(|r| &r.outputs[c]).copied().filter(|v| v.is_finite()).collect();
+        if let Some(state) = output.state.filter(|_| !measured.is_empty()) {
+            all[state] = measured;
         }
     }
     let column = |pick: &dyn Fn(&Run) -> &Vec<f64>| Range {
