@@ -31,14 +31,15 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Diagnoses a recording: what does the simulation miss, where, and what explains it?
+    /// Diagnoses recordings: what does the simulation miss, where, and what explains it?
     Diagnose {
-        /// The recording's folder (it holds recording.toml).
-        folder: PathBuf,
+        /// The recording's folder (it holds recording.toml); of several each has a diagnosis, and outputs are folders with a file each.
+        #[arg(required = true, value_name = "FOLDER")]
+        folders: Vec<PathBuf>,
         /// Write the answer as JSON as well; - for standard output (the text is then on standard error).
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
-        /// Write the report as one HTML page as well.
+        /// Write the report as one HTML page as well; FOLDER/ has index.html over all of them.
         #[arg(long, value_name = "FILE")]
         html: Option<PathBuf>,
         /// Write a picture of where it misses most as SVG as well.
@@ -145,14 +146,21 @@ enum Command {
 
 fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
     match command {
-        Command::Diagnose { folder, json, html, svg, write_model, seed, threads, alpha, allow_command } => {
-            permit(&folder, allow_command)?;
+        Command::Diagnose { folders, json, html, svg, write_model, seed, threads, alpha, allow_command } => {
+            folders.iter().try_for_each(|folder| permit(folder, allow_command))?;
             on_interrupt("nothing was written".into());
             let options = Options { alpha, seed, ..Options::default() };
             let threads = useful(threads);
+            let many = commands::into_folders(&folders, html.as_deref());
+            let folder = folders.first().cloned().unwrap_or_default();
             let arguments =
                 DiagnoseArguments { folder, json, html, svg, model: write_model, options, threads };
-            commands::diagnose(&arguments, &Steps::new(loudness))
+            let steps = Steps::new(loudness);
+            if many {
+                commands::diagnose_many(&folders, &arguments, &steps)
+            } else {
+                commands::diagnose(&arguments, &steps)
+            }
         }
         Command::Import { files, domain, out, maps, settings, run, gap, every, rate, like } => {
             let (gap_s, rate_hz) = (gap, rate);
@@ -243,7 +251,7 @@ fn deliver(said: &Said, quiet: bool) -> Result<(), String> {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(format!("standard output: {error}"))
         }
-        _ => Ok(()),
+        _ => said.failure.clone().map_or(Ok(()), Err),
     }
 }
 

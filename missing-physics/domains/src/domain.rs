@@ -1,5 +1,7 @@
 //! What a domain is, and what it makes of a recording.
 
+use std::collections::BTreeMap;
+
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Experiment, Model, Quantity, Spec};
 
@@ -20,6 +22,23 @@ pub trait Domain: Sync {
     /// The columns of its table; none where the recording itself names them.
     fn columns(&self) -> &'static [Column<'static>] {
         &[]
+    }
+    /// What the columns of numbers are in words, without their units, by name (`z_m`: `height`).
+    fn words(&self) -> BTreeMap<String, String> {
+        let words = |c: &Column<'_>| {
+            let end = c.what.find([',', '(']).unwrap_or(c.what.len());
+            c.what[..end].split(" in ").next().unwrap_or_default().trim().to_owned()
+        };
+        let columns: Vec<(&str, String)> =
+            self.columns().iter().filter(|c| !c.label).map(|c| (c.name, words(c))).collect();
+        let alike = |of: &str| columns.iter().filter(|(_, words)| words == of).count() > 1;
+        let told_apart = |(name, words): &(&str, String)| {
+            // The coordinate: `x` of `x_m` and of `spin_x_rad_s`.
+            let axis = name.split('_').find(|part| part.len() == 1).filter(|_| alike(words));
+            let words = axis.map_or_else(|| words.clone(), |axis| format!("{words} {axis}"));
+            ((*name).to_owned(), words)
+        };
+        columns.iter().map(told_apart).collect()
     }
     /// The fullest model of the domain, for `domains`.
     fn spec(&self) -> Spec;

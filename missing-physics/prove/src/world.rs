@@ -136,6 +136,7 @@ impl World {
             recording: format!("{}/recording", self.name),
             title: self.name.clone(),
             citations: vec![domains::THESIS.into()],
+            words: domain.words(),
             additions: loaded.additions,
             ..ReportContext::default()
         };

@@ -1,9 +1,13 @@
 #![doc = include_str!("../README.md")]
 mod context;
+mod corner;
+mod explore;
 mod html;
 mod json;
 mod number;
 mod plots;
+mod quantity;
+mod runs;
 mod svg;
 mod text;
 mod write;
@@ -15,7 +19,7 @@ pub mod page {
 }
 
 pub use context::ReportContext;
-pub use html::html;
+pub use html::{Entry, html, index};
 pub use json::json;
 pub use plots::picture;
 pub use text::text;

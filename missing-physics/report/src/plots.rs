@@ -1,49 +1,26 @@
-//! The charts of a diagnosis.
+//! The charts of a diagnosis, still.
 
-use std::fmt::Write as _;
+use missing_physics::diagnosis::{Curves, Diagnosis};
 
-use missing_physics::diagnosis::{Curves, Diagnosis, Location, Verdict};
+use super::context::ReportContext;
+use super::quantity::{axis_label, label};
+use super::runs::{self, along, axis, channels, interval, located, residuals, together};
+use super::svg::{self, Chart, Series};
+use super::text::{changed, headline};
 
-use super::number::probability;
-use super::svg::{self, Chart, Series, escape};
-use super::text::headline;
-
-/// Runs drawn; more say no more.
-const MOST_RUNS: usize = 4;
-
-/// For each channel: data with both fits, and residuals before and after.
-pub(super) fn channels(d: &Diagnosis) -> String {
-    let mut html = String::new();
-    for c in by_misfit(d) {
-        // Writing to a string cannot fail.
-        let _ = write!(html, "<h3>{}</h3><div class=\"charts\">", escape(&d.channels[c].0));
-        for curves in d.curves.iter().take(MOST_RUNS) {
-            let [data, left] = charts(d, c, curves);
-            let _ = write!(html, "<figure>{data}</figure><figure>{left}</figure>");
-        }
-        html.push_str("</div>");
-        if d.curves.len() > MOST_RUNS {
-            let _ = write!(
-                html,
-                "<p class=\"note\">The first {MOST_RUNS} of {} runs are drawn.</p>",
-                d.curves.len()
-            );
-        }
-    }
-    html
+/// For each channel the run that misses most: data with both fits, and residuals before and after.
+pub(super) fn still(d: &Diagnosis, context: &ReportContext) -> String {
+    let figure = |chart: &String| format!("<figure>{chart}</figure>");
+    let of = |c: usize| charts(d, context, c).iter().map(figure).collect::<String>();
+    channels(d).into_iter().map(|c| format!("<div class=\"charts\">{}</div>", of(c))).collect()
 }
 
-/// The channel that misses most, in the first run in which it does: data with both fits, and residuals before and after.
-pub fn picture(d: &Diagnosis) -> String {
-    let drawn = by_misfit(d).first().and_then(|&c| {
-        let place = place(d, c);
-        let run =
-            d.curves.iter().find(|r| place.is_none_or(|l| l.runs.is_empty() || l.runs.contains(&r.run)));
-        run.or(d.curves.first()).map(|curves| charts(d, c, curves))
-    });
-    let shaded = by_misfit(d).first().is_some_and(|&c| interval(d, c).is_some());
-    let words = [headline(d), key(changed(d), shaded)];
-    svg::picture(drawn.as_ref().map_or(&[], |pair| pair.as_slice()), &words)
+/// The channel that misses most, in the run in which it misses most: data with both fits, and residuals before and after.
+pub fn picture(d: &Diagnosis, context: &ReportContext) -> String {
+    let worst = channels(d).first().copied();
+    let drawn = worst.map(|c| charts(d, context, c)).unwrap_or_default();
+    let shaded = worst.is_some_and(|c| shade(d, c).is_some());
+    svg::picture(&drawn, &[headline(d), key(changed(d), shaded)])
 }
 
 /// What the colours mean, of those that are there.
@@ -58,84 +35,85 @@ fn key(changed: bool, shaded: bool) -> String {
     key
 }
 
-/// Whether the diagnosis has a second fit to draw.
-fn changed(d: &Diagnosis) -> bool {
-    d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Partly | Verdict::Ambiguous)
+/// The interval of a channel, if it lies in what is drawn.
+fn shade(d: &Diagnosis, c: usize) -> Option<(f64, f64)> {
+    let drawn = together(d) || runs::worst(d).is_some_and(|run| located(d, c, &d.curves[run].run));
+    interval(d, c).filter(|_| drawn)
 }
 
-/// The rows that miss, along the variable of their place.
-fn interval(d: &Diagnosis, c: usize) -> Option<(f64, f64)> {
-    place(d, c).and_then(|l| Some((l.from?, l.to?))).filter(|_| !d.variables.is_empty())
+/// What is drawn of a channel: axis, readings, both fits and what they leave.
+#[derive(Default)]
+struct Rows {
+    axis: Vec<f64>,
+    measured: Vec<f64>,
+    fits: [Vec<f64>; 2],
+    left: [Vec<f64>; 2],
 }
 
-/// The channels, those that miss first.
-fn by_misfit(d: &Diagnosis) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..d.channels.len()).collect();
-    let rank =
-        |c: &usize| d.location.iter().position(|l| l.channel == d.channels[*c].0).unwrap_or(usize::MAX);
-    order.sort_by_key(rank);
-    order
-}
-
-/// Where a channel misses.
-fn place(d: &Diagnosis, c: usize) -> Option<&Location> {
-    d.location.iter().find(|l| l.channel == d.channels[c].0)
-}
-
-/// One run's data with both fits, and its residuals.
-fn charts(d: &Diagnosis, c: usize, curves: &Curves) -> [String; 2] {
-    let (channel, unit) = &d.channels[c];
-    let changed = changed(d);
-    let place = place(d, c);
-    // Plotted along the variable of the located interval, else along the first.
-    let variable =
-        place.and_then(|l| d.variables.iter().position(|(n, _)| Some(n) == l.variable.as_ref())).unwrap_or(0);
-    let shaded = interval(d, c);
-    let axis = d.variables.get(variable).map_or_else(|| "row".to_owned(), |(n, _)| n.clone());
-    let rows: Vec<f64> = match curves.inputs.get(variable) {
-        Some(column) => column.clone(),
-        None => (0..curves.measured[c].len()).map(|i| i as f64).collect(),
-    };
-    let left = |fit: &[f64]| -> Vec<f64> { curves.measured[c].iter().zip(fit).map(|(m, p)| m - p).collect() };
-    let (before, after) = (left(&curves.before[c]), left(&curves.after[c]));
-    let mut series = vec![
-        Series { class: "data", x: &rows, y: &curves.measured[c], points: true },
-        Series { class: "before", x: &rows, y: &curves.before[c], points: false },
-    ];
-    let mut residuals = vec![Series { class: "before", x: &rows, y: &before, points: true }];
-    if changed {
-        series.push(Series { class: "after", x: &rows, y: &curves.after[c], points: false });
-        residuals.push(Series { class: "after", x: &rows, y: &after, points: true });
+impl Rows {
+    fn add(&mut self, d: &Diagnosis, c: usize, curves: &Curves) {
+        self.axis.extend(along(curves, axis(d, c)));
+        self.measured.extend(&curves.measured[c]);
+        for (k, fit) in [&curves.before, &curves.after].into_iter().enumerate() {
+            self.fits[k].extend(&fit[c]);
+            self.left[k].extend(residuals(curves, fit, c));
+        }
     }
-    let chart = |what: &str, y_label: String, series, shaded, band| {
-        let title = format!("run {}: {what}", curves.run);
-        Chart { title, x_label: axis.clone(), y_label, series, shaded, band }.render()
+}
+
+/// Data of the worst run, or of all where runs are but a row or two, with both fits; and residuals.
+fn charts(d: &Diagnosis, context: &ReportContext, c: usize) -> Vec<String> {
+    let mut rows = Rows::default();
+    let together = together(d);
+    let title = if together {
+        d.curves.iter().for_each(|curves| rows.add(d, c, curves));
+        format!("all {} runs", d.curves.len())
+    } else {
+        let Some(curves) = runs::worst(d).map(|run| &d.curves[run]) else { return Vec::new() };
+        rows.add(d, c, curves);
+        if d.curves.len() > 1 {
+            format!("the run that misses most, {}", curves.run)
+        } else {
+            format!("run {}", curves.run)
+        }
     };
-    let band = d.noise.iter().find(|n| n.channel == *channel).map(|n| 2.0 * n.sigma);
-    [
-        chart("measured and simulated", channel.clone(), series, None, None),
-        chart("measured less simulated", format!("residual in {unit}"), residuals, shaded, band),
+    let fits = if changed(d) { 2 } else { 1 };
+    let classes = ["before", "after"];
+    let of = |columns: &'static str, k: usize, points| Series {
+        class: classes[k],
+        x: &rows.axis,
+        y: if columns == "fits" { &rows.fits[k] } else { &rows.left[k] },
+        points,
+    };
+    // Readings stand on top of the lines.
+    let mut series: Vec<Series<'_>> = (0..fits).map(|k| of("fits", k, together)).collect();
+    series.push(Series { class: "data", x: &rows.axis, y: &rows.measured, points: true });
+    let residual = (0..fits).map(|k| of("left", k, true)).collect();
+    let unit = &d.channels[c].1;
+    let left_label = if unit.is_empty() {
+        "measured less simulated".into()
+    } else {
+        format!("measured less simulated ({unit})")
+    };
+    let chart = |y_label: String, series, shaded, band| {
+        Chart {
+            title: title.clone(),
+            x_label: axis_label(d, context, axis(d, c)),
+            y_label,
+            series,
+            shaded,
+            band,
+        }
+        .render()
+    };
+    vec![
+        chart(label(context, &d.channels[c]), series, None, None),
+        chart(left_label, residual, shade(d, c), runs::sigma(d, c).map(|s| 2.0 * s)),
     ]
 }
 
-/// Probabilities of the mechanisms as bars.
-pub(super) fn probabilities(d: &Diagnosis) -> String {
-    let mut html = String::from("<table class=\"bars\">");
-    for m in &d.mechanisms {
-        let p = m.probability.clamp(0.0, 1.0);
-        let class = if d.chosen.contains(&m.id) { "bar chosen" } else { "bar" };
-        let why = m
-            .ruled_out
-            .as_ref()
-            .map_or_else(String::new, |r| format!(" <span class=\"note\">alone: {}</span>", escape(r)));
-        let _ = write!(
-            html,
-            "<tr><th scope=\"row\">{}</th><td class=\"track\"><div class=\"{class}\" style=\"width:{:.1}%\"></div></td><td>{}{why}</td></tr>",
-            escape(&m.name),
-            100.0 * p,
-            escape(&probability(p))
-        );
-    }
-    html.push_str("</table>");
-    html
+/// Data of the worst run with both fits, small.
+pub(super) fn thumbnail(d: &Diagnosis, context: &ReportContext) -> String {
+    let chart = channels(d).first().and_then(|&c| charts(d, context, c).into_iter().next());
+    chart.map(|chart| format!("<figure>{chart}</figure>")).unwrap_or_default()
 }

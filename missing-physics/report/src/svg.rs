@@ -50,7 +50,7 @@ pub struct Chart<'a> {
 /// Colours, light and dark, and how charts use them.
 pub const CHART_STYLE: &str = "
 :root{--ink:#1c2430;--paper:#fff;--soft:#5b6675;--line:#dde2e8;--data:#8a94a3;--before:#c2410c;--after:#0369a1;--shade:#f59e0b33;--band:#0369a114;--card:#f6f8fa}
-@media(prefers-color-scheme:dark){:root{--ink:#e6eaf0;--paper:#12161c;--soft:#9aa6b5;--line:#2b333d;--data:#8793a3;--before:#fb923c;--after:#38bdf8;--shade:#f59e0b2e;--band:#38bdf81c;--card:#1a2028}}
+@media screen and (prefers-color-scheme:dark){:root{--ink:#e6eaf0;--paper:#12161c;--soft:#9aa6b5;--line:#2b333d;--data:#8793a3;--before:#fb923c;--after:#38bdf8;--shade:#f59e0b2e;--band:#38bdf81c;--card:#1a2028}}
 svg text{font:11px system-ui,sans-serif;fill:var(--soft)}svg .t{font-weight:600;font-size:12px;fill:var(--ink)}.grid{stroke:var(--line);stroke-width:.7}
 polyline{fill:none;stroke-width:1.6}polyline.before{stroke:var(--before);stroke-dasharray:5 3}polyline.after{stroke:var(--after)}g.data{fill:var(--data)}g.before{fill:var(--before)}g.after{fill:var(--after)}.shade{fill:var(--shade)}.band{fill:var(--band)}
 ";
@@ -176,7 +176,12 @@ fn grid(
 
 /// Charts side by side as a picture that stands alone, with lines of words below.
 pub(crate) fn picture(charts: &[String], words: &[String]) -> String {
-    let (width, height) = (WIDTH * charts.len().max(1) as f64, HEIGHT + 18.0 * words.len() as f64 + 8.0);
+    /// Width of a letter of the words, with room to spare.
+    const LETTER: f64 = 6.2;
+    let width = WIDTH * charts.len().max(1) as f64;
+    let longest = ((width - LEFT - RIGHT) / LETTER) as usize;
+    let lines: Vec<String> = words.iter().flat_map(|text| wrapped(text, longest)).collect();
+    let height = HEIGHT + 18.0 * lines.len() as f64 + 8.0;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\"><style>{CHART_STYLE}</style><rect width=\"{width}\" height=\"{height}\" fill=\"var(--paper)\"/>"
     );
@@ -188,12 +193,27 @@ pub(crate) fn picture(charts: &[String], words: &[String]) -> String {
             WIDTH * i as f64
         );
     }
-    for (i, line) in words.iter().enumerate() {
+    for (i, line) in lines.iter().enumerate() {
         let y = HEIGHT + 12.0 + 18.0 * i as f64;
         let _ = write!(svg, "<text x=\"{LEFT}\" y=\"{y}\">{}</text>", escape(line));
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// A text in lines of so many letters, or more where a word is longer.
+fn wrapped(text: &str, longest: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut().filter(|line| line.chars().count() + 1 + word.chars().count() <= longest) {
+            Some(line) => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// A range that is not empty, with some room.
@@ -238,6 +258,11 @@ mod tests {
         let labels: Vec<String> = ticks(-0.13, 0.52).into_iter().map(|t| t.1).collect();
         assert_eq!(labels, ["0.0", "0.2", "0.4"]);
         assert!(ticks(0.0, 1e-9).len() > 2);
+    }
+
+    #[test]
+    fn words_below_a_picture_stay_in_it() {
+        assert_eq!(wrapped("the simulation does not hold", 12), ["the", "simulation", "does not", "hold"]);
     }
 
     #[test]

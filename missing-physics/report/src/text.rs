@@ -119,6 +119,11 @@ fn named(d: &Diagnosis, set: &[String]) -> String {
     set.iter().map(name).collect::<Vec<_>>().join(" together with ")
 }
 
+/// Whether the diagnosis has a second fit to draw.
+pub(super) fn changed(d: &Diagnosis) -> bool {
+    d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Partly | Verdict::Ambiguous)
+}
+
 /// A share that is not the whole is not said to be the whole.
 fn floored(share: f64) -> f64 {
     (100.0 * share).floor().min(99.0) / 100.0

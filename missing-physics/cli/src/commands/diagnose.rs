@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose as run};
 use missing_physics::observer::Observer;
 
@@ -36,6 +37,18 @@ pub struct DiagnoseArguments {
 /// # Errors
 /// [`CommandError`]; outputs that cannot be written are refused before the work begins.
 pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<Said, CommandError> {
+    one(arguments, observer).map(|done| done.said)
+}
+
+/// A diagnosis, and what is said of it.
+pub(super) struct Done {
+    pub(super) said: Said,
+    pub(super) diagnosis: Diagnosis,
+    pub(super) context: ReportContext,
+}
+
+/// As [`diagnose`].
+pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<Done, CommandError> {
     let asked = [&arguments.json, &arguments.html, &arguments.svg, &arguments.model];
     let outputs: Vec<&std::path::Path> = asked.iter().filter_map(|path| path.as_deref()).collect();
     let mut places = places(&outputs, &domains::recording::files_of(&arguments.folder))?.into_iter();
@@ -62,6 +75,7 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
             .file_name()
             .map_or_else(|| "recording".into(), |n| n.to_string_lossy().into_owned()),
         citations: vec![domains::THESIS.into()],
+        words: domain.words(),
         additions: loaded.additions,
         provenance: provenance(&arguments.folder, &arguments.options),
     };
@@ -73,10 +87,10 @@ pub fn diagnose(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Resul
         said.write(place, report::html(&diagnosis, &context));
     }
     if let Some(place) = &svg {
-        said.write(place, report::picture(&diagnosis));
+        said.write(place, report::picture(&diagnosis, &context));
     }
     if let Some(place) = &model {
         said.write(place, Repair::new(domain, &diagnosis).to_json());
     }
-    Ok(said)
+    Ok(Done { said, diagnosis, context })
 }

@@ -45,6 +45,12 @@ pub enum CommandError {
         /// The folder.
         path: PathBuf,
     },
+    /// Something else stands where a folder is to be written to.
+    #[error("{}: no folder, expected one: several recordings have a file each", .path.display())]
+    NotAFolder {
+        /// What stands there.
+        path: PathBuf,
+    },
     /// The recording starts a program, and nobody has allowed it.
     #[error(
         "{}: starts the program {}; call again with --allow-command where you trust it", .folder.display(), quoted(.program)

@@ -10,6 +10,8 @@ use super::error::CommandError;
 pub struct Said {
     /// For a person.
     pub text: String,
+    /// What failed beside what is said, for the end: the exit status says it as well.
+    pub failure: Option<String>,
     files: Vec<(Place, Vec<u8>)>,
 }
 
@@ -36,13 +38,20 @@ enum Identity {
 
 impl From<String> for Said {
     fn from(text: String) -> Self {
-        Self { text, files: Vec::new() }
+        Self { text, ..Self::default() }
     }
 }
 
 impl Said {
     pub(super) fn write(&mut self, place: &Place, contents: impl Into<Vec<u8>>) {
         self.files.push((place.clone(), contents.into()));
+    }
+
+    /// Says and writes what another command says and writes as well.
+    pub(super) fn join(&mut self, other: Self) {
+        self.text.push_str(&other.text);
+        self.files.extend(other.files);
+        self.failure = self.failure.take().or(other.failure);
     }
 
     /// Whether a file goes to standard output, so that the text has to go elsewhere.

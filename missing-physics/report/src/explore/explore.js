@@ -1,0 +1,241 @@
+// The runs of a diagnosis, to be explored: pick a run, a channel and an axis; point at a row; drag to zoom.
+"use strict";
+(() => {
+  const home = document.getElementById("explore");
+  const data = JSON.parse(document.getElementById("curves").textContent);
+  const state = { run: data.first, channel: 0, axis: data.channels[0].axis, log: false };
+  let charts = [];
+  let printing = false;
+
+  const element = (tag, attributes = {}, ...children) => {
+    const made = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    made.append(...children);
+    return made;
+  };
+  const light = { ink: "#1c2430", soft: "#5b6675", line: "#dde2e8", data: "#5b6675", before: "#c2410c", after: "#0369a1", shade: "#f59e0b33", band: "#0369a114" };
+  const colours = () => {
+    if (printing) return light;
+    const style = getComputedStyle(document.documentElement);
+    return Object.fromEntries(Object.keys(light).map((key) => [key, style.getPropertyValue("--" + key).trim() || light[key]]));
+  };
+  const short = (value, digits = 5) => (value == null || Number.isNaN(value) ? "–" : String(Number(value.toPrecision(digits))));
+  const sigmas = (value) => (value == null ? "?" : value >= 100 ? value.toFixed(0) : value.toPrecision(2)) + " σ";
+
+  // What is shown of one run, or of all of them one after the other: rows as they were measured, and their order along the axis.
+  const view = () => {
+    const c = state.channel;
+    const runs = state.run < 0 ? data.runs : [data.runs[state.run]];
+    const rows = { x: [], measured: [], before: [], after: [], run: [], aside: [] };
+    for (const run of runs) {
+      const { measured, before, after, aside } = run.channels[c];
+      const own = state.axis >= 0 ? run.inputs[state.axis] : run.channels[-1 - state.axis].measured;
+      for (let i = 0; i < measured.length; i++) {
+        rows.x.push(own ? own[i] : i);
+        rows.measured.push(measured[i]);
+        rows.before.push(before[i]);
+        rows.after.push(after ? after[i] : null);
+        rows.aside.push(aside.includes(i));
+        rows.run.push(run.label);
+      }
+    }
+    if (state.log) {
+      const above = (v) => (v > 0 ? v : null);
+      rows.x = rows.x.map(above);
+      for (const key of ["measured", "before", "after"]) rows[key] = rows[key].map(above);
+    }
+    const order = rows.x.map((x, i) => i).filter((i) => rows.x[i] != null).sort((a, b) => rows.x[a] - rows.x[b] || a - b);
+    return { rows, order };
+  };
+
+  // A line through rows in the order in which they were measured, broken between runs and where a value is missing.
+  const line = (rows, key) => (u) => {
+    const path = new Path2D();
+    let pen = false;
+    rows[key].forEach((y, i) => {
+      if (y == null || rows.x[i] == null) pen = false;
+      else {
+        const [px, py] = [u.valToPos(rows.x[i], "x", true), u.valToPos(y, "y", true)];
+        if (pen && rows.run[i] === rows.run[i - 1]) path.lineTo(px, py);
+        else path.moveTo(px, py);
+        pen = true;
+      }
+    });
+    return { stroke: path, fill: null, clip: null, flags: 1 };
+  };
+
+  const chart = (place, shown, height, { label, series, log, band, shade, aside, axisLabel, pointed }) => {
+    const { rows, order } = shown;
+    const pick = (values) => order.map((i) => values[i] ?? null);
+    const at = (colour) => () => colours()[colour];
+    const dots = Math.max(3, Math.min(6, 900 / Math.sqrt(order.length + 1) / 8));
+    const axis = (text, size) => ({ label: text, labelSize: 22, labelFont: "12px system-ui", font: "12px system-ui", size, stroke: at("soft"), grid: { stroke: at("line"), width: 0.7 }, ticks: { stroke: at("line"), width: 0.7 } });
+    const options = {
+      width: place.clientWidth, height, legend: { show: false }, padding: [8, 14, 0, 0],
+      cursor: { sync: { key: "run", setSeries: false, scales: ["x", null] }, drag: { x: true, y: false, dist: 4 }, y: false, points: { size: 8 } },
+      scales: { x: { time: false, distr: log ? 3 : 1 }, y: { distr: log && !band ? 3 : 1, range: log && !band ? undefined : (u, low, high) => {
+        if (low == null) return [0, 1];
+        if (band) [low, high] = [Math.min(low, -band), Math.max(high, band)];
+        const room = 0.06 * (high - low) || 0.5 * Math.abs(high) || 1e-9;
+        return [low - room, high + room];
+      } } },
+      axes: [axis(axisLabel, 36), axis(label, 62)],
+      series: [{}].concat(series.map((s) => ({
+        stroke: at(s.colour), width: 1.6, dash: s.dash, spanGaps: false,
+        paths: s.dots ? () => null : line(rows, s.key),
+        points: { show: s.dots, size: s.size ?? dots, fill: at(s.colour), stroke: at(s.colour), width: 0 },
+      }))),
+      hooks: {
+        drawClear: [(u) => {
+          const { ctx, bbox } = u;
+          ctx.save();
+          ctx.beginPath();
+          ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+          ctx.clip();
+          if (shade) {
+            const [a, b] = shade.map((v) => u.valToPos(v, "x", true));
+            ctx.fillStyle = colours().shade;
+            ctx.fillRect(a, bbox.top, Math.max(b - a, 1), bbox.height);
+          }
+          if (band) {
+            const [a, b] = [band, -band].map((v) => u.valToPos(v, "y", true));
+            ctx.fillStyle = colours().band;
+            ctx.fillRect(bbox.left, a, bbox.width, b - a);
+          }
+          ctx.restore();
+        }],
+        draw: [(u) => {
+          // Rows that were set aside wear a ring.
+          u.ctx.save();
+          u.ctx.strokeStyle = colours().before;
+          u.ctx.lineWidth = 1.5 * devicePixelRatio;
+          order.filter((i) => rows.aside[i] && rows[aside][i] != null).forEach((i) => {
+            u.ctx.beginPath();
+            u.ctx.arc(u.valToPos(rows.x[i], "x", true), u.valToPos(rows[aside][i], "y", true), 6 * devicePixelRatio, 0, 7);
+            u.ctx.stroke();
+          });
+          u.ctx.restore();
+        }],
+        setCursor: [(u) => pointed(u.cursor.idx == null ? null : order[u.cursor.idx])],
+        setScale: [(u, key) => {
+          if (key !== "x") return;
+          for (const other of charts) {
+            const { min, max } = u.scales.x;
+            if (other !== u && (other.scales.x.min !== min || other.scales.x.max !== max)) other.setScale("x", { min, max });
+          }
+        }],
+      },
+    };
+    return new uPlot(options, [pick(rows.x), ...series.map((s) => pick(rows[s.key]))], place);
+  };
+
+  const mark = (kind) => {
+    const drawn = { data: "<circle cx='11' cy='5' r='3.2' fill='var(--data)'/>", before: "<path d='M0 5H22' stroke='var(--before)' stroke-width='2' stroke-dasharray='5 3'/>", after: "<path d='M0 5H22' stroke='var(--after)' stroke-width='2'/>" }[kind];
+    const holder = element("span");
+    holder.innerHTML = `<svg viewBox="0 0 22 10" class="mark" aria-hidden="true">${drawn}</svg>`;
+    return holder.firstChild;
+  };
+
+  const draw = () => {
+    charts.forEach((c) => c.destroy());
+    charts = [];
+    const channel = data.channels[state.channel];
+    const shown = view();
+    const { rows } = shown;
+    rows.left = rows.measured.map((m, i) => (m == null || rows.before[i] == null ? null : m - rows.before[i]));
+    rows.now = rows.measured.map((m, i) => (m == null || rows.after[i] == null ? null : m - rows.after[i]));
+    const unit = channel.unit ? " " + channel.unit : "";
+    const axisLabel = state.axis >= 0 ? data.variables[state.axis].label : data.channels[-1 - state.axis].label;
+    const single = rows.run.every((run, i) => run !== rows.run[i - 1]);
+    const pointed = (i) => {
+      const empty = i == null || i === undefined;
+      const what = (key, value) => { values[key].textContent = empty ? "" : " " + value; };
+      what("data", short(rows.measured[i]) + unit);
+      what("before", short(rows.before[i]) + unit + (rows.left[i] == null ? "" : ` (off by ${short(rows.left[i], 3)})`));
+      if (data.changed) what("after", short(rows.after[i]) + unit + (rows.now[i] == null ? "" : ` (off by ${short(rows.now[i], 3)})`));
+      where.textContent = empty ? "Point at a row for its values, drag to zoom, double-click for all." : `run ${rows.run[i]}, ${axisLabel}: ${short(rows.x[i])}${rows.aside[i] ? ", set aside" : ""}`;
+    };
+    const place = channel.place;
+    const inRun = state.run < 0 || !place || place.runs.length === 0 || place.runs.includes(data.runs[state.run].label);
+    const shade = place && place.variable === state.axis && inRun ? [place.from, place.to] : null;
+    shadeKey.hidden = !shade;
+    const fits = [{ key: "before", colour: "before", dash: [6, 4], dots: single, size: 11 }];
+    if (data.changed) fits.push({ key: "after", colour: "after", dots: single, size: 11 });
+    const lefts = [{ key: "left", colour: "before", dots: true }];
+    if (data.changed) lefts.push({ key: "now", colour: "after", dots: true });
+    const common = { log: state.log, axisLabel, pointed };
+    charts.push(chart(above, shown, 320, { ...common, label: channel.label, aside: "measured", series: [...fits, { key: "measured", colour: "data", dots: true }] }));
+    charts.push(chart(below, shown, 210, { ...common, label: "residual" + (channel.unit ? ` (${channel.unit})` : ""), aside: "left", series: lefts, band: channel.sigma ? 2 * channel.sigma : null, shade }));
+    pointed(null);
+  };
+
+  const choice = (label, options, value, change) => {
+    const select = element("select", { "aria-label": label });
+    options.forEach(([v, text]) => select.append(element("option", { value: v }, text)));
+    select.value = value;
+    select.addEventListener("change", () => { change(Number(select.value)); draw(); });
+    return select;
+  };
+  const controls = element("div", { class: "controls" });
+  const order = data.runs.map((r, i) => i);
+  const runs = order.map((i) => {
+    const r = data.runs[i];
+    return [i, `run ${r.label}: off by ${sigmas(r.before)}${data.changed ? `, now ${sigmas(r.after)}` : ""}`];
+  });
+  if (runs.length > 1) {
+    runs.push([-1, `all ${runs.length} runs`]);
+    const picker = choice("run", runs, state.run, (v) => { state.run = v; });
+    const step = (by, text, name) => {
+      const button = element("button", { type: "button", "aria-label": name, title: name }, text);
+      button.addEventListener("click", () => {
+        picker.selectedIndex = (picker.selectedIndex + by + runs.length) % runs.length;
+        picker.dispatchEvent(new Event("change"));
+      });
+      return button;
+    };
+    controls.append(step(-1, "‹", "run that misses more"), picker, step(1, "›", "run that misses less"));
+  }
+  if (data.channels.length > 1) {
+    controls.append(choice("channel", data.channels.map((c, i) => [i, c.label]), 0, (v) => {
+      state.channel = v;
+      if (-1 - state.axis === v || state.axis >= 0) { state.axis = data.channels[v].axis; axes.value = state.axis; }
+    }));
+  }
+  const along = data.variables.map((v, i) => [i, "against " + v.label]).concat(data.channels.length > 1 ? data.channels.map((c, i) => [-1 - i, "against " + c.label]) : []);
+  const axes = choice("horizontal axis", along, state.axis, (v) => { state.axis = v; });
+  if (along.length > 1) controls.append(axes);
+  if (data.log) {
+    const box = element("input", { type: "checkbox" });
+    box.addEventListener("change", () => { state.log = box.checked; draw(); });
+    controls.append(element("label", {}, box, " logarithmic"));
+  }
+  const all = element("button", { type: "button" }, "show all");
+  all.addEventListener("click", () => draw());
+  controls.append(all);
+
+  const values = {};
+  const legend = element("p", { class: "key note" });
+  for (const [kind, words] of [["data", "measured"], ["before", "simulated"], ["after", "with what was found"]]) {
+    if (kind === "after" && !data.changed) continue;
+    values[kind] = element("output", { class: "num" });
+    legend.append(element("span", {}, mark(kind), words, values[kind]));
+  }
+  const shadeKey = element("span", {}, element("i", { style: "background:var(--shade);height:.8rem" }), "without these rows the simulation would hold");
+  const bandKey = element("span", {}, element("i", { style: "background:var(--band);height:.8rem" }), "twice the noise");
+  legend.append(shadeKey, bandKey);
+  const where = element("p", { class: "note where" });
+  const [above, below] = [element("div", { class: "plot" }), element("div", { class: "plot" })];
+  home.replaceChildren(controls, element("figure", {}, above, below), legend, where);
+  if (data.every > 1) home.append(element("p", { class: "note" }, `Of the rows of a run every ${data.every}th is drawn.`));
+  draw();
+
+  let width = above.clientWidth;
+  addEventListener("resize", () => {
+    if (above.clientWidth !== width) { width = above.clientWidth; charts.forEach((c) => c.setSize({ width, height: c.height })); }
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.forEach((c) => c.redraw()));
+  // On paper everything is light.
+  const print = matchMedia("print");
+  print.addEventListener("change", () => { printing = print.matches; charts.forEach((c) => c.redraw()); });
+  document.documentElement.dataset.explored = "yes";
+})();
