@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use mcap::records::{MessageHeader, Record};
+use mcap::records::{ChunkHeader, MessageHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::opened;
@@ -24,9 +24,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
     let broken = |why: String| ImportError::broken(path, why);
     let mut file = File::open(path).map_err(|e| opened(path, &e))?;
     let mut reader = LinearReader::new_with_options(
-        LinearReaderOptions::default()
-            .with_record_length_limit(LARGEST_RECORD)
-            .with_validate_chunk_crcs(true),
+        LinearReaderOptions::default().with_record_length_limit(LARGEST_RECORD).with_emit_chunks(true),
     );
     let mut bag = Bag::default();
     let mut cut = None;
@@ -39,7 +37,17 @@ pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
                 let record = mcap::parse_record(opcode, data).map_err(|e| broken(e.to_string()))?;
-                bag.take(record).map_err(broken)?;
+                match record {
+                    Record::Chunk { header, data } => match unpacked(&header, &data) {
+                        Ok(records) => bag.take_all(&records).map_err(broken)?,
+                        Err(why) if bag.cells > 0 => {
+                            cut = Some(why);
+                            break;
+                        }
+                        Err(why) => return Err(broken(why)),
+                    },
+                    record => bag.take(record).map_err(broken)?,
+                }
             }
             // A recorder that was ended leaves a bag without its end: what came before is whole.
             Err(error) if bag.cells > 0 => {
@@ -59,6 +67,31 @@ pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
         ));
     }
     Ok(tables)
+}
+
+/// The records of a chunk.
+fn unpacked(header: &ChunkHeader, data: &[u8]) -> Result<Vec<u8>, String> {
+    let size = header.uncompressed_size;
+    if size > LARGEST_RECORD as u64 {
+        return Err(format!("a chunk of {size} bytes, expected at most {LARGEST_RECORD}"));
+    }
+    let mut records = Vec::new();
+    // One byte more than it says is enough to see that it says too little.
+    let done = match header.compression.as_str() {
+        "" => data.take(size + 1).read_to_end(&mut records),
+        "zstd" => zstd::Decoder::new(data).and_then(|d| d.take(size + 1).read_to_end(&mut records)),
+        "lz4" => lz4_flex::frame::FrameDecoder::new(data).take(size + 1).read_to_end(&mut records),
+        other => return Err(format!("chunks are packed by {}, expected zstd or lz4", one_line(other))),
+    };
+    done.map_err(|e| format!("a chunk that cannot be unpacked: {}", one_line(&e.to_string())))?;
+    if records.len() as u64 != size {
+        return Err(format!("a chunk of {} bytes or more, {size} as it says", records.len()));
+    }
+    let sum = header.uncompressed_crc;
+    if sum != 0 && crc32fast::hash(&records) != sum {
+        return Err("a chunk whose checksum is another".into());
+    }
+    Ok(records)
 }
 
 /// What was read so far.
@@ -88,6 +121,12 @@ enum How {
 }
 
 impl Bag {
+    /// Takes the records of a chunk.
+    fn take_all(&mut self, records: &[u8]) -> Result<(), String> {
+        mcap::read::LinearReader::sans_magic(records)
+            .try_for_each(|record| self.take(record.map_err(|e| e.to_string())?))
+    }
+
     fn take(&mut self, record: Record<'_>) -> Result<(), String> {
         match record {
             Record::Schema { header, data } => {
@@ -297,4 +336,48 @@ fn unit(schema: &str, field: &str) -> Option<&'static str> {
         (kind == "BatteryState" && field == "voltage", "V"),
     ];
     rules.into_iter().find(|(holds, _)| *holds).map(|(_, unit)| unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    fn header(compression: &str, size: usize, crc: u32) -> ChunkHeader {
+        let (message_start_time, message_end_time, compressed_size) = (0, 0, 0);
+        let (uncompressed_size, uncompressed_crc) = (size as u64, crc);
+        let compression = compression.to_owned();
+        ChunkHeader {
+            message_start_time,
+            message_end_time,
+            uncompressed_size,
+            uncompressed_crc,
+            compression,
+            compressed_size,
+        }
+    }
+
+    #[test]
+    fn chunks_are_unpacked_or_refused() {
+        let records = b"what a robot said, what a robot said".to_vec();
+        let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        encoder.write_all(&records).unwrap();
+        let packed = encoder.finish().unwrap();
+        let sum = crc32fast::hash(&records);
+        assert_eq!(unpacked(&header("lz4", records.len(), sum), &packed).unwrap(), records);
+        assert_eq!(unpacked(&header("", records.len(), 0), &records).unwrap(), records);
+        let refused = [
+            (header("lz4", records.len(), sum + 1), "checksum"),
+            (header("lz4", records.len() - 1, sum), "as it says"),
+            (header("lz4", records.len() + 1, sum), "as it says"),
+            (header("lz4", usize::MAX / 2, sum), "at most"),
+            (header("zstd", records.len(), sum), "cannot be unpacked"),
+            (header("br", records.len(), sum), "zstd or lz4"),
+        ];
+        for (header, why) in refused {
+            let said = unpacked(&header, &packed).unwrap_err();
+            assert!(said.contains(why), "{said}");
+        }
+    }
 }
