@@ -85,6 +85,15 @@ fn a_simulator_that_fails_is_quoted() {
             "the simulator answered no finite number for y_m at row 3",
         ),
         ("printf '\\377\\376\\n'; cat", "which is no text"),
+        (
+            "read l; echo '{\"id\": 1, \"channels\": {\"y_m\": [0,1,2,1e155,4,5,6,7,8,9,10,11]}}'; cat",
+            "the simulator answered 1e155 for y_m at row 3, expected at most 1e150",
+        ),
+        (
+            "read l; echo '{\"id\": 1, \"channels\": {\"y_m\": [0,1,2,3,4,5,6,7,8,9,10,11]}}'; \
+             read l; echo '{\"id\": 2, \"channels\": {\"y_m\": [0,1,2,3,4,5.1,6,7,8,9,10,11]}}'; cat",
+            "the simulator answered one question twice, with 5 and with 5.1 for y_m at row 5, expected the same answer",
+        ),
     ];
     for (script, expected) in cases {
         let said = said_of(script);

@@ -197,6 +197,14 @@ impl Answer<'_> {
         }
     }
 
+    /// Which mechanisms could not be fitted, and why.
+    pub(crate) fn unfitted(&self, unfitted: &[(usize, PredictError)]) -> Vec<String> {
+        let words = |(m, why): &(usize, PredictError)| {
+            format!("{} could not be fitted: {why}", self.problem.spec().mechanisms[*m].name)
+        };
+        unfitted.iter().map(words).collect()
+    }
+
     /// Every mechanism that the data can speak of, likeliest first.
     pub(crate) fn mechanisms(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<MechanismReport> {
         let best = best.map(|b| ranking.at(b.at));
@@ -248,7 +256,7 @@ impl Answer<'_> {
         let scored = if ranking.score_of(&holder.set).is_some() { &holder.set[..] } else { &[m] };
         let score = ranking.score_of(scored);
         let profile = profile && best.is_some_and(|b| b.set == holder.set);
-        let holding = sets.iter().filter(|(c, _)| c.set.contains(&m));
+        let holding = sets.iter().filter(|(c, _)| self.problem.at_work(&c.set).contains(&m));
         let channels = &self.problem.recording.channels;
         Some(MechanismReport {
             id: mechanism.id.clone(),

@@ -1,5 +1,7 @@
 //! A recording as the engine sees it: runs of rows, with known inputs and measured channels.
 
+use std::collections::HashSet;
+
 use crate::quantity::Quantity;
 
 /// One run: the unit that is left out when a fit is judged on data that it has not seen.
@@ -54,6 +56,12 @@ pub enum RecordingError {
         runs: usize,
         /// Number of channels.
         channels: usize,
+    },
+    /// Two runs have one label.
+    #[error("the label {label} stands for two runs, expected another for each")]
+    Label {
+        /// The label.
+        label: String,
     },
     /// A column is missing or has another length than the run's first one.
     #[error("run {run}: column {column} has {got} rows, expected {expected}")]
@@ -116,6 +124,10 @@ impl Recording {
         let variables = self.variables.len();
         if let Some(index) = self.noise_along.filter(|&index| index >= variables) {
             return Err(RecordingError::NoiseAlong { index, variables });
+        }
+        let mut labels = HashSet::new();
+        if let Some(twice) = self.runs.iter().find(|run| !labels.insert(&run.label)) {
+            return Err(RecordingError::Label { label: twice.label.clone() });
         }
         for run in &self.runs {
             let expected = run.len();

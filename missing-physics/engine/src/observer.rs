@@ -9,7 +9,8 @@ pub struct Progress<'a> {
     pub done: f64,
 }
 
-/// Watches a diagnosis and may stop it. Called from one thread, between pieces of work.
+/// Watches a piece of work and may stop it. One call at a time, between pieces of work; from one thread in a diagnosis, from any of
+/// the pool's where many recordings are diagnosed at once.
 pub trait Observer: Sync {
     /// Takes note of the progress; `false` stops the work.
     fn progress(&self, progress: Progress<'_>) -> bool;

@@ -47,13 +47,17 @@ pub fn oracle(
     let competing = rule.competing();
     let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
     let among = candidate(&problem, &competing, &[], &[], &baseline.fit, &[])?;
-    let all = search(&problem, &competing, among, &everything, &|_| true).ok_or(DiagnoseError::Stopped)?;
-    let known = all.iter().find(|c| c.set == set).cloned();
+    let all = search(&problem, &competing, among, &everything, &|_| true).ok_or(DiagnoseError::Stopped)?.all;
+    let at_work = problem.at_work(&set);
+    let known = all.iter().find(|c| problem.at_work(&c.set) == at_work).cloned();
     let truth = match known {
         Some(found) => found,
         None => candidate(&problem, &competing, &set, &[], &baseline.fit, &[])?,
     };
-    let lacking = |c: &&Candidate| !set.iter().all(|m| c.set.contains(m)) && c.ruled_out.is_none();
+    let lacking = |c: &&Candidate| {
+        let there = problem.at_work(&c.set);
+        !set.iter().all(|m| there.contains(m)) && c.ruled_out.is_none()
+    };
     let rival = all.iter().filter(lacking).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max);
     let likelihood_ratio = 2.0 * (truth.fit.log_likelihood - all[0].fit.log_likelihood);
     let degrees = truth.selection.shared.len() - all[0].selection.shared.len();

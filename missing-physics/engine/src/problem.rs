@@ -197,8 +197,39 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// The free parameters with the mechanisms `set` (indices into [`Spec::mechanisms`]) and terms `terms` on.
-    pub(crate) fn select(&self, set: &[usize], terms: &[usize]) -> Selection {
+    /// The mechanisms that are at work with those of `set` on: these, and others all of whose parameters they free as companions (moving
+    /// air acts through drag). Sets with the same ones at work are one model.
+    pub(crate) fn at_work(&self, set: &[usize]) -> Vec<usize> {
+        let spec = self.spec();
+        let freed = self.freed(set);
+        let companions = |m: usize| spec.mechanisms[m].companions.iter();
+        let brought = |parameters: &[usize]| {
+            !parameters.is_empty()
+                && parameters.iter().all(|p| freed[*p] && set.iter().any(|&o| companions(o).any(|c| c == p)))
+        };
+        (0..spec.mechanisms.len())
+            .filter(|m| set.contains(m) || brought(&spec.mechanisms[*m].parameters))
+            .collect()
+    }
+
+    /// Which parameters (index into [`Spec::parameters`]) are free with the mechanisms `set` on.
+    fn freed(&self, set: &[usize]) -> Vec<bool> {
+        let spec = self.spec();
+        let mut free = self.of_baseline();
+        for &m in set {
+            let mechanism = &spec.mechanisms[m];
+            mechanism.parameters.iter().for_each(|&p| free[p] = true);
+            let needless =
+                set.iter().any(|&o| o != m && mechanism.companions_unless.contains(&spec.mechanisms[o].id));
+            if !needless {
+                mechanism.companions.iter().for_each(|&p| free[p] = true);
+            }
+        }
+        free
+    }
+
+    /// Which parameters are free in the baseline.
+    fn of_baseline(&self) -> Vec<bool> {
         let spec = self.spec();
         let mut free: Vec<bool> = vec![true; spec.parameters.len()];
         for m in &spec.mechanisms {
@@ -209,16 +240,14 @@ impl<'a> Problem<'a> {
         for t in &spec.terms {
             free[t.parameter] = false;
         }
-        let baseline = free.clone();
-        for &m in set {
-            let mechanism = &spec.mechanisms[m];
-            mechanism.parameters.iter().for_each(|&p| free[p] = true);
-            let needless =
-                set.iter().any(|&o| o != m && mechanism.companions_unless.contains(&spec.mechanisms[o].id));
-            if !needless {
-                mechanism.companions.iter().for_each(|&p| free[p] = true);
-            }
-        }
+        free
+    }
+
+    /// The free parameters with the mechanisms `set` (indices into [`Spec::mechanisms`]) and terms `terms` on.
+    pub(crate) fn select(&self, set: &[usize], terms: &[usize]) -> Selection {
+        let spec = self.spec();
+        let baseline = self.of_baseline();
+        let mut free = self.freed(set);
         for &place in spec.mechanisms.iter().flat_map(|m| &m.integer_parameters) {
             free[place] = false;
         }

@@ -185,6 +185,13 @@ fn a_recording_has_the_shape_that_it_says() {
     assert!(matches!(swapped, DiagnoseError::Recording(RecordingError::Shape { .. })));
 }
 
+/// Models find what they know of a run by its label.
+#[test]
+fn two_runs_of_one_label_are_refused() {
+    let twice = recording_refused(|r| r.runs[1].label = r.runs[0].label.clone());
+    assert_eq!(twice, RecordingError::Label { label: "1".into() }.into());
+}
+
 #[test]
 fn an_experiment_fits_the_model() {
     let recording = World::NULL.draw(1);

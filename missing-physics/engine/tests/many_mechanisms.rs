@@ -76,3 +76,35 @@ fn a_bound_that_nothing_reaches_stays_open() {
     // Where both have to be determined, one that is not rules the mechanism out.
     assert!(answer(&cut(vec![]), &recording).chosen.is_empty());
 }
+
+/// A mechanism that cannot be computed where its fit would begin is not passed over in silence.
+#[test]
+fn a_mechanism_that_cannot_be_fitted_is_named() {
+    let parameters = vec![parameter("offset", 0.0, ANY), parameter("slope", 0.0, ANY)];
+    let law = |s: &[f64], _: &[f64], x: f64| if s[1] > 5.0 { f64::NAN } else { s[0] + s[1] * x };
+    let model =
+        Curve::new(parameters, vec![mechanism("a-slope", vec![1])], law).from(|_| vec![vec![(1, 9.0)]]);
+    let found = answer(&model, &draw(|x| 0.5 * x));
+    let said = found.remarks.iter().any(|r| r.starts_with("a slope could not be fitted: "));
+    assert!(said, "{:?}", found.remarks);
+}
+
+/// Moving air acts through drag, which is free then: drag with moving air is the same set by another name, and is counted once.
+#[test]
+fn sets_that_differ_by_a_companion_alone_are_counted_once() {
+    let parameters = ["offset", "drag", "air"].map(|name| parameter(name, 0.0, ANY)).into();
+    let moving = Mechanism {
+        companions: vec![1],
+        companions_unless: vec!["drag".into()],
+        ..mechanism("moving-air", vec![2])
+    };
+    let law = |s: &[f64], _: &[f64], x: f64| s[0] - s[1] * (x - s[2]).powi(2);
+    let model = Curve::new(parameters, vec![mechanism("drag", vec![1]), moving], law);
+    let found = answer(&model, &draw(|x| 1.0 - 0.1 * x * x));
+    assert_eq!(found.chosen, ["drag"]);
+    let held: Vec<&[String]> = found.sets.iter().map(|s| &s.ids[..]).filter(|ids| !ids.is_empty()).collect();
+    assert_eq!(held.len(), 2, "{held:?}");
+    // Whichever of the two it is, drag is at work.
+    let drag = found.mechanisms.iter().find(|m| m.id == "drag").unwrap();
+    assert!(drag.probability > 0.99, "{}", drag.probability);
+}

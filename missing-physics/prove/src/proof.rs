@@ -1,7 +1,7 @@
 //! The proof as a whole: worlds drawn and sealed, diagnosed, opened and scored.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use missing_physics::observer::{Observer, Progress};
 use rayon::prelude::*;
@@ -138,21 +138,22 @@ fn begin(folder: &Path, plan: &Plan) -> Result<(), ProveError> {
     }
 }
 
-/// Does a piece of work on every world, in parallel; each world keeps what it has done.
-fn each(
+/// Does a piece of work on every world, in parallel; each world keeps what it has done. The observer is told of one at a time.
+fn each<W: Sync>(
     pool: &rayon::ThreadPool,
-    worlds: &[World],
+    worlds: &[W],
     stage: &str,
     observer: &dyn Observer,
-    work: impl Fn(&World) -> Result<(), ProveError> + Sync,
+    work: impl Fn(&W) -> Result<(), ProveError> + Sync,
 ) -> Result<(), ProveError> {
-    let done = AtomicUsize::new(0);
+    let done = Mutex::new(0);
     pool.install(|| {
         worlds.par_iter().try_for_each(|world| {
             work(world)?;
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+            *done += 1;
             let text = format!("{stage}: {done} of {}", worlds.len());
-            report(observer, &text, done as f64 / worlds.len() as f64)
+            report(observer, &text, f64::from(*done) / worlds.len() as f64)
         })
     })
 }
@@ -160,4 +161,43 @@ fn each(
 /// Tells the observer how far the proof is, unless it asks for a stop.
 fn report(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), ProveError> {
     if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(ProveError::Stopped) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use super::*;
+
+    /// Counts calls that overlap, and those that go back.
+    #[derive(Default)]
+    struct Strict {
+        busy: AtomicBool,
+        overlapped: AtomicBool,
+        last: Mutex<f64>,
+    }
+
+    impl Observer for Strict {
+        fn progress(&self, progress: Progress<'_>) -> bool {
+            if self.busy.swap(true, Ordering::SeqCst) {
+                self.overlapped.store(true, Ordering::SeqCst);
+            }
+            std::thread::sleep(std::time::Duration::from_millis(2));
+            let mut last = self.last.lock().unwrap();
+            assert!(progress.done > *last);
+            *last = progress.done;
+            self.busy.store(false, Ordering::SeqCst);
+            true
+        }
+    }
+
+    #[test]
+    fn the_observer_is_told_of_one_world_at_a_time() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
+        let strict = Strict::default();
+        each(&pool, &[(); 64], "nothing", &strict, |()| Ok(())).unwrap();
+        assert!(!strict.overlapped.load(Ordering::SeqCst));
+        assert_eq!(*strict.last.lock().unwrap(), 1.0);
+    }
 }

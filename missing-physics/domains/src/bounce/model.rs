@@ -82,8 +82,11 @@ impl BounceModel {
         &self.nominal
     }
 
-    /// A drop that was not measured, about itself.
+    /// A drop that was not measured, about itself; `None` where it makes no sense, or a drop is called so already.
     pub(super) fn imagined(&mut self, label: &str, drop: &Drop, numbers: &[f64]) -> Option<Run> {
+        if self.drops.contains_key(label) {
+            return None;
+        }
         let linear = Linear::new(drop, &self.nominal);
         self.run(label, linear, drop, numbers, 0)
     }

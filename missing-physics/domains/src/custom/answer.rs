@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use missing_physics::model::LARGEST_PREDICTION;
+
 use crate::recording::{brief, quoted};
 
 /// What is answered: predicted channels, or why there are none.
@@ -30,7 +32,7 @@ pub enum Failure {
 /// Reads a simulator's line that answers question `id` into `out`: the channels one after the other, as many rows of each.
 ///
 /// # Errors
-/// [`Failure::NoPrediction`] where the simulator says that it cannot, or a number is not finite; [`Failure::Fatal`] where the line is no
+/// [`Failure::NoPrediction`] where the simulator says that it cannot, or a number is not finite or above [`LARGEST_PREDICTION`]; [`Failure::Fatal`] where the line is no
 /// such answer, with what came.
 pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) -> Result<(), Failure> {
     let fatal = |why: String| Err(Failure::Fatal(why));
@@ -69,11 +71,19 @@ pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) ->
             ));
         }
         for (row, (out, value)) in out.iter_mut().zip(values).enumerate() {
-            *out = value.filter(|v| v.is_finite()).ok_or_else(|| {
-                Failure::NoPrediction(format!(
-                    "the simulator answered no finite number for {name} at row {row}"
-                ))
-            })?;
+            *out = match value {
+                Some(value) if value.abs() <= LARGEST_PREDICTION => *value,
+                Some(value) if value.is_finite() => {
+                    return Err(Failure::NoPrediction(format!(
+                        "the simulator answered {value:e} for {name} at row {row}, expected at most {LARGEST_PREDICTION:e}"
+                    )));
+                }
+                _ => {
+                    return Err(Failure::NoPrediction(format!(
+                        "the simulator answered no finite number for {name} at row {row}"
+                    )));
+                }
+            };
         }
     }
     Ok(())

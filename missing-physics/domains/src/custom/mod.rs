@@ -116,7 +116,14 @@ impl Domain for Custom {
         let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
         let simulation = match program {
             Some(start) => {
-                Simulation::Program(Box::new(Program::new(Pool::new(start), &inputs, &channels, parameters)))
+                let pool = Pool::new(start);
+                Simulation::Program(Box::new(Program::new(
+                    pool,
+                    &inputs,
+                    &channels,
+                    parameters,
+                    relative_step,
+                )))
             }
             None if !parameters.is_empty() => {
                 let expected = "a program, for the parameters and mechanisms that are declared";

@@ -1,7 +1,9 @@
 //! A model of which the tool knows nothing but its predictions.
 
 use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use missing_physics::data::Run;
 use missing_physics::model::{Extensions, ExternalProgram, Model, PredictError, Quantity, Scope, Spec};
@@ -13,6 +15,9 @@ use crate::memo::{Memo, bits};
 
 /// How many predicted numbers are remembered altogether.
 const MOST_NUMBERS: usize = 16 << 20;
+
+/// Answers to one question are to agree to this part of the step of derivatives.
+const BEYOND_STEP: f64 = 1e-3;
 
 /// Where predictions come from.
 #[derive(Debug)]
@@ -35,8 +40,12 @@ pub(super) struct Program {
     /// Names of the channels, as the program answers them.
     channels: Vec<String>,
     parameters: Names,
-    /// Predictions by run, number of rows, and the bits of the parameters.
-    predictions: Memo<(String, usize, Vec<u64>), Arc<Vec<f64>>>,
+    /// Predictions by run, a hash of its inputs, number of rows, and the bits of the parameters.
+    predictions: Memo<(String, u64, usize, Vec<u64>), Arc<Vec<f64>>>,
+    /// By how much the answers to one question may differ, relative to the largest number of a channel.
+    tolerance: f64,
+    /// Whether a question was asked twice.
+    asked_twice: AtomicBool,
 }
 
 /// The model of the domain `custom`.
@@ -50,10 +59,24 @@ pub(super) struct CustomModel {
 
 impl Program {
     /// A program that is started when it is first asked.
-    pub(super) fn new(pool: Pool, inputs: &[Quantity], channels: &[Quantity], parameters: Names) -> Self {
+    pub(super) fn new(
+        pool: Pool,
+        inputs: &[Quantity],
+        channels: &[Quantity],
+        parameters: Names,
+        relative_step: f64,
+    ) -> Self {
         let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.clone()).collect();
         let (inputs, channels) = (names(inputs), names(channels));
-        Self { pool, inputs, channels, parameters, predictions: Memo::new(MOST_NUMBERS) }
+        Self {
+            pool,
+            inputs,
+            channels,
+            parameters,
+            predictions: Memo::new(MOST_NUMBERS),
+            tolerance: BEYOND_STEP * relative_step,
+            asked_twice: AtomicBool::new(false),
+        }
     }
 
     fn predict(
@@ -68,16 +91,48 @@ impl Program {
             Scope::PerRun => nuisance[*slot],
         };
         let values: Vec<f64> = self.parameters.iter().map(value).collect();
-        self.predictions.get_or((run.label.clone(), rows, bits(&values)), rows, || {
-            let names = self.parameters.iter().map(|(name, ..)| name.as_str());
-            let parameters = names.zip(values.iter().copied()).collect();
-            let inputs =
-                self.inputs.iter().map(String::as_str).zip(run.inputs.iter().map(Vec::as_slice)).collect();
-            let mut out = vec![0.0; rows];
-            self.pool.predict(&run.label, parameters, inputs, &self.channels, &mut out)?;
+        let asked = (run.label.clone(), hash(&run.inputs), rows, bits(&values));
+        self.predictions.get_or(asked, rows, || {
+            let ask = || {
+                let names = self.parameters.iter().map(|(name, ..)| name.as_str());
+                let parameters = names.zip(values.iter().copied()).collect();
+                let columns = run.inputs.iter().map(Vec::as_slice);
+                let inputs = self.inputs.iter().map(String::as_str).zip(columns).collect();
+                let mut out = vec![0.0; rows];
+                self.pool.predict(&run.label, parameters, inputs, &self.channels, &mut out).map(|()| out)
+            };
+            let out = ask()?;
+            if !self.asked_twice.swap(true, Ordering::SeqCst) {
+                self.same(&out, &ask()?).map_err(|why| self.pool.give_up(why))?;
+            }
             Ok(Arc::new(out))
         })
     }
+
+    /// Two answers to one question are one; or how they differ.
+    fn same(&self, first: &[f64], second: &[f64]) -> Result<(), String> {
+        let rows = (first.len() / self.channels.len().max(1)).max(1);
+        let columns = first.chunks(rows).zip(second.chunks(rows)).zip(&self.channels);
+        for ((first, second), name) in columns {
+            let largest = first.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            let apart = |(a, b): (&f64, &f64)| (a - b).abs() > self.tolerance * largest;
+            if let Some(row) = first.iter().zip(second).position(apart) {
+                return Err(format!(
+                    "the simulator answered one question twice, with {} and with {} for {name} at row {row}, expected \
+                     the same answer: seed its random numbers, keep nothing from question to question",
+                    first[row], second[row]
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Tells a run's inputs from another's that has its label.
+fn hash(inputs: &[Vec<f64>]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    inputs.iter().for_each(|column| bits(column).hash(&mut hasher));
+    hasher.finish()
 }
 
 impl Model for CustomModel {

@@ -103,8 +103,22 @@ impl Pool {
             _ => state.idle.push(process),
         }
         drop(state);
-        self.freed.notify_one();
+        if matches!(answer, Err(Failure::Fatal(_))) {
+            // There will be no answer any more: nobody has anything to wait for.
+            self.freed.notify_all();
+        } else {
+            self.freed.notify_one();
+        }
         answer
+    }
+
+    /// No simulator is asked any more, for this reason.
+    pub(super) fn give_up(&self, why: String) -> Failure {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let why = state.fault.get_or_insert(why).clone();
+        drop(state);
+        self.freed.notify_all();
+        Failure::Fatal(why)
     }
 
     /// A simulator that is idle, or a new one, or the first to be free; with the number of the question.
@@ -127,6 +141,7 @@ impl Pool {
                     }
                     Err(why) => {
                         state.fault = Some(why.clone());
+                        self.freed.notify_all();
                         Err(Failure::Fatal(why))
                     }
                 };
@@ -314,5 +329,35 @@ impl Drop for Process {
             let _ = self.child.wait();
         }
         running().retain(|id| *id != self.child.id());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use super::*;
+
+    /// The only simulator there may be dies while many wait for it: each of them is told.
+    #[test]
+    fn a_simulator_that_dies_leaves_nobody_waiting() {
+        let script = "read l; sleep 0.3; exit 1";
+        let pool = Arc::new(Pool::new(Start {
+            command: ["sh", "-c", script].map(str::to_owned).into(),
+            folder: std::env::temp_dir(),
+            limit: Duration::from_secs(60),
+            processes: 1,
+        }));
+        let (done, all) = channel();
+        for _ in 0..16 {
+            let (pool, done) = (Arc::clone(&pool), done.clone());
+            std::thread::spawn(move || {
+                let asked = pool.predict("a", BTreeMap::new(), BTreeMap::new(), &[], &mut []);
+                let _ = done.send(asked);
+            });
+        }
+        for _ in 0..16 {
+            let told = all.recv_timeout(Duration::from_secs(20)).unwrap();
+            assert!(matches!(told, Err(Failure::Fatal(_))));
+        }
     }
 }

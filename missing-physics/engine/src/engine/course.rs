@@ -20,7 +20,7 @@ use crate::selection::confusion::confusion;
 use crate::selection::held_out::held_out;
 use crate::selection::main_cause::{Judge, MainCause};
 use crate::selection::ranking::{Best, Ranking, clearly};
-use crate::selection::search::search;
+use crate::selection::search::{Searched, search};
 
 /// Tells the observer of a step; an error where it stops the work.
 pub(super) fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseError> {
@@ -70,7 +70,7 @@ impl Course<'_> {
             diagnosis.limits = limits(problem, rule, baseline);
             return Ok(diagnosis);
         }
-        let mut ranking = self.compare()?;
+        let (mut ranking, unfitted) = self.compare()?;
         self.tell("adequacy of the best explanation", 0.0)?;
         let best = ranking.best(self.options.alpha, |c, stream| self.test(c, stream))?;
         self.tell("predicting unseen data", 0.0)?;
@@ -111,6 +111,7 @@ impl Course<'_> {
             }
         };
         let explained = explained.filter(|_| diagnosis.verdict != Verdict::Partly);
+        diagnosis.remarks.extend(answer.unfitted(&unfitted));
         diagnosis.sets = answer.sets(&ranking, best.as_ref());
         let sigma = match explained {
             Some(chosen) => ranking.at(chosen.at).fit.noise.sigma.clone(),
@@ -126,8 +127,8 @@ impl Course<'_> {
         answer.errors(&self.least_squares.fit, &held_out(&self.begun.problem, self.least_squares)?)
     }
 
-    /// Every set of mechanisms worth looking at, fitted.
-    fn compare(&self) -> Result<Ranking, DiagnoseError> {
+    /// Every set of mechanisms worth looking at, fitted; and mechanisms that could not be, with the reason.
+    fn compare(&self) -> Result<(Ranking, Vec<(usize, PredictError)>), DiagnoseError> {
         const STAGE: &str = "comparing mechanisms";
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell(STAGE, 0.0)?;
@@ -135,8 +136,9 @@ impl Course<'_> {
         let among = candidate(problem, &competing, &[], &[], &baseline.fit, &[])?;
         let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
         let progress = |done| self.observer.progress(Progress { stage: STAGE, done });
-        let all = search(problem, &competing, among, &everything, &progress).ok_or(DiagnoseError::Stopped)?;
-        Ok(Ranking::new(all, held_out(problem, baseline)?))
+        let Searched { all, unfitted } =
+            search(problem, &competing, among, &everything, &progress).ok_or(DiagnoseError::Stopped)?;
+        Ok((Ranking::new(all, held_out(problem, baseline)?), unfitted))
     }
 
     /// A set takes away nearly all of the misfit, and something is left.

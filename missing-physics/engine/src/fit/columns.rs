@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::linalg::gram;
-use crate::model::PredictError;
+use crate::model::{LARGEST_PREDICTION, PredictError};
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
@@ -40,8 +40,10 @@ pub(crate) fn whitened_columns(
         &mut out,
         &mut jacobian,
     )?;
-    if let Some(bad) = out.iter().chain(&jacobian).find(|v| !v.is_finite()) {
-        return Err(PredictError { run: data.label.clone(), reason: format!("the prediction holds {bad}") });
+    let large = out.iter().find(|v| !(v.abs() <= LARGEST_PREDICTION));
+    if let Some(bad) = large.or_else(|| jacobian.iter().find(|v| !v.is_finite())) {
+        let reason = format!("the prediction holds {bad:e}, expected at most {LARGEST_PREDICTION:e}");
+        return Err(PredictError { run: data.label.clone(), reason });
     }
     let mut columns = vec![Vec::with_capacity(rows); free + 1];
     for channel in 0..problem.channels() {

@@ -10,7 +10,7 @@ mod spec;
 pub use crate::quantity::Quantity;
 pub use builder::{ParameterRef, SpecBuilder, UNBOUNDED};
 pub use check::SpecError;
-pub use error::PredictError;
+pub use error::{LARGEST_PREDICTION, PredictError};
 pub use extensions::{CoupledRows, ErrorModel, Extensions, ExternalProgram, JointLimits, MultimodalModel};
 pub use simulation::{Experiment, Model, finite_differences};
 pub use spec::{Derived, DerivedPerRun, Mechanism, OfParameters, OfRun, Over, Parameter, Scope, Spec, Term};

@@ -33,7 +33,7 @@ pub(crate) fn evidence(
     // Each free parameter's prior belongs to the first mechanism or term that frees it.
     let mut left = added.clone();
     let spec = problem.spec();
-    for mechanism in set.iter().map(|&m| &spec.mechanisms[m]) {
+    for mechanism in problem.at_work(set).into_iter().map(|m| &spec.mechanisms[m]) {
         let frees: Vec<usize> = mechanism.parameters.iter().chain(&mechanism.companions).copied().collect();
         evidence.pay(&mut left, &frees, &mechanism.shape_parameters);
     }

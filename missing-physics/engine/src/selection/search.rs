@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::data::Run;
 use crate::estimate::profile::better_top;
 use crate::fit::prediction::residuals;
+use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
 use crate::selection::candidate::{Candidate, Guess, candidate};
@@ -20,15 +21,24 @@ const MOST: usize = 3;
 /// A set that leaves less than this many sigmas of the data's rough part explains them to the noise.
 const NOISE: f64 = 1.05;
 
-/// Tries sets of mechanisms: each alone, then the best ones with one more, to three.
+/// What a search found.
+pub(crate) struct Searched {
+    /// The sets that could be fitted, the baseline first.
+    pub(crate) all: Vec<Candidate>,
+    /// Mechanisms that could not be fitted on their own, and why.
+    pub(crate) unfitted: Vec<(usize, PredictError)>,
+}
+
+/// Tries sets of mechanisms: each alone, then the best ones with one more, to three at work; `None` where `tell` stops it.
 pub(crate) fn search(
     problem: &Problem<'_>,
     rule: &NoiseRule,
     baseline: Candidate,
     allowed: &[usize],
     tell: &(dyn Fn(f64) -> bool + Sync),
-) -> Option<Vec<Candidate>> {
+) -> Option<Searched> {
     let mut all = vec![baseline];
+    let mut unfitted = Vec::new();
     // Where there are many, most would be fitted for nothing.
     let mut screening = (allowed.len() > MANY)
         .then(|| Screening::new(allowed.iter().map(|&m| (m, guesses(problem, &all[0], &[m])))));
@@ -36,17 +46,23 @@ pub(crate) fn search(
     for size in 1..=MOST {
         let wanted = match &mut screening {
             Some(screening) => screened(problem, screening, &all, &layer),
-            None => larger(&all, &layer, allowed),
+            None => larger(problem, &all, &layer, allowed),
         };
-        let fitted: Vec<Candidate> =
-            wanted.par_iter().filter_map(|wanted| fitted(problem, rule, &all, wanted)).collect();
+        let fitted: Vec<Result<Candidate, PredictError>> =
+            wanted.par_iter().map(|wanted| fitted(problem, rule, &all, wanted)).collect();
         if !tell(size as f64 / MOST as f64) {
             return None;
         }
         let before = best_evidence(&all);
-        let first = all.len();
-        all.extend(fitted);
-        let mut order: Vec<usize> = (first..all.len()).filter(|&i| all[i].evidence.is_finite()).collect();
+        for (Wanted { set, .. }, fitted) in wanted.into_iter().zip(fitted) {
+            match (fitted, &set[..]) {
+                (Ok(fitted), _) => all.push(fitted),
+                (Err(why), &[alone]) => unfitted.push((alone, why)),
+                (Err(_), _) => {}
+            }
+        }
+        let of_this_size = |c: &Candidate| problem.at_work(&c.set).len() == size && c.evidence.is_finite();
+        let mut order: Vec<usize> = (0..all.len()).filter(|&i| of_this_size(&all[i])).collect();
         order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
         if size > 1 && best_evidence(&all) <= before {
             break;
@@ -61,7 +77,7 @@ pub(crate) fn search(
         layer = order;
     }
     polish(problem, rule, &mut all);
-    Some(all)
+    Some(Searched { all, unfitted })
 }
 
 /// Whether a set leaves no more than the noise.
@@ -76,11 +92,11 @@ fn down_to_noise(problem: &Problem<'_>, rule: &NoiseRule, candidate: &Candidate)
 }
 
 /// The sets of a layer with one more mechanism each, every set once, and where its parent stands.
-fn larger(all: &[Candidate], layer: &[usize], allowed: &[usize]) -> Vec<Wanted> {
+fn larger(problem: &Problem<'_>, all: &[Candidate], layer: &[usize], allowed: &[usize]) -> Vec<Wanted> {
     let mut wanted = Vec::new();
     for &parent in layer {
         for &m in allowed {
-            want(&mut wanted, all, parent, m, None);
+            want(problem, &mut wanted, all, parent, m, None);
         }
     }
     wanted
@@ -96,7 +112,7 @@ fn screened(
     let mut wanted = Vec::new();
     for &parent in layer {
         for promising in screening.promising(problem, &all[parent]) {
-            want(&mut wanted, all, parent, promising.mechanism, Some(promising.start));
+            want(problem, &mut wanted, all, parent, promising.mechanism, Some(promising.start));
         }
     }
     wanted
@@ -109,15 +125,25 @@ struct Wanted {
     start: Option<Guess>,
 }
 
-/// Adds a parent's set with one more mechanism, unless it has that or the set is wanted already.
-fn want(wanted: &mut Vec<Wanted>, all: &[Candidate], parent: usize, mechanism: usize, start: Option<Guess>) {
+/// Adds a parent's set with one more mechanism, unless it has that, or the set is wanted or fitted already, by this name or another.
+fn want(
+    problem: &Problem<'_>,
+    wanted: &mut Vec<Wanted>,
+    all: &[Candidate],
+    parent: usize,
+    mechanism: usize,
+    start: Option<Guess>,
+) {
     let mut set = all[parent].set.clone();
-    if !set.contains(&mechanism) {
-        set.push(mechanism);
-        set.sort_unstable();
-        if !wanted.iter().any(|w| w.set == set) {
-            wanted.push(Wanted { set, parent, start });
-        }
+    if set.contains(&mechanism) {
+        return;
+    }
+    set.push(mechanism);
+    set.sort_unstable();
+    let at_work = problem.at_work(&set);
+    let mut known = all.iter().map(|c| &c.set).chain(wanted.iter().map(|w| &w.set));
+    if !known.any(|other| problem.at_work(other) == at_work) {
+        wanted.push(Wanted { set, parent, start });
     }
 }
 
@@ -128,17 +154,17 @@ fn fitted(
     rule: &NoiseRule,
     all: &[Candidate],
     Wanted { set, parent, start }: &Wanted,
-) -> Option<Candidate> {
+) -> Result<Candidate, PredictError> {
     let parent = &all[*parent];
     let guesses = start.clone().map_or_else(|| guesses(problem, parent, set), |start| vec![start]);
-    let found = candidate(problem, rule, set, &[], &parent.fit, &guesses).ok();
+    let found = candidate(problem, rule, set, &[], &parent.fit, &guesses);
     if set.len() == 1 || start.is_some() {
         return found;
     }
-    let other = candidate(problem, rule, set, &[], &parent.fit, &[hints(problem, all, set)]).ok();
+    let other = candidate(problem, rule, set, &[], &parent.fit, &[hints(problem, all, set)]);
     match (found, other) {
-        (Some(found), Some(other)) if other.fit.log_likelihood > found.fit.log_likelihood + 1e-6 => {
-            Some(other.in_place_of(found, problem, rule))
+        (Ok(found), Ok(other)) if other.fit.log_likelihood > found.fit.log_likelihood + 1e-6 => {
+            Ok(other.in_place_of(found, problem, rule))
         }
         (found, other) => found.or(other),
     }
