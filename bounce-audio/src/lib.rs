@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+pub mod chain;
 pub mod cup;
 pub mod drop;
 pub mod exact;

@@ -1,4 +1,4 @@
-//! Impacts that were not heard: two flights that were taken for one; and sounds that were none: one flight taken for two.
+//! Impacts that were not heard: two flights that were taken for one.
 
 use crate::quantile::quantile;
 
@@ -51,34 +51,6 @@ pub fn unheard(durations_s: &[f64], restitution: f64, expected_first: Option<f64
     found
 }
 
-/// Which of the sounds at rising times (s) was no impact, of a ball of the given restitution in (0, 1): without it flights shorten as
-/// the ball's do, with it they do not.
-///
-/// Three microphones cannot always tell by its place a sound from above or beyond the table from one on it.
-pub fn extra(times_s: &[f64], restitution: f64) -> Option<usize> {
-    /// Logarithms of ratios of neighbouring flights, off the ball's: as drag and speeds may make them, and as a sound between two
-    /// impacts does.
-    const REGULAR: f64 = 0.1;
-    const BROKEN: f64 = 0.2;
-    /// Sounds without which nothing is regular.
-    const FEWEST: usize = 4;
-    if times_s.len() < FEWEST || !(restitution > 0.0 && restitution < 1.0) {
-        return None;
-    }
-    let worst = |without: Option<usize>| {
-        let rest = times_s.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, t)| *t);
-        let flights: Vec<f64> = rest.clone().zip(rest.skip(1)).map(|(a, b)| b - a).collect();
-        flights.windows(2).map(|w| (w[1] / w[0] / restitution).ln().abs()).fold(0.0, f64::max)
-    };
-    if worst(None) < BROKEN {
-        return None;
-    }
-    // The first and the last stay: without them, what an unheard impact beside them broke would be whole again.
-    let candidates = (1..times_s.len() - 1).map(|i| (worst(Some(i)), i));
-    let (off, which) = candidates.fold((f64::INFINITY, 0), nearer);
-    (off < REGULAR).then_some(which)
-}
-
 fn nearer(best: (f64, usize), next: (f64, usize)) -> (f64, usize) {
     if next.0 < best.0 { next } else { best }
 }
@@ -116,27 +88,6 @@ mod tests {
                     approx::assert_relative_eq!(first, all[at], max_relative = 1e-12);
                     approx::assert_relative_eq!(last, all[at + m], max_relative = 1e-12);
                 }
-            }
-        }
-    }
-
-    #[test]
-    fn a_sound_between_two_impacts_is_found_and_an_unheard_one_is_none() {
-        for e in [0.5, 0.7, 0.85, 0.95] {
-            let mut times = vec![0.0];
-            flights(e, 6).iter().for_each(|t| times.push(times[times.len() - 1] + t));
-            assert_eq!(extra(&times, e), None);
-            for gap in 0..6 {
-                for part in [0.1, 0.3, 0.5, 0.7, 0.9] {
-                    let mut heard = times.clone();
-                    heard.insert(gap + 1, times[gap] + part * (times[gap + 1] - times[gap]));
-                    assert_eq!(extra(&heard, e), Some(gap + 1), "e {e}, gap {gap}, part {part}");
-                }
-            }
-            for unheard in 1..6 {
-                let mut heard = times.clone();
-                heard.remove(unheard);
-                assert_eq!(extra(&heard, e), None, "e {e}, unheard {unheard}");
             }
         }
     }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use bounce_audio::chain::{Candidate, impacts as impacts_of};
 use bounce_audio::hear::{HearSettings, Impact, hear, hear_times};
-use bounce_audio::missed::{extra, typical_restitution};
 use bounce_audio::wav::Sound;
 
 use super::array::Microphones;
@@ -19,8 +19,15 @@ pub(super) struct Listened {
     pub(super) microphones: Microphones,
     /// Hearing's own estimate of its errors: sigma of a typical time (s) and place (m).
     pub(super) estimated: Option<[f64; 2]>,
-    /// Sounds that were taken for none of the ball's, in words.
+    /// How many sounds were taken for none of the ball's, and which, in words.
     pub(super) strays: Vec<String>,
+}
+
+/// What was heard in one file.
+struct Run {
+    impacts: Vec<Impact>,
+    /// When sounds were heard that were no impacts, s.
+    strays: Vec<f64>,
 }
 
 /// Listens to the files of a recording; `None` where it has no sound.
@@ -40,6 +47,7 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
         all.push(impacts_in(&path, microphones.as_deref(), speed, rig)?);
     }
     let strays = take_out(&mut all);
+    let all: Vec<Vec<Impact>> = all.into_iter().map(|run| run.impacts).collect();
     let mut heard: Vec<Heard> =
         all.iter().enumerate().map(|(run, impacts)| drop_of(run, impacts, rig)).collect();
     let microphones = Microphones { places_m: microphones.unwrap_or_default(), speed_of_sound_m_s: speed };
@@ -53,7 +61,7 @@ fn impacts_in(
     microphones: Option<&[[f64; 3]]>,
     speed_m_s: f64,
     rig: &Rig,
-) -> Result<Vec<Impact>, ReadError> {
+) -> Result<Run, ReadError> {
     let open = |why: String| ReadError::Open { file: path.display().to_string(), why };
     let sound = Sound::read(path).map_err(|e| open(e.fault.to_string()))?;
     let settings = HearSettings::default();
@@ -61,7 +69,9 @@ fn impacts_in(
         Some(places) => hear(&sound, places, speed_m_s, &settings),
         None => hear_times(&sound, &settings),
     };
-    let mut impacts = found.map_err(|e| open(e.to_string()))?.impacts;
+    let found = found.map_err(|e| open(e.to_string()))?;
+    let strays = found.strays.iter().map(|stray| stray.t_s).collect();
+    let mut impacts = found.impacts;
     impacts.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     let fewest = rig.fewest();
     if impacts.len() < fewest {
@@ -72,26 +82,39 @@ fn impacts_in(
             expected: format!("at least {fewest} impacts"),
         });
     }
-    Ok(impacts)
+    Ok(Run { impacts, strays })
 }
 
 /// Takes out sounds that fit no bounce, and says which.
-fn take_out(all: &mut [Vec<Impact>]) -> Vec<String> {
-    let times = |impacts: &[Impact]| impacts.iter().map(|i| i.t_s).collect::<Vec<f64>>();
-    let flights: Vec<Vec<f64>> =
-        all.iter().map(|run| times(run).windows(2).map(|w| w[1] - w[0]).collect()).collect();
-    let Some(restitution) = typical_restitution(flights.iter().map(Vec::as_slice)) else { return Vec::new() };
-    let mut strays = Vec::new();
-    for (run, impacts) in all.iter_mut().enumerate() {
-        while let Some(which) = extra(&times(impacts), restitution) {
-            let t_s = impacts.remove(which).t_s;
-            strays.push(format!(
-                "a sound {t_s:.3} s into run {} fits no bounce: taken for one from elsewhere",
-                run + 1
-            ));
+fn take_out(all: &mut [Run]) -> Vec<String> {
+    let candidate = |i: &Impact| Candidate { t_s: i.t_s, loudness: i.amplitude_sigmas.max(1.0).ln() };
+    let candidates: Vec<Vec<Candidate>> =
+        all.iter().map(|run| run.impacts.iter().map(candidate).collect()).collect();
+    let sounds: usize = all.iter().map(|run| run.impacts.len() + run.strays.len()).sum();
+    let mut taken = Vec::new();
+    for ((number, run), kept) in all.iter_mut().enumerate().zip(impacts_of(&candidates)) {
+        for (i, impact) in std::mem::take(&mut run.impacts).into_iter().enumerate() {
+            if kept.contains(&i) {
+                run.impacts.push(impact);
+            } else {
+                run.strays.push(impact.t_s);
+            }
+        }
+        run.strays.sort_by(f64::total_cmp);
+        let times: Vec<String> = run.strays.iter().map(|t_s| format!("{t_s:.3} s")).collect();
+        if !times.is_empty() {
+            taken.push(format!("{} into run {}", times.join(", "), number + 1));
         }
     }
-    strays
+    let count: usize = all.iter().map(|run| run.strays.len()).sum();
+    if count == 0 {
+        return Vec::new();
+    }
+    vec![format!(
+        "{count} of {sounds} sounds fit no bounce and were left out: {} (an impact of the ball follows the one before it by a \
+         steady part of the time between those)",
+        taken.join("; ")
+    )]
 }
 
 /// What was heard in a file; runs are counted from 1, in the order of the files.
