@@ -107,7 +107,7 @@ impl SloshModel {
         mode.read(times, [nuisance[p.cos.slot], nuisance[p.sin.slot]], out).map_err(|e| e.to_string())
     }
 
-    /// What is added to the first mode's reading: other oscillations, and the sensor's transient.
+    /// What is added to the first mode's reading: other oscillations, and the sensor's zero and transient.
     fn add_others(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
         let (p, cylinder) = (&self.layout, self.cylinder(run));
         let times = run.inputs.first().ok_or("there is no column of times")?;
@@ -118,6 +118,8 @@ impl SloshModel {
             cylinder.angular_frequency_rad_s(1, 0.0) / self.cylinders[0].angular_frequency_rad_s(1, 0.0);
         let second = mode(moved * shared[p.second_omega.slot], shared[p.second_damping.slot]);
         let arm = mode(shared[p.arm_omega.slot], shared[p.arm_damping.slot]);
+        let zero = nuisance[p.zero.slot];
+        out.iter_mut().for_each(|y| *y += zero);
         let mut more = Vec::new();
         for (mode, cos, sin) in [(second, p.second_cos, p.second_sin), (arm, p.arm_cos, p.arm_sin)] {
             let start = [nuisance[cos.slot], nuisance[sin.slot]];

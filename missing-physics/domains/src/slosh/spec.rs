@@ -22,6 +22,8 @@ pub(super) struct Layout {
     pub(super) lag: ParameterRef,
     pub(super) cos: ParameterRef,
     pub(super) sin: ParameterRef,
+    /// What the sensor reads at rest.
+    pub(super) zero: ParameterRef,
     pub(super) second_cos: ParameterRef,
     pub(super) second_sin: ParameterRef,
     pub(super) arm_cos: ParameterRef,
@@ -67,7 +69,7 @@ pub(super) fn build(
     let mut p = Layout::default();
     let (unit, suffix) = (setup.channel.unit(), setup.channel.suffix());
     let wave = Wave { cylinder, omega: cylinder.angular_frequency_rad_s(0, 0.0), largest, unit, suffix };
-    b.baseline("the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase");
+    b.baseline("the first antisymmetric mode of an upright cylinder with linear viscous damping; every run has its own amplitude and phase, and its sensor a zero of its own");
     let thickest = cylinder.kinematic_viscosity_m2_s(0.9);
     p.viscosity = b.shared(
         "kinematic_viscosity_m2_s",
@@ -78,6 +80,7 @@ pub(super) fn build(
     );
     p.cos = b.nuisance(&format!("cos_{suffix}"), unit, UNBOUNDED, largest);
     p.sin = b.nuisance(&format!("sin_{suffix}"), unit, UNBOUNDED, largest);
+    p.zero = b.nuisance(&format!("zero_{suffix}"), unit, UNBOUNDED, SMALL * largest);
     surface_tension(&mut b, &mut p, setup.density_kg_m3);
     nonlinear_frequency(&mut b, &mut p, &wave);
     damping(&mut b, &mut p, &wave);
@@ -185,7 +188,9 @@ fn damping(b: &mut SpecBuilder, p: &mut Layout, wave: &Wave<'_>) {
 /// The sensor's time constant, and what is left of its reading at the start of each run.
 fn sensor_parameters(b: &mut SpecBuilder, p: &mut Layout, wave: &Wave<'_>) {
     let &Wave { omega, largest, unit, suffix, .. } = wave;
-    p.lag = b.shared("tau_s", "s", (1.0 / omega).clamp(1e-3, 100.0), [1e-3, 100.0], 1.0 / omega);
+    // A sensor that follows more slowly than the wave swings shows next to nothing of it.
+    let period = std::f64::consts::TAU / omega;
+    p.lag = b.shared("tau_s", "s", 1.0 / omega, [1e-3 * period, period], 1.0 / omega);
     p.transient = b.nuisance(&format!("transient_{suffix}"), unit, UNBOUNDED, SMALL * largest);
 }
 
