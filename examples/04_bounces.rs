@@ -4,9 +4,6 @@
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use missing_physics::diagnosis::{Diagnosis, Verdict};
-use missing_physics::engine::{Options, diagnose};
-use missing_physics::observer::Silent;
-use rayon::prelude::*;
 use worlds::physics::bounce::{BounceWorld, Effects};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -32,10 +29,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     for (k, (name, count, world)) in kinds.iter().enumerate() {
         let count: u64 = if examples::small() { 1 } else { *count };
-        let answers: Result<Vec<Diagnosis>, String> =
-            (0..count).into_par_iter().map(|i| diagnosed(world, 4_000_000 + 1000 * k as u64 + i)).collect();
+        let files = |seed| {
+            let files = ["recording.toml", "data.csv"].into_iter().zip(world.files(seed));
+            files.map(|(name, text)| (name.to_owned(), text.into_bytes())).collect()
+        };
+        let answers = examples::diagnose_files(&files, count, 4_000_000 + 1000 * k as u64, 499)?;
         let mut tally = [0; 5];
-        answers?.iter().for_each(|answer| tally[kind(answer, name)] += 1);
+        answers.iter().flatten().for_each(|answer| tally[kind(answer, name)] += 1);
         let [adequate, named, rivals, another, unexplained] = tally;
         println!("{name:32} {count:>6} {adequate:>8} {named:>6} {rivals:>12} {another:>8} {unexplained:>11}");
     }
@@ -57,15 +57,4 @@ fn kind(answer: &Diagnosis, hidden: &str) -> usize {
         Verdict::Explained | Verdict::Partly | Verdict::Ambiguous => 3,
         Verdict::Unexplained => 4,
     }
-}
-
-/// The tool's answer on a drawn world.
-fn diagnosed(world: &BounceWorld, seed: u64) -> Result<Diagnosis, String> {
-    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
-    for (name, text) in ["recording.toml", "data.csv"].iter().zip(world.files(seed)) {
-        std::fs::write(folder.path().join(name), text).map_err(|e| e.to_string())?;
-    }
-    let (_, loaded) = missing_physics_domains::load(folder.path()).map_err(|e| e.to_string())?;
-    let options = Options { seed, replicates: 499, ..Options::default() };
-    diagnose(&*loaded.model, &loaded.recording, &[], &options, &Silent).map_err(|e| e.to_string())
 }

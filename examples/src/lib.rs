@@ -79,3 +79,29 @@ pub fn diagnose_many(
         })
         .collect()
 }
+
+/// Diagnoses `count` recordings that are made from seeds as files, in parallel; in order, `None` where a recording is refused.
+///
+/// # Errors
+/// What went wrong, where it was not the recording.
+pub fn diagnose_files(
+    files: &(dyn Fn(u64) -> Vec<(String, Vec<u8>)> + Sync),
+    count: u64,
+    first_seed: u64,
+    replicates: usize,
+) -> Result<Vec<Option<Diagnosis>>, String> {
+    let one = |seed: u64| {
+        let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+        for (name, contents) in files(seed) {
+            std::fs::write(folder.path().join(name), contents).map_err(|e| e.to_string())?;
+        }
+        let Ok((_, loaded)) = missing_physics_domains::load(folder.path()) else { return Ok(None) };
+        let options = Options { seed, replicates, ..Options::default() };
+        match diagnose(&*loaded.model, &loaded.recording, &[], &options, &Silent) {
+            Ok(diagnosis) => Ok(Some(diagnosis)),
+            Err(DiagnoseError::TooFewRows { .. }) => Ok(None),
+            Err(error) => Err(error.to_string()),
+        }
+    };
+    (first_seed..first_seed + count).into_par_iter().map(one).collect()
+}

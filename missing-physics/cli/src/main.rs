@@ -149,7 +149,7 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
         Command::Diagnose { folders, json, html, svg, write_model, seed, threads, alpha, allow_command } => {
             folders.iter().try_for_each(|folder| permit(folder, allow_command))?;
             on_interrupt("nothing was written".into());
-            let options = Options { alpha, seed, ..Options::default() };
+            let options = Options { seed, ..Options::with_alpha(alpha) };
             let threads = useful(threads);
             let many = commands::into_folders(&folders, html.as_deref());
             let folder = folders.first().cloned().unwrap_or_default();

@@ -98,7 +98,9 @@ impl Answer<'_> {
         }
         let (rows, unknowns) = self.problem.size();
         if rows < 3 * unknowns {
-            remarks.push(format!("few data: {rows} measured values for {unknowns} unknowns"));
+            remarks.push(format!(
+                "few data: {rows} measured values for {unknowns} unknowns: an effect has to be large to show, and what does not show is not ruled out"
+            ));
         }
         remarks
     }
@@ -121,17 +123,20 @@ impl Answer<'_> {
         (0..self.problem.channels())
             .map(|c| {
                 let shape = self.problem.family.shape(fit.noise.shape[c]);
+                // Errors that accumulate are correlated over the whole run.
+                let rows = self.problem.count(c) as f64 / self.problem.rows.len().max(1) as f64;
+                let (share, length) = shape.correlation(rows);
                 ChannelNoise {
                     channel: recording.channels[c].name.clone(),
-                    sigma: fit.noise.sigma[c],
+                    sigma: fit.noise.sigma[c] * shape.accumulated.hypot(1.0),
                     source: match (self.rule.fixed_sigma[c], recording.calibration.get(c)) {
                         (None, _) => NoiseSource::Differences,
                         (Some(_), Some(Some(_))) => NoiseSource::Calibration,
                         (Some(_), _) => NoiseSource::Replicates,
                     },
-                    correlated_share: shape.correlated,
-                    correlation_rows: shape.length_steps,
-                    correlation_length: shape.length_steps * self.problem.step,
+                    correlated_share: share,
+                    correlation_rows: length,
+                    correlation_length: length * self.problem.step,
                 }
             })
             .collect()

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use crate::data::{Recording, Run};
 use crate::model::{Model, Scope, Spec};
 use crate::noise::family::Family;
-use crate::noise::process::{Whitener, rough_sigma};
+use crate::noise::process::{Shape, Whitener, rough_sigma};
 use crate::statistics::median;
 
 /// A model and a recording, with everything about the rows that no fit changes.
@@ -17,6 +17,9 @@ pub(crate) struct Problem<'a> {
     pub(crate) rows: Vec<RunRows>,
     /// Median step between rows, in the noise variable's unit.
     pub(crate) step: f64,
+    /// Root mean square of the errors that accumulate over all rows of a channel for a unit step, in the channel's unit; `None` where the
+    /// model knows of none.
+    pub(crate) accumulated: Vec<Option<f64>>,
     /// Whether rows are so unevenly spaced that noise along the noise variable and noise from row to row differ.
     pub(crate) uneven: bool,
     pub(crate) slots: Vec<usize>,
@@ -90,6 +93,16 @@ impl<'a> Problem<'a> {
             let whiteners = valid.iter().map(|_| empty(family.len().div_ceil(PAGE))).collect();
             rows.push(RunRows { valid, positions, whiteners });
         }
+        let accumulated = (0..recording.channels.len())
+            .map(|channel| {
+                let of_run = |run: &Run| accumulated_errors(model, run, channel);
+                let squares = recording.runs.iter().map(of_run).collect::<Option<Vec<_>>>()?;
+                let squares: Vec<f64> =
+                    squares.iter().flatten().map(|row| row.iter().map(|v| v * v).sum()).collect();
+                let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+                (mean > 0.0).then(|| mean.sqrt())
+            })
+            .collect();
         let step = median(&mut gaps).unwrap_or(1.0);
         let odd = gaps.iter().filter(|g| (*g / step - 1.0).abs() > 0.2).count();
         let spec = model.spec();
@@ -116,6 +129,7 @@ impl<'a> Problem<'a> {
             nuisance,
             nuisance_start,
             step,
+            accumulated,
             uneven: 10 * odd > gaps.len(),
             family,
             rows,
@@ -128,6 +142,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn with(&self, recording: Recording) -> Problem<'a> {
         let mut other = Problem::new(self.model, recording);
         other.step = self.step;
+        other.accumulated.clone_from(&self.accumulated);
         other
     }
 
@@ -174,13 +189,26 @@ impl<'a> Problem<'a> {
         let page = rows.whiteners[channel][shape / PAGE].get_or_init(|| empty(PAGE).into_boxed_slice());
         page[shape % PAGE].get_or_init(|| {
             let shape = self.family.shape(shape);
-            if shape.by_row {
+            if shape.accumulated > 0.0 {
+                self.accumulating(run, channel, shape.accumulated)
+            } else if shape.by_row {
                 let numbers: Vec<f64> = rows.valid[channel].iter().map(|&i| i as f64).collect();
                 Whitener::new(&numbers, 1.0, shape)
             } else {
                 Whitener::new(&rows.positions[channel], self.step, shape)
             }
         })
+    }
+
+    /// The whitener of errors that accumulate, so many times the white ones; of white ones alone where the model says nothing of a run.
+    fn accumulating(&self, run: usize, channel: usize, size: f64) -> Whitener {
+        let rows = &self.rows[run].valid[channel];
+        let known = accumulated_errors(self.model, &self.recording.runs[run], channel);
+        let (Some(errors), Some(unit)) = (known, self.accumulated[channel]) else {
+            return Whitener::new(&self.rows[run].positions[channel], self.step, Shape::WHITE);
+        };
+        let scaled = |&i: &usize| errors[i].iter().map(|v| size * v / unit).collect();
+        Whitener::of_accumulated(&rows.iter().map(scaled).collect::<Vec<Vec<f64>>>())
     }
 
     /// Picks the measured rows of a channel out of a column over all rows.
@@ -264,6 +292,15 @@ impl<'a> Problem<'a> {
         let (nuisance, added_nuisance) = pick(Scope::PerRun);
         Selection { shared, nuisance, added_shared, added_nuisance }
     }
+}
+
+/// What a unit of each of a run's random steps adds to each of its rows, as the model says; `None` where it says nothing, or of other
+/// rows than there are.
+fn accumulated_errors(model: &dyn Model, run: &Run, channel: usize) -> Option<Vec<Vec<f64>>> {
+    let errors = model.extensions().errors?.accumulated(run, channel)?;
+    let steps = errors.first().map_or(0, Vec::len);
+    let sound = |row: &Vec<f64>| row.len() == steps && row.iter().all(|v| v.is_finite());
+    (errors.len() == run.len() && errors.iter().all(sound)).then_some(errors)
 }
 
 /// The noise variable of a run: the recording's, or the number of the row.

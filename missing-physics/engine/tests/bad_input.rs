@@ -280,3 +280,15 @@ fn stochastic_models_check_the_specification_too() {
     let refused = Scores::put(Flat(crossed().0), &runs, 10, 1).err();
     assert!(matches!(refused, Some(SyntheticError::Spec(SpecError::Bounds { .. }))));
 }
+
+#[test]
+fn a_rate_that_no_p_value_reaches_is_refused_or_gets_more_replicates() {
+    let recording = World::NULL.draw(1);
+    let rare = Options { alpha: 1e-4, replicates: 999, ..Options::default() };
+    let refused = diagnose(&Ball::default(), &recording, &[], &rare, &Silent).unwrap_err();
+    assert!(matches!(refused, DiagnoseError::Option { name: "alpha", .. }), "{refused}");
+    assert_eq!(Options::with_alpha(0.05), Options::default());
+    assert_eq!(Options::with_alpha(0.01).replicates, 4999);
+    let refused = diagnose(&Ball::default(), &recording, &[], &Options::with_alpha(1e-6), &Silent);
+    assert!(matches!(refused, Err(DiagnoseError::Option { name: "alpha", .. })));
+}

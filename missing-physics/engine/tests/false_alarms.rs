@@ -71,3 +71,12 @@ fn one_reading_in_a_hundred_is_wild() {
 fn many_rows_of_coloured_noise() {
     holds_in(World { rows: 1000, phi: 0.5, ..World::NULL }, 40);
 }
+
+/// The least rows that are accepted, and some more: one run of a free fall with two unknowns and an unknown noise.
+#[test]
+fn one_run_of_a_few_rows() {
+    for rows in [4, 5, 6, 8, 12] {
+        println!("{rows} rows");
+        holds(World { runs: 1, rows, ..World::NULL });
+    }
+}

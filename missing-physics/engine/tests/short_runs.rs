@@ -27,9 +27,8 @@ impl Model for Level {
     }
 }
 
-/// Two or three rows hold no oscillation: what is wrong with them is said without one.
-#[test]
-fn no_oscillation_is_looked_for_in_a_few_rows() {
+/// The specification of one level, in m.
+fn level() -> Spec {
     let level = Parameter {
         name: "level".into(),
         unit: "m".into(),
@@ -39,7 +38,13 @@ fn no_oscillation_is_looked_for_in_a_few_rows() {
         upper: 10.0,
         scale: 1.0,
     };
-    let spec = Spec { baseline: "a level".into(), parameters: vec![level], ..Spec::default() };
+    Spec { baseline: "a level".into(), parameters: vec![level], ..Spec::default() }
+}
+
+/// Two or three rows hold no oscillation: what is wrong with them is said without one.
+#[test]
+fn no_oscillation_is_looked_for_in_a_few_rows() {
+    let spec = level();
     for rows in [2, 3] {
         let run = |r: u32| {
             let reading = |i: u32| 0.1 * f64::from(r * r % 7) + 0.001 * f64::from((5 * r + 3 * i) % 11);
@@ -63,4 +68,33 @@ fn no_oscillation_is_looked_for_in_a_few_rows() {
         assert_eq!(answer.verdict, Verdict::Unexplained);
         assert!(answer.law.is_none(), "{:?}", answer.law);
     }
+}
+
+/// Data that are the simulation, printed with five digits: sawteeth of rounding are no physics.
+#[test]
+fn what_equals_its_baseline_to_the_last_digit_is_adequate() {
+    let spec = level();
+    let answer = |digit: f64, drift: f64| {
+        let times: Vec<f64> = (0..60).map(f64::from).collect();
+        let read = |t: &f64| if digit > 0.0 { (drift * t / digit).round() * digit } else { drift * t };
+        let column: Vec<f64> = times.iter().map(read).collect();
+        let run = Run { label: "1".into(), inputs: vec![times], outputs: vec![column], kind: 0 };
+        let recording = Recording {
+            channels: vec![Quantity::new("y_m", "m")],
+            variables: vec![Quantity::new("t_s", "s")],
+            runs: vec![run],
+            noise_along: Some(0),
+            calibration: vec![None],
+            resolution: vec![digit],
+        };
+        let options = Options { replicates: 99, ..Options::default() };
+        diagnose(&Level(spec.clone()), &recording, &[], &options, &Silent).unwrap()
+    };
+    // All is rounded to zero; or there is nothing to round.
+    for (digit, drift) in [(1e-5, 8e-8), (0.0, 0.0)] {
+        let found = answer(digit, drift);
+        assert_eq!((found.verdict, found.p_value), (Verdict::Adequate, 1.0));
+    }
+    // One digit more, and there is something to look at.
+    assert!(answer(1e-6, 8e-8).p_value < 1.0);
 }

@@ -56,6 +56,10 @@ pub struct BounceWorld {
     pub noise: [f64; 2],
     /// Whether the header states the noise.
     pub noise_known: bool,
+    /// Whether places are recorded beside times.
+    pub placed: bool,
+    /// One sigma of the restitution's logarithm from impact to impact.
+    pub restitution_scatter: f64,
     /// Where the softer side of the table begins, if it has one, along x in m; balls are let go above 0.
     pub soft_from_m: f64,
     /// The effects at work.
@@ -75,6 +79,8 @@ impl BounceWorld {
             release_m_s: 0.05,
             noise: [3e-5, 6e-3],
             noise_known: true,
+            placed: true,
+            restitution_scatter: 0.0,
             soft_from_m: 0.02,
             effects: Effects::default(),
         }
@@ -91,13 +97,17 @@ impl BounceWorld {
         let mut header = String::from("format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n");
         if self.noise_known {
             let [time, place] = self.noise;
-            let _ = write!(header, "\n[noise]\nt_s = {time}\nx_m = {place}\ny_m = {place}\n");
+            let _ = write!(header, "\n[noise]\nt_s = {time}\n");
+            if self.placed {
+                let _ = write!(header, "x_m = {place}\ny_m = {place}\n");
+            }
         }
         if self.height_known {
             let _ = write!(header, "\n[rig]\ndrop_height_m = {}\n", self.height_m);
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut data = String::from("run,bounce,t_s,x_m,y_m\n");
+        let mut data =
+            String::from(if self.placed { "run,bounce,t_s,x_m,y_m\n" } else { "run,bounce,t_s\n" });
         for run in 1..=self.runs {
             let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
             let unheard = self.unheard(&mut rng);
@@ -106,7 +116,8 @@ impl BounceWorld {
             let heard = self.drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
             for (number, (_, [t, x, y])) in kept.enumerate() {
-                let _ = writeln!(data, "{run},{},{t:.7},{x:.5},{y:.5}", number + 1);
+                let _ = write!(data, "{run},{},{t:.7}", number + 1);
+                let _ = if self.placed { writeln!(data, ",{x:.5},{y:.5}") } else { writeln!(data) };
             }
         }
         ([header, data], runs_unheard)
@@ -192,6 +203,10 @@ impl BounceWorld {
         let into = v[0] * up[0] + v[1] * up[1] + v[2] * up[2];
         let mirrored: Vec3 =
             std::array::from_fn(|i| (1.0 - e.friction) * (v[i] - into * up[i]) - into * up[i]);
+        if self.restitution_scatter > 0.0 {
+            let off: f64 = StandardNormal.sample(rng);
+            restitution *= (self.restitution_scatter * off).exp();
+        }
         let size = restitution * norm(&mirrored);
         von_mises_fisher(&unit(&mirrored), self.kappa, rng).map(|x| size * x)
     }

@@ -57,10 +57,8 @@ impl Drops {
         let spare = self.microphones.spare();
         let placed = self.setup.placed;
         let channels = if placed { placed_channels(spare) } else { timed_channels() };
-        let mut calibration = vec![None; channels.len()];
-        if placed {
-            calibration[0] = self.calibration.time_s;
-        }
+        let calibration =
+            if placed { self.placed_calibration(channels.len()) } else { vec![None; channels.len()] };
         let run = |h: &Heard| {
             let rows = if placed { Rows::of(&h.drop, spare).heard } else { 0..h.numbers.len() };
             RunContents::new(&h.label, &h.numbers[rows])
@@ -72,6 +70,14 @@ impl Drops {
         };
         let variable = Quantity::new("bounce", "");
         Contents { channels, calibration, variable, runs: self.heard.iter().map(run).collect(), spec }
+    }
+
+    /// The sigma of each channel, where it was calibrated. What directions scatter beyond it is judged before, and weighed with it.
+    fn placed_calibration(&self, channels: usize) -> Vec<Option<f64>> {
+        let Calibration { time_s, place_m: [x, y], .. } = self.calibration;
+        let mut calibration = vec![time_s, x.or(y), y.or(x)];
+        calibration.resize(channels, None);
+        calibration
     }
 
     /// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
@@ -103,9 +109,7 @@ impl Drops {
             runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, COPIES).ok_or_else(|| senseless(h))?);
         }
         let channels = placed_channels(self.microphones.spare());
-        let mut calibration = vec![None; channels.len()];
-        // A direction's scatter is the ball's own: only the clock's noise is as it was calibrated.
-        calibration[0] = self.calibration.time_s;
+        let calibration = self.placed_calibration(channels.len());
         let recording = Recording {
             resolution: vec![0.0; channels.len()],
             calibration,
@@ -133,12 +137,13 @@ impl Drops {
 
     /// Times alone.
     fn timed(&self) -> Loaded {
-        let model = TimesModel::new(
+        let mut model = TimesModel::new(
             self.setup,
             self.restitution,
             self.rig.drop_height_m,
             self.calibration.time_s.is_some(),
         );
+        self.heard.iter().for_each(|h| model.heard(&h.label, &h.drop, self.restitution));
         let times: Vec<f64> = self.heard.iter().flat_map(|h| h.drop.times_s.iter().copied()).collect();
         // Directions scatter the times beyond the clock's noise, so that a calibrated clock is the least there is.
         let least = self.calibration.time_s.map_or(0.0, |sigma| sigma * 12f64.sqrt());
@@ -196,12 +201,29 @@ fn mark_unheard(heard: &mut [Heard], rig: &Rig) -> (f64, usize) {
         .clamp(LIKELY_RESTITUTION[0], LIKELY_RESTITUTION[1]);
     let mut missed = 0;
     for (h, durations) in heard.iter_mut().zip(&durations) {
+        // A sound begins anywhere: the first impact in it need not be where the fall ended.
+        let listened = !h.drop.loudness.is_empty();
+        let before = of_drop.zip(durations.first()).filter(|_| listened);
+        let before = before.map_or(0, |(fall, first)| begins_late(first / fall, restitution));
+        (h.drop.unheard[0], h.drop.known[0]) = (before, before);
         for (found, m) in h.drop.unheard.iter_mut().skip(1).zip(unheard(durations, restitution, None)) {
             *found = (*found).max(m);
         }
         missed += usize::from(h.drop.unheard != h.drop.known);
     }
     (restitution, missed)
+}
+
+/// How many impacts are before the first that was heard, where the first flight lasted a part `first` of that on which it would have
+/// fallen from its height: as many as shorten flights by so much, if that is a whole number and no error of a clock or a height.
+fn begins_late(first: f64, restitution: f64) -> usize {
+    /// A restitution above this tells one impact from the next no better than a wrong clock would.
+    const STEADY: f64 = 0.93;
+    /// How near to a whole number.
+    const NEAR: f64 = 0.25;
+    let shortened = (first / restitution).ln() / restitution.ln();
+    let whole = shortened.round();
+    if restitution < STEADY && whole >= 1.0 && (shortened - whole).abs() < NEAR { whole as usize } else { 0 }
 }
 
 /// Where balls are expected to land, and to head where their fall is not known: a tilted table, or a hand, may send all of them one
@@ -230,3 +252,20 @@ fn expect_first(drops: &mut [Drop], nominal: &mut Effects) {
 }
 
 const UNTIED: &str = "without drop_height_m nothing ties the clock to gravity";
+
+#[cfg(test)]
+mod tests {
+    use super::begins_late;
+
+    #[test]
+    fn a_sound_that_begins_late_is_told_from_a_wrong_clock() {
+        for before in 0..4 {
+            assert_eq!(begins_late(0.8f64.powi(before + 1), 0.8), before as usize);
+        }
+        // A clock that is four per cent off, a fall from a hand's breadth more.
+        assert_eq!(
+            [begins_late(0.8 * 0.96, 0.8), begins_late(0.8 * 1.1, 0.8), begins_late(0.9, 0.96)],
+            [0; 3]
+        );
+    }
+}

@@ -21,16 +21,35 @@ pub(super) struct Calibration {
 }
 
 impl Calibration {
-    /// Minus twice the logarithm of the prior that hearing's own estimate makes of a spread.
+    /// Minus twice the logarithm of the prior of a spread: what is typical of people's drops, or hearing's own estimate.
+    ///
+    /// Two or three flights a run do not split what they show among clock, places and directions: without a prior all of it falls to
+    /// one of them, as chance has it.
     fn prior(&self, spread: &Spread) -> f64 {
         /// One sigma of the factor's logarithm, on sounds with echoes and without.
-        const FACTOR: f64 = 0.5;
-        self.estimated.map_or(0.0, |[time, place]| {
-            let off = [spread.time_s / time, spread.place_m[0] / place].map(|factor| factor.ln() / FACTOR);
-            off[0] * off[0] + off[1] * off[1]
-        })
+        const HEARD: f64 = 0.5;
+        let ([time_s, place_m], [times, places]) = match self.estimated {
+            Some(estimated) => (estimated, [HEARD; 2]),
+            None => ([TYPICAL.time_s, TYPICAL.place_m[0]], [2.0, 1.0]),
+        };
+        [
+            (spread.time_s / time_s, times, self.time_s.is_none()),
+            (spread.place_m[0] / place_m, places, self.place_m == [None; 2]),
+            (spread.restitution / TYPICAL.restitution, 1.5, true),
+            (spread.kappa / TYPICAL.kappa, 1.5, true),
+            (spread.approach_rad / TYPICAL.approach_rad, 1.0, true),
+        ]
+        .into_iter()
+        .filter(|(.., unknown)| *unknown)
+        .map(|(factor, sigma, _)| (factor.ln() / sigma).powi(2))
+        .sum()
     }
 }
+
+/// What is typical: times marked in a sound to a tenth of a millisecond, places to half a centimetre, directions to a degree, a hand that
+/// lets go to two, a restitution to a thousandth.
+const TYPICAL: Spread =
+    Spread { time_s: 1e-4, place_m: [5e-3; 2], kappa: 3e3, approach_rad: 0.03, restitution: 1e-3 };
 
 #[derive(Debug, Clone, Copy)]
 enum Unknown {
@@ -105,20 +124,20 @@ impl Likelihood<'_> {
     fn unknowns(&self) -> Vec<Unknown> {
         let mut list = Vec::new();
         if self.calibration.time_s.is_none() {
-            list.extend([Unknown::Time, Unknown::Restitution]);
+            list.push(Unknown::Time);
         }
-        list.extend([Unknown::Kappa, Unknown::Approach]);
+        list.extend([Unknown::Restitution, Unknown::Kappa, Unknown::Approach]);
         if self.calibration.place_m == [None; 2] {
             list.push(Unknown::Place);
         }
         list
     }
 
-    /// Spreads about the start, which is the best one, drawn from the normal law that the likelihood's curvature gives; what it
-    /// does not tell is left open by a factor of some e-folds.
+    /// Spreads about the start, which is the best one, drawn from the normal law that the curvature of likelihood and prior gives.
     fn plausible(&self) -> Vec<Spread> {
         const STEP: f64 = 0.3;
-        const OPEN: f64 = 1.5;
+        /// A factor that is open by more than this is left open by so many e-folds.
+        const OPEN: f64 = 3.0;
         let n = self.unknowns().len();
         let at = |moves: &[(usize, f64)]| {
             let mut logs = vec![0.0; n];
@@ -209,13 +228,11 @@ const PLAUSIBLE: usize = 16;
 /// The spread of all drops and each drop about its likely course; `None` where a drop makes no sense.
 pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration) -> Option<Judged> {
     let [x, y] = calibration.place_m;
-    let [time_s, place_m] = calibration.estimated.unwrap_or([1e-4, 5e-3]);
+    let [time_s, place_m] = calibration.estimated.unwrap_or([TYPICAL.time_s, TYPICAL.place_m[0]]);
     let mut spread = Spread {
         time_s: calibration.time_s.unwrap_or(time_s),
         place_m: [x.or(y).unwrap_or(place_m), y.or(x).unwrap_or(place_m)],
-        kappa: 3e3,
-        approach_rad: 0.03,
-        restitution: if calibration.time_s.is_some() { 0.0 } else { 1e-3 },
+        ..TYPICAL
     };
     let mut plausible = vec![spread; PLAUSIBLE];
     let mut begin = *effects;

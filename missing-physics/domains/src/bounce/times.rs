@@ -1,7 +1,9 @@
 //! The full model where only times were measured: when each impact is heard.
 //!
-//! Where the ball heads is not seen. A direction that scatters shortens its flights a little, which adds up along a drop: the
-//! errors of times are correlated, and the engine finds by how much where there are drops enough.
+//! Where the ball heads is not seen. A direction that scatters shortens its flights a little, a restitution that scatters from impact to
+//! impact shortens or lengthens all later ones, which adds up along a drop: errors of times accumulate, and the engine finds by how much.
+
+use std::collections::HashMap;
 
 use missing_physics::data::Run;
 use missing_physics::model::{
@@ -9,6 +11,7 @@ use missing_physics::model::{
 };
 
 use bounce_audio::impact::{rebound, speed_after_drop};
+use bounce_audio::missed::parts;
 
 use super::drop::Drop;
 use super::setup::Setup;
@@ -24,6 +27,9 @@ pub(super) struct TimesModel {
     leaves: Option<ParameterRef>,
     height_m: Option<f64>,
     longest_noise: f64,
+    largest_scatter: f64,
+    /// What a scatter of the restitution adds to each time of a run, by its label ([`ErrorModel::accumulated`]).
+    scattered: HashMap<String, Vec<Vec<f64>>>,
 }
 
 /// Impacts over which errors may hang together where there is one drop: heard ones, by their fading loudness, and any whose size is
@@ -31,6 +37,10 @@ pub(super) struct TimesModel {
 const LONGEST_IN_ONE: f64 = 3.0;
 /// ... and those that were marked one by one, of a size that is not known: neighbours alike by a third (exp(-1)).
 const LONGEST_MARKED: f64 = 1.0;
+
+/// The largest scatter of the restitution's logarithm that a single drop is thought to show: one that is larger adds up to what drag
+/// looks like, and is taken for physics.
+const SCATTER_IN_ONE: f64 = 2e-3;
 
 /// Inputs of a row: the impact's number, and how many impacts went unheard before it in its run: known ones, all.
 const KNOWN: usize = 1;
@@ -45,7 +55,28 @@ impl TimesModel {
             _ if setup.listened || stated => LONGEST_IN_ONE,
             _ => LONGEST_MARKED,
         };
-        Self { setup, spec, layout, begins, leaves, height_m, longest_noise }
+        let largest_scatter = if setup.unheard[1] > 1 { f64::INFINITY } else { SCATTER_IN_ONE };
+        let scattered = HashMap::new();
+        Self { setup, spec, layout, begins, leaves, height_m, longest_noise, largest_scatter, scattered }
+    }
+
+    /// Takes note of a measured drop: how late an impact is by the restitution of those before it.
+    pub(super) fn heard(&mut self, label: &str, drop: &Drop, restitution: f64) {
+        let mut impacts_s = vec![drop.times_s[0]];
+        for (flight, pair) in drop.times_s.windows(2).enumerate() {
+            let hidden = drop.unheard.get(flight + 1).copied().unwrap_or(0);
+            let (first, _) = parts(pair[1] - pair[0], hidden, restitution);
+            let mut t_s = pair[0];
+            for k in 0..hidden {
+                t_s += first * restitution.powi(k as i32);
+                impacts_s.push(t_s);
+            }
+            impacts_s.push(pair[1]);
+        }
+        // How fast a ball leaves the first impact is an unknown of its own, unless its fall is known.
+        impacts_s.drain(..usize::from(self.leaves.is_some()));
+        let late = |t_s: &f64| impacts_s.iter().map(|before| (t_s - before).max(0.0)).collect();
+        self.scattered.insert(label.to_owned(), drop.times_s.iter().map(late).collect());
     }
 
     /// The run of a drop.
@@ -174,5 +205,13 @@ impl ErrorModel for TimesModel {
     /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
     fn longest_correlation(&self) -> f64 {
         self.longest_noise
+    }
+
+    fn accumulated(&self, run: &Run, _channel: usize) -> Option<Vec<Vec<f64>>> {
+        self.scattered.get(&run.label).cloned()
+    }
+
+    fn largest_step(&self) -> f64 {
+        self.largest_scatter
     }
 }

@@ -37,8 +37,12 @@ pub(crate) fn test(
     replicates: usize,
     seed: u64,
 ) -> Result<Adequacy, PredictError> {
-    let mut linearised = Linearised::new(problem, selection, fit, rivals, rule)?;
     let observed = residuals(problem, fit)?;
+    let floor = 1.0 / (replicates as f64 + 1.0);
+    if to_the_last_digit(problem, &observed) {
+        return Ok(Adequacy { p_value: 1.0, p_floor: floor, tests: Vec::new() });
+    }
+    let mut linearised = Linearised::new(problem, selection, fit, rivals, rule)?;
     let truth = linearised.sharpen(&observed);
     let chosen = chosen_shapes(&linearised, &observed, |k| draw(problem, &truth, rule, seed ^ 0x5eed, k));
     linearised.play(&sorted(chosen.into_iter().chain(truth.iter().map(|&(shape, _)| shape)).chain([0])));
@@ -66,7 +70,6 @@ pub(crate) fn test(
     };
     let observed_smallest = smallest(&seen);
     let below = null.iter().filter(|row| smallest(row) <= observed_smallest).count();
-    let floor = 1.0 / (replicates as f64 + 1.0);
     let names = linearised.alternatives.iter().map(|a| a.name.clone()).chain(omnibus_names(problem, rule));
     let mut tests: Vec<TestOutcome> = names
         .zip(seen.iter().zip(&tails))
@@ -74,6 +77,26 @@ pub(crate) fn test(
         .collect();
     tests.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
     Ok(Adequacy { p_value: (below as f64 + 1.0) * floor, p_floor: floor, tests })
+}
+
+/// Whether data are what the model predicts to within half of the last digit that they are printed with, or to within rounding: no test
+/// has anything to look at then.
+fn to_the_last_digit(problem: &Problem<'_>, observed: &[Vec<Vec<f64>>]) -> bool {
+    /// Rounding, relative to the largest reading.
+    const ROUNDING: f64 = 1e-9;
+    /// How near to a whole number of digits a reading is.
+    const WHOLE: f64 = 1e-3;
+    (0..problem.channels()).all(|c| {
+        let columns = problem.recording.runs.iter().flat_map(|run| &run.outputs[c]);
+        let readings: Vec<f64> = columns.copied().filter(|v| v.is_finite()).collect();
+        let largest = readings.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let digit = problem.recording.resolution.get(c).copied().unwrap_or(0.0);
+        let printed =
+            |v: &f64| ((v - readings[0]) / digit - ((v - readings[0]) / digit).round()).abs() < WHOLE;
+        let digit = if digit > 0.0 && readings.iter().all(printed) { digit } else { 0.0 };
+        let least = 0.5 * digit + ROUNDING * largest;
+        observed.iter().flat_map(|run| &run[c]).all(|v| v.abs() <= least)
+    })
 }
 
 /// Shapes of noise that pilot worlds choose, and these data: the others need not be tried again for each world.

@@ -20,6 +20,20 @@ impl Default for Options {
     }
 }
 
+/// Most replicates that a rate of false alarms gets.
+const MOST_REPLICATES: f64 = 99_999.0;
+
+impl Options {
+    /// As by default, with a rate of false alarms, in (0, 0.5), and replicates enough to show it: at least fifty times its inverse, and at
+    /// most 99,999.
+    pub fn with_alpha(alpha: f64) -> Self {
+        let plain = Self::default();
+        let enough = (50.0 / alpha).ceil() - 1.0;
+        let replicates = if alpha > 0.0 { enough.min(MOST_REPLICATES) as usize } else { 0 };
+        Self { alpha, replicates: replicates.max(plain.replicates), ..plain }
+    }
+}
+
 /// Why there is no diagnosis.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DiagnoseError {
@@ -88,6 +102,10 @@ pub(super) fn check(recording: &Recording, options: &Options) -> Result<(), Diag
     if options.replicates < 19 {
         let value = options.replicates as f64;
         return Err(DiagnoseError::Option { name: "replicates", value, expected: "at least 19" });
+    }
+    if options.alpha * (options.replicates as f64 + 1.0) < 1.0 {
+        let expected = "at least 1 / (replicates + 1), the smallest p value that so many replicates can show";
+        return Err(DiagnoseError::Option { name: "alpha", value: options.alpha, expected });
     }
     Ok(())
 }

@@ -41,6 +41,17 @@ pub trait ErrorModel: Sync {
         f64::INFINITY
     }
 
+    /// How errors accumulate along a run, beside those of each reading: what a unit of each of the random steps adds to the channel's
+    /// readings, `[row][step]` (a restitution that scatters from impact to impact moves all later ones). None by default.
+    fn accumulated(&self, _run: &Run, _channel: usize) -> Option<Vec<Vec<f64>>> {
+        None
+    }
+
+    /// The largest standard deviation that such a step may have; what is larger is physics. No limit by default.
+    fn largest_step(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Whether a residual may depend on the prediction itself (the default); false where predictions are made with measured inputs,
     /// and share their noise with the residual.
     fn prediction_is_clean(&self) -> bool {

@@ -126,6 +126,10 @@ impl Left<'_> {
     /// Log likelihood with the prior's weight, and sigma, under a shape of noise.
     fn under(&self, shape: usize) -> (f64, f64) {
         let Self { problem, rule, channel, .. } = *self;
+        let of_noise = problem.family.shape(shape);
+        if !rule.may_have(channel, &of_noise) {
+            return (f64::NEG_INFINITY, 1.0);
+        }
         let mut sums = Sums::default();
         for (run, columns) in self.raw.iter().enumerate() {
             let start: usize = (0..channel).map(|c| problem.rows[run].valid[c].len()).sum();
@@ -157,10 +161,7 @@ impl Left<'_> {
         let share = sums.rows as f64 / total.max(1) as f64;
         let freedom =
             (sums.rows as f64 - sums.used as f64 - share * self.selection.shared.len() as f64).max(1.0);
-        let sigma = match rule.fixed_sigma[channel] {
-            Some(sigma) => sigma,
-            None => (sums.squares / freedom).sqrt().max(rule.floor[channel]),
-        };
+        let sigma = rule.sigma(channel, &of_noise, (sums.squares / freedom).sqrt());
         let score = rule.log_prior(problem, shape)
             - freedom * sigma.ln()
             - 0.5 * sums.log_determinant

@@ -41,6 +41,8 @@ enum Kind {
     Mixed,
     /// White noise and a smooth part.
     Smooth,
+    /// White noise and errors that accumulate as the model says.
+    Accumulated,
 }
 
 /// Evenly spaced values.
@@ -78,9 +80,15 @@ const MIXED_CORRELATIONS: Axis = Axis { from: 0.5, step: 0.04, count: 57 };
 /// Logarithms of smooth lengths: 2 to 30 steps.
 const LENGTHS: Axis = Axis { from: 0.69, step: 0.05, count: 55 };
 
+/// Logarithms of the size of accumulated errors in white sigmas: 0.03 to 400.
+const SIZES: Axis = Axis { from: -3.5, step: 0.1, count: 96 };
+/// Sizes of accumulated errors that are tried one by one.
+const FEW_SIZES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+
 impl Kind {
     fn of(shape: &Shape) -> Option<Self> {
         match shape {
+            s if s.accumulated > 0.0 => Some(Self::Accumulated),
             s if s.correlated <= 0.0 => None,
             s if s.by_row => Some(Self::ByRow),
             s if s.smooth => Some(Self::Smooth),
@@ -94,14 +102,18 @@ impl Kind {
             Self::Rough | Self::ByRow => [WHOLE, CORRELATIONS],
             Self::Mixed => [SHARES, MIXED_CORRELATIONS],
             Self::Smooth => [SHARES, LENGTHS],
+            Self::Accumulated => [WHOLE, SIZES],
         }
     }
 
     fn shape(self, log_odds: f64, length: f64) -> Shape {
+        if self == Self::Accumulated {
+            return Shape { accumulated: length.exp(), ..Shape::WHITE };
+        }
         let smooth = self == Self::Smooth;
         let length_steps = if smooth { length.exp() } else { -1.0 / length.tanh().ln() };
         let correlated = if log_odds.is_finite() { 1.0 / (1.0 + (-log_odds).exp()) } else { 1.0 };
-        Shape { correlated, length_steps, smooth, by_row: self == Self::ByRow }
+        Shape { correlated, length_steps, smooth, by_row: self == Self::ByRow, ..Shape::WHITE }
     }
 }
 
@@ -115,7 +127,7 @@ impl Family {
     fn new() -> Self {
         let mut shapes = few();
         let few = shapes.len();
-        let lattices = [Kind::Rough, Kind::ByRow, Kind::Mixed, Kind::Smooth].map(|kind| {
+        let lattices = [Kind::Rough, Kind::ByRow, Kind::Mixed, Kind::Smooth, Kind::Accumulated].map(|kind| {
             let [shares, lengths] = kind.axes();
             let first = shapes.len();
             for i in 0..shares.count {
@@ -158,8 +170,11 @@ impl Family {
         };
         let log_odds = (shape.correlated / (1.0 - shape.correlated)).ln();
         let i = if lattice.shares.count == 1 { 0 } else { lattice.shares.nearest(log_odds) };
-        let length =
-            if shape.smooth { shape.length_steps.ln() } else { (-1.0 / shape.length_steps).exp().atanh() };
+        let length = match lattice.kind {
+            Kind::Accumulated => shape.accumulated.ln(),
+            Kind::Smooth => shape.length_steps.ln(),
+            _ => (-1.0 / shape.length_steps).exp().atanh(),
+        };
         let j = lattice.lengths.nearest(length);
         let at = |i: usize, j: usize| lattice.first + i * lattice.lengths.count + j;
         std::iter::once(at(i, j))
@@ -210,7 +225,7 @@ impl Family {
     }
 }
 
-/// White first, those that go by row last.
+/// White first, those that go by row and those that accumulate last.
 fn few() -> Vec<Shape> {
     let mut shapes = vec![Shape::WHITE];
     let rough =
@@ -227,6 +242,7 @@ fn few() -> Vec<Shape> {
         }
     }
     shapes.extend(PHIS.map(|phi| Shape { by_row: true, ..rough(phi, 1.0) }));
+    shapes.extend(FEW_SIZES.map(|accumulated| Shape { accumulated, ..Shape::WHITE }));
     shapes
 }
 
@@ -247,8 +263,10 @@ mod tests {
             for shape in around.iter().map(|&n| family.shape(n)) {
                 assert_eq!(Kind::of(&shape), kind);
                 let odds = |s: &Shape| (s.correlated / (1.0 - s.correlated).max(1e-12)).ln();
-                assert!((odds(&shape) - odds(&centre)).abs() < 0.11);
-                assert!((shape.length_steps / centre.length_steps).ln().abs() < 0.5);
+                let accumulates = shape.accumulated > 0.0;
+                assert!(accumulates || (odds(&shape) - odds(&centre)).abs() < 0.11);
+                let size = |s: &Shape| if s.accumulated > 0.0 { s.accumulated } else { s.length_steps };
+                assert!((size(&shape) / size(&centre)).ln().abs() < 0.5);
             }
             if number >= family.few {
                 assert_eq!(around[0], number);

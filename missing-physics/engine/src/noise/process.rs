@@ -6,6 +6,8 @@
 //! column in O(n) at any spacing of the rows and with rows missing (Hartikainen and Sarkka 2010,
 //! doi:10.1109/MLSP.2010.5589113).
 
+use nalgebra::DMatrix;
+
 use crate::statistics::median;
 
 /// How the unit-variance noise of one channel is correlated along a run.
@@ -20,16 +22,28 @@ pub struct Shape {
     /// Whether it is correlated from row to row, however far apart these are (a filter that runs with the readings), and not
     /// along the noise variable.
     pub by_row: bool,
+    /// How large the errors are that accumulate along a run as the model says, beside white noise: ratio of their root mean square to
+    /// its sigma.
+    pub accumulated: f64,
 }
 
 impl Shape {
     /// White noise.
-    pub const WHITE: Self = Self { correlated: 0.0, length_steps: 0.0, smooth: false, by_row: false };
+    pub const WHITE: Self =
+        Self { correlated: 0.0, length_steps: 0.0, smooth: false, by_row: false, accumulated: 0.0 };
+
+    /// Share of the variance that is correlated, and over how many steps, in runs of so many: errors that accumulate are, over a run.
+    pub fn correlation(&self, steps: f64) -> (f64, f64) {
+        let square = self.accumulated * self.accumulated;
+        if square > 0.0 { (square / (1.0 + square), steps) } else { (self.correlated, self.length_steps) }
+    }
 
     /// Log prior weight against white noise: colour has to show, and a faint slow part (which would swallow any faint
     /// slow effect) has to show most.
     pub fn log_prior(&self) -> f64 {
-        if self.correlated <= 0.0 {
+        if self.accumulated > 0.0 {
+            -1.0
+        } else if self.correlated <= 0.0 {
             0.0
         } else if self.correlated >= 1.0 && !self.smooth {
             -1.0
@@ -47,6 +61,8 @@ const LEAST_WHITE: f64 = 1e-6;
 pub struct Whitener {
     steps: Vec<Step>,
     kind: Kind,
+    /// The lower triangular root of a covariance that no filter makes, row by row.
+    root: Vec<Vec<f64>>,
     /// Log determinant of the covariance.
     pub log_determinant: f64,
 }
@@ -56,6 +72,7 @@ enum Kind {
     White,
     Rough,
     Smooth,
+    Root,
 }
 
 /// What the filter does at one row: transition from the row before, gain, one over the innovation's sigma.
@@ -75,7 +92,7 @@ impl Whitener {
             _ => Kind::Rough,
         };
         if kind == Kind::White {
-            return Self { steps: Vec::new(), kind, log_determinant: 0.0 };
+            return Self { steps: Vec::new(), kind, root: Vec::new(), log_determinant: 0.0 };
         }
         let (correlated, length) = (shape.correlated, shape.length_steps * step);
         // The white part never vanishes altogether: readings have a last digit, and the filter stays regular (also where
@@ -110,11 +127,31 @@ impl Whitener {
                 Step { transition: f, gain, inverse_sigma: 1.0 / innovation.sqrt() }
             })
             .collect();
-        Self { steps, kind, log_determinant }
+        Self { steps, kind, root: Vec::new(), log_determinant }
+    }
+
+    /// A whitener for white noise of unit variance and errors that accumulate: `accumulated[row]` times independent standard normal
+    /// numbers, as many in each row. Of white noise alone where these are no numbers.
+    pub fn of_accumulated(accumulated: &[Vec<f64>]) -> Self {
+        let n = accumulated.len();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let one = |i: usize, j: usize| f64::from(u8::from(i == j));
+        let covariance = DMatrix::from_fn(n, n, |i, j| one(i, j) + dot(&accumulated[i], &accumulated[j]));
+        let Some(factor) = covariance.cholesky() else {
+            return Self { steps: Vec::new(), kind: Kind::White, root: Vec::new(), log_determinant: 0.0 };
+        };
+        let lower = factor.l_dirty();
+        let root: Vec<Vec<f64>> = (0..n).map(|i| (0..=i).map(|j| lower[(i, j)]).collect()).collect();
+        let log_determinant = 2.0 * (0..n).map(|i| lower[(i, i)].ln()).sum::<f64>();
+        Self { steps: Vec::new(), kind: Kind::Root, root, log_determinant }
     }
 
     /// Whitens a column in place.
     pub fn whiten(&self, column: &mut [f64]) {
+        for (i, row) in self.root.iter().enumerate().take(column.len()) {
+            let known: f64 = row[..i].iter().zip(&column[..i]).map(|(r, x)| r * x).sum();
+            column[i] = (column[i] - known) / row[i];
+        }
         self.run(column, |value, mean, inverse_sigma| {
             let innovation = value - mean;
             (innovation * inverse_sigma, innovation)
@@ -123,6 +160,9 @@ impl Whitener {
 
     /// Turns white noise of unit variance into noise of this shape, in place.
     pub fn colour(&self, column: &mut [f64]) {
+        for (i, row) in self.root.iter().enumerate().take(column.len()).rev() {
+            column[i] = row[..=i].iter().zip(&column[..=i]).map(|(r, x)| r * x).sum();
+        }
         self.run(column, |value, mean, inverse_sigma| {
             let innovation = value / inverse_sigma;
             (mean + innovation, innovation)
@@ -133,6 +173,12 @@ impl Whitener {
     pub fn impulse(&self, i: usize, n: usize, reach: usize) -> Vec<f64> {
         if self.kind == Kind::White {
             return vec![1.0];
+        }
+        if self.kind == Kind::Root {
+            let mut shift = vec![0.0; n];
+            shift[i] = 1.0;
+            self.whiten(&mut shift);
+            return shift[i..].iter().take(reach).copied().collect();
         }
         let mut image = vec![0.0; n.saturating_sub(i).min(reach)];
         if let Some(first) = image.first_mut() {
@@ -155,7 +201,7 @@ impl Whitener {
     fn run_from(&self, first: usize, column: &mut [f64], output: impl Fn(f64, f64, f64) -> (f64, f64)) {
         let steps = self.steps.get(first..).unwrap_or_default();
         match self.kind {
-            Kind::White => {}
+            Kind::White | Kind::Root => {}
             Kind::Rough => {
                 let mut state = 0.0;
                 for (value, step) in column.iter_mut().zip(steps) {
@@ -276,5 +322,32 @@ mod tests {
                 approx::assert_relative_eq!(a, b, epsilon = 1e-9);
             }
         }
+    }
+
+    /// Errors that accumulate: the dense covariance again, and a shift of one row as whitening shows it.
+    #[test]
+    fn accumulated_errors_are_whitened_by_their_covariance() {
+        let accumulated: Vec<Vec<f64>> = (0..9)
+            .map(|row| (0..7).map(|step| 0.4 * f64::from((row - step).max(0)).powf(1.3)).collect())
+            .collect();
+        let dense = DMatrix::from_fn(9, 9, |i, j| {
+            let shared: f64 = accumulated[i].iter().zip(&accumulated[j]).map(|(a, b)| a * b).sum();
+            shared + f64::from(u8::from(i == j))
+        });
+        let factor = dense.cholesky().expect("positive definite");
+        let whitener = Whitener::of_accumulated(&accumulated);
+        let y = DVector::from_fn(9, |i, _| (1.7 * i as f64).cos());
+        let mut white = y.as_slice().to_vec();
+        whitener.whiten(&mut white);
+        let fast: f64 = white.iter().map(|v| v * v).sum();
+        approx::assert_relative_eq!(fast, y.dot(&factor.solve(&y)), max_relative = 1e-12);
+        let log_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        approx::assert_relative_eq!(whitener.log_determinant, log_determinant, max_relative = 1e-12);
+        whitener.colour(&mut white);
+        approx::assert_relative_eq!(white.as_slice(), y.as_slice(), epsilon = 1e-12);
+        let mut shifted = vec![0.0; 9];
+        shifted[4] = 1.0;
+        whitener.whiten(&mut shifted);
+        assert_eq!(whitener.impulse(4, 9, 3), shifted[4..7]);
     }
 }

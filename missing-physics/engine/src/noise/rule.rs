@@ -28,6 +28,8 @@ pub(crate) struct NoiseRule {
     /// Further log prior weight against correlated noise. Where mechanisms compete, colour that only some of them need is
     /// one more thing that they assume; it cancels where all of them need it.
     pub(crate) against_colour: f64,
+    /// The largest product of a channel's sigma and the size of accumulated errors that is believed; `None` where none accumulate.
+    pub(crate) most_accumulated: Vec<Option<f64>>,
     /// The smallest sigma that is believed, by channel (a reading has a last digit).
     pub(crate) floor: Vec<f64>,
 }
@@ -49,6 +51,23 @@ impl NoiseRule {
         let floor =
             self.fixed_sigma.iter().zip(&self.floor).map(|(fixed, floor)| fixed.unwrap_or(*floor)).collect();
         Self { fixed_sigma: vec![None; self.floor.len()], floor, ..self.clone() }
+    }
+
+    /// The sigma of a channel under a shape, where the residual has `found`.
+    pub(crate) fn sigma(&self, channel: usize, shape: &Shape, found: f64) -> f64 {
+        if let Some(sigma) = self.fixed_sigma[channel] {
+            return sigma;
+        }
+        let most = self.most_accumulated[channel].filter(|_| shape.accumulated > 0.0);
+        let believed = most.map_or(found, |most| found.min(most / shape.accumulated));
+        believed.max(self.floor[channel])
+    }
+
+    /// Whether a channel may have a shape of noise: errors accumulate only where the model says so, and no more than it says.
+    pub(crate) fn may_have(&self, channel: usize, shape: &Shape) -> bool {
+        let least = self.fixed_sigma[channel].unwrap_or(self.floor[channel]);
+        shape.accumulated <= 0.0
+            || self.most_accumulated[channel].is_some_and(|most| least * shape.accumulated <= most)
     }
 
     /// The rule where mechanisms compete.
@@ -84,6 +103,11 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
     let long = rows >= ROWS_FOR_COLOUR * problem.rows.len().max(1);
     let longest =
         problem.model.extensions().errors.map_or(f64::INFINITY, |errors| errors.longest_correlation());
+    let largest_step =
+        problem.model.extensions().errors.map_or(f64::INFINITY, |errors| errors.largest_step());
+    let most_accumulated: Vec<Option<f64>> =
+        problem.accumulated.iter().map(|unit| unit.map(|unit| unit * largest_step)).collect();
+    let accumulates = most_accumulated.iter().any(Option::is_some);
     let (fixed_sigma, uncertainty) = (0..problem.channels())
         .map(|c| match recording.calibration.get(c).copied().flatten() {
             Some(sigma) => (Some(sigma), CALIBRATION_UNCERTAINTY),
@@ -106,10 +130,14 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
             .filter(|&s| {
                 let shape = problem.family.shape(s);
                 let heard = !shape.by_row || problem.uneven;
+                if shape.accumulated > 0.0 {
+                    return accumulates;
+                }
                 s == 0 || long && heard && shape.length_steps <= longest
             })
             .collect(),
         longest,
+        most_accumulated,
         floor,
     }
 }

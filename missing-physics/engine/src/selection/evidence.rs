@@ -19,6 +19,11 @@ pub(crate) fn evidence(
     selection: &Selection,
     fit: &Fit,
 ) -> (f64, Option<String>) {
+    let unknowns =
+        selection.shared.len() + selection.nuisance.len() * problem.rows.len() + problem.channels();
+    if problem.size().0 <= unknowns {
+        return (f64::NEG_INFINITY, Some("there are too few rows for it".into()));
+    }
     let covariance = covariance(&fit.information);
     let added: Vec<usize> = (0..selection.shared.len()).filter(|&i| selection.added_shared[i]).collect();
     let added = without_open(problem, set, selection, &covariance, added);

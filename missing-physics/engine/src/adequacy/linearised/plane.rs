@@ -114,6 +114,11 @@ impl Linearised<'_> {
         }
     }
 
+    /// Degrees of freedom of the noise that the model and so many further columns leave.
+    pub(super) fn freedom_beside(&self, columns: usize) -> f64 {
+        self.freedom.iter().sum::<f64>() - columns as f64
+    }
+
     /// Drops all alternatives: the model alone is read.
     pub(crate) fn without_alternatives(mut self) -> Self {
         self.alternatives.clear();

@@ -15,7 +15,7 @@ impl Linearised<'_> {
     }
 
     /// By how much an alternative lowers the sum of squares that the model alone leaves, in units of the noise that is left beside the
-    /// alternative; nothing where its coefficient has the wrong sign.
+    /// alternative; nothing where its coefficient has the wrong sign, or where it leaves no noise to measure it by.
     fn gain(
         &self,
         products: &Products,
@@ -23,6 +23,11 @@ impl Linearised<'_> {
         noise: &[(usize, f64)],
         alternative: &Alternative,
     ) -> f64 {
+        // Beside an alternative that leaves nothing of the data there is no noise to measure it by.
+        let columns = alternative.shared.len() + alternative.nuisance.len() * self.blocks.len();
+        if self.freedom_beside(columns) < 1.0 {
+            return 0.0;
+        }
         let with_nuisance = [nuisance, &alternative.nuisance].concat();
         let with_shared = [shared, &alternative.shared].concat();
         let (_, beside, _) = self.alternate(products, &with_nuisance, &with_shared, noise, 4);

@@ -2,6 +2,10 @@
 
 use super::plane::Linearised;
 
+/// Where the model and every mechanism leave fewer degrees of freedom than this, the noise is that of the model alone: what next to
+/// nothing is left of says nothing of noise.
+const LEAST_FREEDOM: f64 = 5.0;
+
 /// Most moves of a climb at one stride.
 const CLIMB: usize = 8;
 
@@ -11,7 +15,9 @@ impl Linearised<'_> {
     pub(crate) fn noise_beyond_mechanisms(&self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
         let products = self.products(data);
         let nuisance: Vec<usize> = (0..self.n_nuisance).collect();
-        let (_, shared) = self.columns_with(self.mechanisms);
+        let (_, with) = self.columns_with(self.mechanisms);
+        let enough = self.freedom_beside(with.len() - self.n_shared) >= LEAST_FREEDOM;
+        let shared = if enough { with } else { self.columns_with(0).1 };
         let start = self.white_start(&products);
         let (_, noise, _) = self.alternate(&products, &nuisance, &shared, &start, 8);
         noise.into_iter().map(|(shape, sigma)| (self.in_play[shape], sigma)).collect()

@@ -102,12 +102,10 @@ impl Linearised<'_> {
         (squares, log_determinant)
     }
 
-    fn channel_score(&self, channel: usize, squares: f64, log_determinant: f64) -> (f64, f64) {
+    /// Score and sigma of a channel under a shape of the family.
+    fn channel_score(&self, channel: usize, shape: usize, squares: f64, log_determinant: f64) -> (f64, f64) {
         let freedom = self.freedom[channel];
-        let sigma = match self.rule.fixed_sigma[channel] {
-            Some(sigma) => sigma,
-            None => (squares / freedom).sqrt().max(self.rule.floor[channel]),
-        };
+        let sigma = self.rule.sigma(channel, &self.problem.family.shape(shape), (squares / freedom).sqrt());
         (-freedom * sigma.ln() - 0.5 * log_determinant - 0.5 * squares / (sigma * sigma), sigma)
     }
 
@@ -130,10 +128,15 @@ impl Linearised<'_> {
             for (channel, state) in next.iter_mut().enumerate() {
                 let mut best = f64::NEG_INFINITY;
                 for shape in 0..self.in_play.len() {
+                    let of_noise = self.problem.family.shape(self.in_play[shape]);
+                    if !self.rule.may_have(channel, &of_noise) {
+                        continue;
+                    }
                     let (squares, log_determinant) =
                         self.squares(products, channel, shape, &ids, &coefficients);
-                    let (mut value, sigma) = self.channel_score(channel, squares, log_determinant);
-                    value += self.problem.family.shape(self.in_play[shape]).log_prior();
+                    let (mut value, sigma) =
+                        self.channel_score(channel, self.in_play[shape], squares, log_determinant);
+                    value += of_noise.log_prior();
                     if value > best {
                         best = value;
                         *state = (shape, sigma);
@@ -176,7 +179,7 @@ impl Linearised<'_> {
         (0..self.problem.channels())
             .map(|c| {
                 let squares: f64 = products.values.iter().map(|row| row[c][0].total).sum();
-                (0, self.channel_score(c, squares, 0.0).1)
+                (0, self.channel_score(c, 0, squares, 0.0).1)
             })
             .collect()
     }
