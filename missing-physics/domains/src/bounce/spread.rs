@@ -35,7 +35,7 @@ impl Calibration {
         [
             (spread.time_s / time_s, times, self.time_s.is_none()),
             (spread.place_m[0] / place_m, places, self.place_m == [None; 2]),
-            (spread.restitution / TYPICAL.restitution, 1.5, true),
+            (spread.restitution / TYPICAL.restitution, 1.5, self.time_s.is_none()),
             (spread.kappa / TYPICAL.kappa, 1.5, true),
             (spread.approach_rad / TYPICAL.approach_rad, 1.0, true),
         ]
@@ -124,9 +124,9 @@ impl Likelihood<'_> {
     fn unknowns(&self) -> Vec<Unknown> {
         let mut list = Vec::new();
         if self.calibration.time_s.is_none() {
-            list.push(Unknown::Time);
+            list.extend([Unknown::Time, Unknown::Restitution]);
         }
-        list.extend([Unknown::Restitution, Unknown::Kappa, Unknown::Approach]);
+        list.extend([Unknown::Kappa, Unknown::Approach]);
         if self.calibration.place_m == [None; 2] {
             list.push(Unknown::Place);
         }
@@ -232,6 +232,7 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
     let mut spread = Spread {
         time_s: calibration.time_s.unwrap_or(time_s),
         place_m: [x.or(y).unwrap_or(place_m), y.or(x).unwrap_or(place_m)],
+        restitution: if calibration.time_s.is_some() { 0.0 } else { TYPICAL.restitution },
         ..TYPICAL
     };
     let mut plausible = vec![spread; PLAUSIBLE];

@@ -18,7 +18,8 @@ pub(super) struct Spread {
     pub(super) kappa: f64,
     /// How far from straight down a ball first comes to the table, along each axis, rad.
     pub(super) approach_rad: f64,
-    /// Scatter of the restitution's logarithm from impact to impact (Montaine et al. 2011, doi:10.1103/PhysRevE.84.041306).
+    /// Scatter of the restitution's logarithm from impact to impact (Montaine et al. 2011, doi:10.1103/PhysRevE.84.041306); zero where the
+    /// clock's sigma is known.
     pub(super) restitution: f64,
 }
 
