@@ -31,6 +31,9 @@ pub(super) enum Simulation {
 /// Parameters by the names that the program knows them by, with scope and slot.
 pub(super) type Names = Vec<(String, Scope, usize)>;
 
+/// A question: label and fingerprint of the run, its rows, and the bits of the parameters.
+type Asked = (String, u64, usize, Vec<u64>);
+
 /// A program that predicts.
 #[derive(Debug)]
 pub(super) struct Program {
@@ -41,7 +44,7 @@ pub(super) struct Program {
     channels: Vec<String>,
     parameters: Names,
     /// Predictions by run, a hash of its inputs, number of rows, and the bits of the parameters.
-    predictions: Memo<(String, u64, usize, Vec<u64>), Arc<Vec<f64>>>,
+    predictions: Memo<Asked, Arc<Vec<f64>>>,
     /// By how much the answers to one question may differ, relative to the largest number of a channel.
     tolerance: f64,
     /// Whether a question was asked twice.
