@@ -55,7 +55,9 @@ fn ids(value: &Value) -> Vec<String> {
     ids
 }
 
-/// The verdict of a practice case's key; where the key names look-alikes, the truth must be among the rivals.
+/// The verdict of a practice case's key; where the key names look-alikes, the truth must be among the rivals. A look-alike whose best fit
+/// misses the noise-free data by more than one sigma (`noncentrality_of_alternatives`) may be ruled out by the noise: the truth alone is
+/// then right as well.
 fn practice_case_gets_the_verdict_of_its_key(folder: &Path) {
     let key: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join("key.json")).unwrap()).unwrap();
@@ -67,7 +69,13 @@ fn practice_case_gets_the_verdict_of_its_key(folder: &Path) {
         _ if alike => "ambiguous",
         _ => "explained",
     };
-    assert_eq!(answer["verdict"], expected, "{}", folder.display());
+    let by_noise = |id: &Value| {
+        let apart = key["noncentrality_of_alternatives"][id.as_str().unwrap()].as_f64();
+        apart.is_some_and(|sigmas| sigmas > 1.0)
+    };
+    let alone = alike && key["confusable"].as_array().unwrap().iter().all(by_noise);
+    let verdict = text(&answer["verdict"]);
+    assert!(verdict == expected || (alone && verdict == "explained"), "{}: {verdict}", folder.display());
     let accepted: Vec<Vec<String>> = key["accepted"].as_array().unwrap().iter().map(ids).collect();
     let mut said = vec![ids(&answer["chosen"])];
     if alike {
