@@ -12,7 +12,7 @@
 use std::path::Path;
 
 use missing_physics::data::Recording;
-use missing_physics::diagnosis::Diagnosis;
+use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::repaired::{PredictedRun, Repaired, RepairedError};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,9 @@ pub struct Repair {
     pub format: u32,
     /// The domain whose simulation it repairs.
     pub domain: String,
+    /// The verdict of the diagnosis that it is from; none in files of versions that did not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
     /// What is on, and by how much.
     pub model: Repaired,
 }
@@ -85,7 +88,31 @@ pub enum RepairError {
 impl Repair {
     /// The model that a diagnosis ended with.
     pub fn new(domain: &dyn Domain, diagnosis: &Diagnosis) -> Self {
-        Self { format: 1, domain: domain.id().into(), model: diagnosis.repaired.clone() }
+        Self {
+            format: 1,
+            domain: domain.id().into(),
+            verdict: Some(diagnosis.verdict),
+            model: diagnosis.repaired.clone(),
+        }
+    }
+
+    /// What whoever predicts by this model should know, one sentence; none where the diagnosis left nothing open.
+    pub fn caveat(&self) -> Option<&'static str> {
+        match self.verdict? {
+            Verdict::Adequate | Verdict::Explained => None,
+            Verdict::Ambiguous => Some(
+                "the model is one of several that explained its recording equally well: in other conditions they may predict otherwise",
+            ),
+            Verdict::Partly => {
+                Some("the model leaves a part of its recording unexplained, which its intervals do not hold")
+            }
+            Verdict::Unexplained if self.model.law.is_some() => Some(
+                "the model holds an empirical law of an unexplained recording: beyond the conditions recorded there it says nothing",
+            ),
+            Verdict::Unexplained => Some(
+                "the model is the plain simulation, which does not explain the recording that it was fitted to, and no other does",
+            ),
+        }
     }
 
     /// The model as JSON.

@@ -1,11 +1,11 @@
 //! The answer: everything that a report, a machine or another program needs of a diagnosis.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::repaired::Repaired;
 
 /// What the recording says of the baseline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// The baseline explains the data to within their noise.

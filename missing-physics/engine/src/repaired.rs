@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::data::{Recording, RecordingError};
 use crate::fit::columns::normal_of_run;
 use crate::fit::gauss_newton::solve;
+pub use crate::law::added::AddedLaw;
+use crate::law::extended::Extended;
 use crate::linalg::inverse;
-use crate::model::{Model, PredictError, Quantity, SpecError};
+use crate::model::{Model, PredictError, Quantity, Spec, SpecError};
 use crate::noise::family::Family;
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
@@ -19,6 +21,10 @@ use crate::selection::candidate::Candidate;
 pub struct Repaired {
     /// Identifiers of the mechanisms that are on; none for a baseline that was adequate.
     pub mechanisms: Vec<String>,
+    /// The empirical law beside them, where one was found; its coefficients are the last of `parameters`, but for those of terms, which
+    /// the full model has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<AddedLaw>,
     /// All shared parameters of the full model, in its order.
     pub parameters: Vec<Shared>,
     /// Which of them were fitted: indices into `parameters`.
@@ -109,6 +115,7 @@ impl Repaired {
         let shared = problem.shared.index.iter().zip(&fit.shared);
         Self {
             mechanisms: model.set.iter().map(|&m| spec.mechanisms[m].id.clone()).collect(),
+            law: None,
             parameters: shared
                 .map(|(&i, &value)| Shared { name: spec.parameters[i].name.clone(), value })
                 .collect(),
@@ -138,13 +145,19 @@ impl Repaired {
     ) -> Result<Vec<PredictedRun>, RepairedError> {
         model.spec().check()?;
         recording.check()?;
+        let sigma: Vec<f64> = self.noise.iter().map(|n| n.sigma).collect();
+        let again = |law: &AddedLaw| {
+            let unknown =
+                || RepairedError::Damaged("its law is of a channel or variable that the recording has not");
+            Extended::again(model, recording, law, &sigma).ok_or_else(unknown)
+        };
+        let added = self.law.as_ref().filter(|law| !matches!(law, AddedLaw::Terms { .. }));
+        let extended = added.map(again).transpose()?;
+        let model = extended.as_ref().map_or(model, |extended| extended as &dyn Model);
         let mut problem = Problem::new(model, recording.clone());
         problem.step = self.noise_step;
         let selection = self.matching(&problem)?;
-        let noise = NoiseState {
-            shape: self.noise.iter().map(|n| n.shape).collect(),
-            sigma: self.noise.iter().map(|n| n.sigma).collect(),
-        };
+        let noise = NoiseState { shape: self.noise.iter().map(|n| n.shape).collect(), sigma };
         let unknown = selection.nuisance.len();
         for (run, rows) in recording.runs.iter().zip(&problem.rows) {
             let got = rows.valid.iter().map(Vec::len).sum();
@@ -200,6 +213,16 @@ impl Repaired {
         Ok(PredictedRun { label: data.label.clone(), channels: columns(&out), sigma: columns(&sigma) })
     }
 
+    /// The simulation's candidate terms that the law is made of.
+    fn terms(&self, spec: &Spec) -> Result<Vec<usize>, RepairedError> {
+        let Some(AddedLaw::Terms { coefficients }) = &self.law else { return Ok(Vec::new()) };
+        let named = |name: &String| {
+            let known = spec.terms.iter().position(|t| spec.parameters[t.parameter].name == *name);
+            known.ok_or(RepairedError::Damaged("its law has a term that the simulation has not"))
+        };
+        coefficients.iter().map(named).collect()
+    }
+
     /// What is free with the model's mechanisms on, if the model is one of this simulation's.
     fn matching(&self, problem: &Problem<'_>) -> Result<Selection, RepairedError> {
         let spec = problem.spec();
@@ -227,7 +250,7 @@ impl Repaired {
                 })
             })
             .collect::<Result<Vec<usize>, _>>()?;
-        let selection = problem.select(&set, &[]);
+        let selection = problem.select(&set, &self.terms(spec)?);
         let n = self.fitted.len();
         let finite = |v: &f64| v.is_finite();
         if self.fitted != selection.shared {

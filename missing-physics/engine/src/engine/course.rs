@@ -242,6 +242,7 @@ impl Course<'_> {
             diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);
             draw(diagnosis, &found.predictions);
             diagnosis.noise = answer.noise(&found.fit);
+            diagnosis.repaired = found.repaired;
             diagnosis.law = Some(Law { beside: answer.ids(&start.set), ..found.law });
         }
         Ok(())

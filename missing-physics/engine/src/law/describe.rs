@@ -9,6 +9,7 @@ use crate::law::found::{Found, compared, improves};
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
+use crate::repaired::Repaired;
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::held_out::{HeldOut, held_out};
 
@@ -49,7 +50,8 @@ pub(crate) fn extended(
         }
     };
     let predictions = predictions(&wide, &fitted.fit)?;
-    Ok(Some(Found { law, predictions, held_out: score, fit: fitted.fit }))
+    let repaired = Repaired { law: Some(model.law(&problem.recording)), ..Repaired::of(&wide, &fitted) };
+    Ok(Some(Found { law, predictions, held_out: score, fit: fitted.fit, repaired }))
 }
 
 /// An oscillation in words.

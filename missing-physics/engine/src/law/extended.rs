@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 
 use crate::adequacy::linearised::DEGREE;
-use crate::data::Run;
+use crate::data::{Recording, Run};
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
+use crate::law::added::AddedLaw;
 use crate::linalg::dot;
-use crate::model::{Model, Parameter, PredictError, Scope, Spec};
+use crate::model::{Model, Parameter, PredictError, Quantity, Scope, Spec};
 use crate::problem::Problem;
 
 /// A model with an empirical term added to its channels.
@@ -32,19 +33,67 @@ pub(crate) enum Added {
 }
 
 impl<'a> Extended<'a> {
-    fn new(problem: &Problem<'a>, parameters: Vec<Parameter>, term: Added) -> Self {
-        let mut spec = problem.spec().clone();
+    fn new(model: &'a dyn Model, recording: &Recording, parameters: Vec<Parameter>, term: Added) -> Self {
+        let mut spec = model.spec().clone();
         // Mechanisms and terms stay in the list so that their parameters stay off.
         let (inner_shared, inner_nuisance) = (spec.count(Scope::Shared), spec.count(Scope::PerRun));
         spec.parameters.extend(parameters);
         Self {
-            inner: problem.model,
+            inner: model,
             spec,
             inner_shared,
             inner_nuisance,
-            channels: problem.channels(),
-            noise_along: problem.recording.noise_along,
+            channels: recording.channels.len(),
+            noise_along: recording.noise_along,
             term,
+        }
+    }
+
+    /// A model with a law that was found before; none where the recording has not its channel or variable.
+    pub(crate) fn again(
+        model: &'a dyn Model,
+        recording: &Recording,
+        law: &AddedLaw,
+        sigma: &[f64],
+    ) -> Option<Self> {
+        let place = |channel: &str, variable: &str| {
+            let at = |list: &[Quantity], name: &str| list.iter().position(|q| q.name == name);
+            Some((at(&recording.channels, channel)?, at(&recording.variables, variable)?))
+        };
+        let (parameters, term) = match law {
+            AddedLaw::Terms { .. } => return None,
+            AddedLaw::Power { channel, variable, largest } => {
+                let (channel, variable) = place(channel, variable)?;
+                (vec![exponent()], Added::Power { channel, variable, largest: *largest })
+            }
+            AddedLaw::Smooth { channel, variable, centre, half_width } => {
+                let (channel, variable) = place(channel, variable)?;
+                let (centre, half_width) = (*centre, *half_width);
+                let term = Added::Smooth { channel, variable, centre, half_width };
+                (powers(&recording.channels[channel].unit), term)
+            }
+            AddedLaw::Periodic => {
+                (oscillation(recording, sigma, [0.0, f64::INFINITY], 1.0, 1.0), Added::Periodic)
+            }
+        };
+        Some(Self::new(model, recording, parameters, term))
+    }
+
+    /// The law without its coefficients.
+    pub(crate) fn law(&self, recording: &Recording) -> AddedLaw {
+        let names = |channel: usize, variable: usize| {
+            (recording.channels[channel].name.clone(), recording.variables[variable].name.clone())
+        };
+        match self.term {
+            Added::Periodic => AddedLaw::Periodic,
+            Added::Smooth { channel, variable, centre, half_width } => {
+                let (channel, variable) = names(channel, variable);
+                AddedLaw::Smooth { channel, variable, centre, half_width }
+            }
+            Added::Power { channel, variable, largest } => {
+                let (channel, variable) = names(channel, variable);
+                AddedLaw::Power { channel, variable, largest }
+            }
         }
     }
 
@@ -69,30 +118,10 @@ impl<'a> Extended<'a> {
         let powers: Vec<f64> = omegas.par_iter().map(|w| power(problem, fit, &residual, *w)).collect();
         let start =
             (0..omegas.len()).max_by(|&a, &b| powers[a].total_cmp(&powers[b])).map_or(lowest, |k| omegas[k]);
-        let mut parameters = vec![Parameter {
-            name: "omega".into(),
-            unit: "rad".into(),
-            scope: Scope::Shared,
-            start,
-            lower: 0.5 * lowest,
-            upper: highest,
-            scale: 1.0 / span.max(f64::MIN_POSITIVE),
-        }];
-        for c in 0..problem.channels() {
-            for part in ["cos", "sin"] {
-                parameters.push(Parameter {
-                    name: format!("{part}_{c}"),
-                    unit: problem.recording.channels[c].unit.clone(),
-                    scope: Scope::PerRun,
-                    start: 0.0,
-                    lower: f64::NEG_INFINITY,
-                    upper: f64::INFINITY,
-                    // Nuisance parameters have a prior a thousand scales wide: here about the size of the residual.
-                    scale: 3e-3 * fit.noise.sigma[c],
-                });
-            }
-        }
-        Ok(Some(Self::new(problem, parameters, Added::Periodic)))
+        let scale = 1.0 / span.max(f64::MIN_POSITIVE);
+        let bounds = [0.5 * lowest, highest];
+        let parameters = oscillation(&problem.recording, &fit.noise.sigma, bounds, start, scale);
+        Ok(Some(Self::new(problem.model, &problem.recording, parameters, Added::Periodic)))
     }
 
     /// A power of a variable by which a channel is multiplied; none where the variable is not positive nearly everywhere, or spans less
@@ -106,16 +135,8 @@ impl<'a> Extended<'a> {
         if !(low > 0.0 && largest.is_finite() && largest > 3.0 * low) {
             return None;
         }
-        let parameters = vec![Parameter {
-            name: "exponent".into(),
-            unit: String::new(),
-            scope: Scope::Shared,
-            start: 0.0,
-            lower: -3.0,
-            upper: 3.0,
-            scale: 0.3,
-        }];
-        Some(Self::new(problem, parameters, Added::Power { channel, variable, largest }))
+        let term = Added::Power { channel, variable, largest };
+        Some(Self::new(problem.model, &problem.recording, vec![exponent()], term))
     }
 
     /// A smooth curve over a variable on one channel; none where the variable does not vary.
@@ -130,21 +151,45 @@ impl<'a> Extended<'a> {
         if !(half_width > 1e-12 * high.abs().max(low.abs())) {
             return None;
         }
-        let quantity = &problem.recording.channels[channel];
-        let parameters = (1..=DEGREE + 1)
-            .map(|d| Parameter {
-                name: format!("c{d}"),
-                unit: quantity.unit.clone(),
-                scope: Scope::Shared,
-                start: 0.0,
-                lower: f64::NEG_INFINITY,
-                upper: f64::INFINITY,
-                scale: 1.0,
-            })
-            .collect();
+        let parameters = powers(&problem.recording.channels[channel].unit);
         let term = Added::Smooth { channel, variable, centre: 0.5 * (low + high), half_width };
-        Some(Self::new(problem, parameters, term))
+        Some(Self::new(problem.model, &problem.recording, parameters, term))
     }
+}
+
+/// A shared parameter that starts at zero and is free in both directions up to a bound.
+fn free(name: String, unit: &str, scale: f64, bound: f64) -> Parameter {
+    let unit = unit.to_owned();
+    Parameter { name, unit, scope: Scope::Shared, start: 0.0, lower: -bound, upper: bound, scale }
+}
+
+/// The frequency of an oscillation, shared, and its amplitudes on each channel of each run.
+fn oscillation(
+    recording: &Recording,
+    sigma: &[f64],
+    [lower, upper]: [f64; 2],
+    start: f64,
+    scale: f64,
+) -> Vec<Parameter> {
+    let mut parameters = vec![Parameter { start, lower, upper, ..free("omega".into(), "rad", scale, 0.0) }];
+    for (c, (channel, sigma)) in recording.channels.iter().zip(sigma).enumerate() {
+        for part in ["cos", "sin"] {
+            // Nuisance parameters have a prior a thousand scales wide: here about the size of the residual.
+            let amplitude = free(format!("{part}_{c}"), &channel.unit, 3e-3 * sigma, f64::INFINITY);
+            parameters.push(Parameter { scope: Scope::PerRun, ..amplitude });
+        }
+    }
+    parameters
+}
+
+/// By how much the exponent of a variable is larger.
+fn exponent() -> Parameter {
+    free("exponent".into(), "", 0.3, 3.0)
+}
+
+/// Coefficients of a polynomial without its constant.
+fn powers(unit: &str) -> Vec<Parameter> {
+    (1..=DEGREE + 1).map(|d| free(format!("c{d}"), unit, 1.0, f64::INFINITY)).collect()
 }
 
 impl Model for Extended<'_> {

@@ -3,6 +3,7 @@
 use crate::diagnosis::Law;
 use crate::fit::optimum::Fit;
 use crate::problem::Problem;
+use crate::repaired::Repaired;
 use crate::selection::held_out::HeldOut;
 
 /// A law must gain this much log score on unseen data.
@@ -17,6 +18,7 @@ pub(crate) struct Found {
     pub(crate) predictions: Vec<Vec<Vec<f64>>>,
     pub(crate) held_out: HeldOut,
     pub(crate) fit: Fit,
+    pub(crate) repaired: Repaired,
 }
 
 /// Whether a law predicts unseen data well enough better.

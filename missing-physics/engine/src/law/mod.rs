@@ -3,8 +3,9 @@
 //! Four kinds of law are tried, the simplest first, each judged on data that its fit has not seen: a few of the model's
 //! candidate terms, another power of a variable, an oscillation of one frequency, and a smooth curve over a variable.
 
+pub(crate) mod added;
 mod describe;
-mod extended;
+pub(crate) mod extended;
 pub(crate) mod found;
 pub(crate) mod search;
 mod sparse;

@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use crate::diagnosis::{Estimate, Law};
 use crate::estimate::estimates::estimates;
 use crate::fit::prediction::predictions;
+use crate::law::added::AddedLaw;
 use crate::law::found::{Found, LEAST_GAIN, compared, improves};
 use crate::model::{PredictError, Quantity, Term};
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
+use crate::repaired::Repaired;
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::held_out::{HeldOut, held_out};
 
@@ -49,6 +51,7 @@ pub(crate) fn sparse(
         },
         predictions: predictions(problem, &fitted.fit)?,
         held_out: score,
+        repaired: Repaired { law: Some(AddedLaw::of_terms(spec, &terms)), ..Repaired::of(problem, &fitted) },
         fit: fitted.fit,
     }))
 }
