@@ -4,7 +4,7 @@ use crate::adequacy::test::Adequacy;
 use crate::data::Run;
 use crate::diagnosis::{
     ChannelFit, ChannelNoise, Closest, Curves, Diagnosis, Estimate, MechanismReport, NoiseSource, Outlier,
-    SetReport, Verdict,
+    RunSpread, SetReport, Verdict,
 };
 use crate::estimate::estimates::{estimates, of_mechanism};
 use crate::estimate::open_noise::with_open_noise;
@@ -14,6 +14,7 @@ use crate::model::{Mechanism, PredictError};
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::repaired::Repaired;
+use crate::runs::spread::spread;
 use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
 use crate::selection::main_cause::{Judged, MainCause};
@@ -58,6 +59,7 @@ impl Answer<'_> {
             self.baseline.selection.shared.iter().map(|&slot| self.problem.shared.index[slot]).collect();
         // A leftover in the model leaves the noise open by itself.
         let open = if with_leftover { None } else { with_open_noise(self.problem, self.rule, model) };
+        let (reported, between_runs) = self.allowing_for_runs(open.as_ref().unwrap_or(model))?;
         Ok(Diagnosis {
             verdict,
             p_value: adequacy.p_value,
@@ -78,6 +80,8 @@ impl Answer<'_> {
             leftover: Vec::new(),
             closest: None,
             limits: Vec::new(),
+            between_runs,
+            contradiction: None,
             final_p_value: None,
             after: before.clone(),
             before,
@@ -86,9 +90,16 @@ impl Answer<'_> {
             undetermined: Vec::new(),
             outliers: self.outliers.to_vec(),
             remarks: self.remarks(),
-            repaired: Repaired::of(self.problem, open.as_ref().unwrap_or(model)),
+            repaired: Repaired::of(self.problem, &reported),
             curves: self.curves()?,
         })
+    }
+
+    /// A candidate whose intervals allow for runs that differ, and by how much they do.
+    fn allowing_for_runs(&self, model: &Candidate) -> Result<(Candidate, Vec<RunSpread>), PredictError> {
+        let found = spread(self.problem, model)?;
+        let widened = found.as_ref().map_or_else(|| model.clone(), |found| found.widened(model));
+        Ok((widened, found.map_or_else(Vec::new, |found| found.report(self.problem, model))))
     }
 
     fn remarks(&self) -> Vec<String> {
@@ -211,11 +222,18 @@ impl Answer<'_> {
     }
 
     /// Every mechanism that the data can speak of, likeliest first.
-    pub(crate) fn mechanisms(&self, ranking: &Ranking, best: Option<&Best>) -> Vec<MechanismReport> {
-        let best = best.map(|b| ranking.at(b.at));
-        let open = best.and_then(|b| with_open_noise(self.problem, self.rule, b));
+    pub(crate) fn mechanisms(
+        &self,
+        ranking: &Ranking,
+        best: Option<&Best>,
+    ) -> Result<Vec<MechanismReport>, PredictError> {
         let sets: Vec<(&Candidate, f64)> = ranking.physical().collect();
-        self.reports(ranking, open.as_ref().or(best), &sets, best.is_some())
+        let Some(best) = best.map(|b| ranking.at(b.at)) else {
+            return Ok(self.reports(ranking, None, &sets, false));
+        };
+        let open = with_open_noise(self.problem, self.rule, best);
+        let (reported, between_runs) = self.allowing_for_runs(open.as_ref().unwrap_or(best))?;
+        Ok(self.reports(ranking, Some(&reported), &sets, between_runs.is_empty()))
     }
 
     /// The same where a leftover is in the model: of all sets, the main cause and its rivals count.
@@ -223,11 +241,12 @@ impl Answer<'_> {
         &self,
         ranking: &Ranking,
         cause: &MainCause,
-    ) -> Vec<MechanismReport> {
+    ) -> Result<Vec<MechanismReport>, PredictError> {
         let all = || std::iter::once(&cause.chosen).chain(&cause.rivals).map(|judged| &judged.candidate);
         let evidence: Vec<f64> = all().map(|c| c.evidence).collect();
         let sets: Vec<(&Candidate, f64)> = all().zip(probabilities(&evidence)).collect();
-        self.reports(ranking, Some(&cause.chosen.candidate), &sets, false)
+        let (reported, _) = self.allowing_for_runs(&cause.chosen.candidate)?;
+        Ok(self.reports(ranking, Some(&reported), &sets, false))
     }
 
     fn reports(

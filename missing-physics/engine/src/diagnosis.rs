@@ -184,6 +184,36 @@ pub struct Closest {
     pub parameters: Vec<Estimate>,
 }
 
+/// By how much a parameter differs from run to run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunSpread {
+    /// Name of the parameter, with its unit as a suffix.
+    pub parameter: String,
+    /// The unit alone.
+    pub unit: String,
+    /// Its common value.
+    pub value: f64,
+    /// Standard deviation between runs beyond what their noise explains; the parameter's interval allows for it.
+    pub standard_deviation: f64,
+}
+
+/// A few runs that contradict the others, and the answer without them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Contradiction {
+    /// Labels of the runs.
+    pub runs: Vec<String>,
+    /// The part of the squared misfit beyond the noise that lies in them, of a model fitted to the others.
+    pub share: f64,
+    /// The verdict without them.
+    pub verdict: Verdict,
+    /// The set chosen without them.
+    pub chosen: Vec<String>,
+    /// Other sets that fit equally well without them.
+    pub confused_with: Vec<Vec<String>>,
+    /// The chosen set's parameters without them.
+    pub parameters: Vec<Estimate>,
+}
+
 /// What these data would have shown of a mechanism that they do not show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Limit {
@@ -309,6 +339,10 @@ pub struct Diagnosis {
     pub closest: Option<Closest>,
     /// The size of each mechanism that would have shown, for [`Verdict::Adequate`].
     pub limits: Vec<Limit>,
+    /// Parameters of the chosen mechanisms that differ from run to run.
+    pub between_runs: Vec<RunSpread>,
+    /// Runs that contradict the others, where there are a few and the others have a better answer.
+    pub contradiction: Option<Contradiction>,
     /// p-value of the final model's adequacy, where one was chosen.
     pub final_p_value: Option<f64>,
     /// Errors of the baseline.

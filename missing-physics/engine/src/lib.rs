@@ -19,6 +19,7 @@ pub mod oracle;
 mod problem;
 mod quantity;
 pub mod repaired;
+mod runs;
 mod selection;
 mod statistics;
 pub mod synthetic;

@@ -26,7 +26,7 @@ impl Line {
         let parameters = parameters.map(|(name, start)| parameter(name, start, ANY)).into();
         let kink = mechanism("kink", vec![1]);
         let law =
-            |s: &[f64], _: &[f64], x: f64| s[0] * x + s[1] * (x - 3.0).max(0.0).min(0.1) + s[2] * x.powi(4);
+            |s: &[f64], _: &[f64], x: f64| s[0] * x + s[1] * (x - 3.0).clamp(0.0, 0.1) + s[2] * x.powi(4);
         Self(Curve::new(parameters, vec![kink], law))
     }
 }

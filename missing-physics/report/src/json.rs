@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use missing_physics::diagnosis::{
-    ChannelFit, ChannelNoise, Closest, Confusion, Diagnosis, Estimate, Law, Limit, Location, MechanismReport,
-    NextExperiment, Outlier, SetReport, TestOutcome,
+    ChannelFit, ChannelNoise, Closest, Confusion, Contradiction, Diagnosis, Estimate, Law, Limit, Location,
+    MechanismReport, NextExperiment, Outlier, RunSpread, SetReport, TestOutcome,
 };
 use serde::Serialize;
 use serde_json::{Value, json as value};
@@ -29,6 +29,8 @@ struct Answer<'a> {
     leftover: Vec<Value>,
     closest: Value,
     limits: Vec<Value>,
+    between_runs: Vec<Value>,
+    contradiction: Value,
     law: Value,
     next_experiment: Value,
     #[serde(flatten)]
@@ -66,6 +68,8 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
         leftover: d.leftover.iter().map(place).collect(),
         closest: d.closest.as_ref().map_or(Value::Null, closest),
         limits: d.limits.iter().map(limit).collect(),
+        between_runs: d.between_runs.iter().map(spread).collect(),
+        contradiction: d.contradiction.as_ref().map_or(Value::Null, contradiction),
         law: d.law.as_ref().map_or(Value::Null, law),
         next_experiment: d.next_experiment.as_ref().map_or(Value::Null, next_experiment),
         p_floor: d.p_floor,
@@ -103,6 +107,15 @@ fn closest(c: &Closest) -> Value {
 
 fn limit(l: &Limit) -> Value {
     value!({"id": l.id, "parameter": l.parameter, "unit": l.unit, "upper": l.upper})
+}
+
+fn spread(s: &RunSpread) -> Value {
+    value!({"parameter": s.parameter, "unit": s.unit, "value": s.value, "standard_deviation": s.standard_deviation})
+}
+
+fn contradiction(c: &Contradiction) -> Value {
+    value!({"runs": c.runs, "share": c.share, "verdict": c.verdict.word(), "chosen": c.chosen,
+        "confused_with": c.confused_with, "parameters": estimates(&c.parameters)})
 }
 
 fn mechanism(m: &MechanismReport) -> Value {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Law, Location, MechanismReport, Verdict};
+use missing_physics::diagnosis::{Diagnosis, Law, Location, MechanismReport, RunSpread, Verdict};
 
 use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, probability, significant};
@@ -35,6 +35,9 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
     }
     for place in d.leftover.iter().take(3) {
         page.entry("left", &leftover_sentence(d, place));
+    }
+    for line in runs(d) {
+        page.entry("runs", &line);
     }
     if d.verdict == Verdict::Adequate {
         for noise in &d.noise {
@@ -178,6 +181,34 @@ pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
         format!("{} takes away {share:.0} % of the misfit, too little to be named", named(d, &closest.ids));
     let parameters = closest.parameters.iter().map(|e| format!("{}, if it is at work", estimate(e)));
     std::iter::once(words).chain(parameters).collect()
+}
+
+/// How runs differ, and which contradict the others, a line each.
+pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
+    let spread = |s: &RunSpread| {
+        format!(
+            "{} differs from run to run by {} {} (one standard deviation) beyond their noise; its interval allows for that",
+            s.parameter,
+            significant(s.standard_deviation, 2),
+            s.unit
+        )
+        .replace("  ", " ")
+    };
+    let mut lines: Vec<String> = d.between_runs.iter().map(spread).collect();
+    let Some(c) = &d.contradiction else { return lines };
+    let (which, them) = match &c.runs[..] {
+        [one] => (format!("run {one} contradicts the others and holds"), "it"),
+        several => (format!("runs {} contradict the others and hold", listed(several)), "them"),
+    };
+    let sets: Vec<String> = std::iter::once(&c.chosen).chain(&c.confused_with).map(|s| named(d, s)).collect();
+    let answer = match c.verdict {
+        Verdict::Adequate => "the simulation explains the recording".to_owned(),
+        Verdict::Partly => format!("{} takes away most of the misfit", sets.join(" or ")),
+        _ => format!("{} explains the recording", sets.join(" or ")),
+    };
+    lines.push(format!("{which} {:.0} % of the misfit; without {them} {answer}", 100.0 * floored(c.share)));
+    lines.extend(c.parameters.iter().map(|e| format!("without {them}: {}", estimate(e))));
+    lines
 }
 
 /// The sizes of each mechanism that would have shown, a line each.

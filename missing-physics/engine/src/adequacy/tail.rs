@@ -10,6 +10,8 @@ pub(crate) enum Tail {
     Constant,
     Gamma(Gamma),
     Normal(Normal),
+    /// Counted, of a statistic that is the same in most draws: the draws, rising.
+    Counted(Vec<f64>),
 }
 
 /// From this shape on a gamma law is a normal one: its skewness is 0.02, and its tail, a series, takes time with the root of the shape.
@@ -34,7 +36,14 @@ impl Tail {
         }
     }
 
-    /// Share of the null distribution above a value.
+    /// From draws of a statistic that is the same in most of them.
+    pub(crate) fn counted(values: impl Iterator<Item = f64>) -> Self {
+        let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+        values.sort_by(f64::total_cmp);
+        Self::Counted(values)
+    }
+
+    /// Share of the null distribution at or above a value.
     pub(crate) fn p(&self, value: f64) -> f64 {
         if !(value > 0.0 && value.is_finite()) {
             return 1.0;
@@ -43,6 +52,10 @@ impl Tail {
             Self::Constant => 1.0,
             Self::Gamma(law) => law.sf(value).clamp(1e-300, 1.0),
             Self::Normal(law) => law.sf(value).clamp(1e-300, 1.0),
+            Self::Counted(draws) => {
+                let above = draws.len() - draws.partition_point(|draw| *draw < value);
+                ((above as f64 + 1.0) / (draws.len() as f64 + 1.0)).min(1.0)
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::adequacy::linearised::{Linearised, Reading};
 use crate::adequacy::null::draw;
-use crate::adequacy::omnibus::{omnibus, omnibus_names};
+use crate::adequacy::omnibus::{omnibus, omnibus_tests};
 use crate::adequacy::tail::Tail;
 use crate::diagnosis::TestOutcome;
 use crate::fit::optimum::Fit;
@@ -49,9 +49,10 @@ pub(crate) fn test(
 
     let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
         let reading = linearised.read(data);
-        let white = linearised.whitened_residual(data, &reading);
+        let left = linearised.residual(data, &reading);
+        let white = linearised.whitened(&left, &reading);
         let mut all = reading.gains;
-        all.extend(omnibus(problem, &white, rule));
+        all.extend(omnibus(problem, &left, &white, rule));
         all
     };
     let seen = statistics(&observed);
@@ -59,7 +60,13 @@ pub(crate) fn test(
         .into_par_iter()
         .map(|k| statistics(&draw(problem, &truth, rule, seed, k)))
         .collect();
-    let tails: Vec<Tail> = (0..seen.len()).map(|t| Tail::new(null.iter().map(|row| row[t]))).collect();
+    let undirected = omnibus_tests(problem, rule);
+    let first = seen.len() - undirected.len();
+    let tail = |t: usize| {
+        let draws = null.iter().map(|row| row[t]);
+        if t >= first && undirected[t - first].rare { Tail::counted(draws) } else { Tail::new(draws) }
+    };
+    let tails: Vec<Tail> = (0..seen.len()).map(tail).collect();
     let directed = linearised.mechanisms;
     let smallest = |row: &[f64]| {
         let weighted = row.iter().zip(&tails).enumerate().map(|(t, (x, tail))| {
@@ -70,7 +77,8 @@ pub(crate) fn test(
     };
     let observed_smallest = smallest(&seen);
     let below = null.iter().filter(|row| smallest(row) <= observed_smallest).count();
-    let names = linearised.alternatives.iter().map(|a| a.name.clone()).chain(omnibus_names(problem, rule));
+    let names = linearised.alternatives.iter().map(|a| a.name.clone());
+    let names = names.chain(undirected.into_iter().map(|test| test.name));
     let mut tests: Vec<TestOutcome> = names
         .zip(seen.iter().zip(&tails))
         .map(|(name, (&statistic, tail))| TestOutcome { name, statistic, p_value: tail.p(statistic) })

@@ -15,6 +15,7 @@ use crate::model::{Experiment, PredictError};
 use crate::noise::rule::NoiseState;
 use crate::observer::{Observer, Progress};
 use crate::problem::Problem;
+use crate::runs::contradicting::{Contradicting, contradicting};
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::confusion::confusion;
 use crate::selection::held_out::held_out;
@@ -25,6 +26,12 @@ use crate::selection::search::{Searched, search};
 /// Tells the observer of a step; an error where it stops the work.
 pub(super) fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseError> {
     if observer.progress(Progress { stage, done }) { Ok(()) } else { Err(DiagnoseError::Stopped) }
+}
+
+/// An answer, and runs that contradict the others by it.
+pub(super) struct Outcome {
+    pub(super) diagnosis: Diagnosis,
+    pub(super) contradicting: Option<Contradicting>,
 }
 
 /// The way from a fitted baseline to an answer.
@@ -52,7 +59,7 @@ impl Course<'_> {
     }
 
     /// The whole way.
-    pub(super) fn run(&self) -> Result<Diagnosis, DiagnoseError> {
+    pub(super) fn run(&self) -> Result<Outcome, DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell("adequacy of the baseline", 0.0)?;
         let adequacy = self.test(baseline, 1)?;
@@ -68,7 +75,7 @@ impl Course<'_> {
             let mut diagnosis =
                 answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?;
             diagnosis.limits = limits(problem, rule, baseline);
-            return Ok(diagnosis);
+            return Ok(Outcome { diagnosis, contradicting: None });
         }
         let (mut ranking, unfitted) = self.compare()?;
         self.tell("adequacy of the best explanation", 0.0)?;
@@ -97,19 +104,26 @@ impl Course<'_> {
                 (judge, cause)
             }
         };
-        let mut diagnosis = match (cause, explained) {
-            (Some(cause), _) => self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?,
-            (None, Some(chosen)) => self.explained(&answer, &adequacy, before, &ranking, chosen, &judge)?,
+        let (mut diagnosis, misses) = match (cause, explained) {
+            (Some(cause), _) => {
+                let diagnosis = self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?;
+                (diagnosis, Some(cause.chosen.plain))
+            }
+            (None, Some(chosen)) => {
+                (self.explained(&answer, &adequacy, before, &ranking, chosen, &judge)?, None)
+            }
             (None, None) => {
                 let mut diagnosis = answer.skeleton(&adequacy, Verdict::Unexplained, baseline, before)?;
-                diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref());
+                diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref())?;
                 let closest = judge.closest();
                 diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
-                let set = closest.map_or_else(Vec::new, |closest| closest.candidate.set);
-                self.unexplained(&mut diagnosis, &answer, &ranking, &set)?;
-                diagnosis
+                let misses = closest.map_or_else(|| self.least_squares.clone(), |closest| closest.plain);
+                self.unexplained(&mut diagnosis, &answer, &ranking, &misses.set)?;
+                (diagnosis, Some(misses))
             }
         };
+        let judged = misses.map(|model| contradicting(problem, &model.selection, &model.fit, &white));
+        let contradicting = judged.transpose()?.flatten();
         let explained = explained.filter(|_| diagnosis.verdict != Verdict::Partly);
         diagnosis.remarks.extend(answer.unfitted(&unfitted));
         diagnosis.sets = answer.sets(&ranking, best.as_ref());
@@ -118,8 +132,7 @@ impl Course<'_> {
             None => white,
         };
         diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &sigma)?;
-        self.tell("done", 1.0)?;
-        Ok(diagnosis)
+        Ok(Outcome { diagnosis, contradicting })
     }
 
     /// Errors of the plain simulation.
@@ -154,7 +167,7 @@ impl Course<'_> {
         let problem = &self.begun.problem;
         let chosen = &cause.chosen.candidate;
         let mut diagnosis = answer.skeleton(adequacy, Verdict::Partly, chosen, before)?;
-        diagnosis.mechanisms = answer.mechanisms_beside_a_leftover(ranking, cause);
+        diagnosis.mechanisms = answer.mechanisms_beside_a_leftover(ranking, cause)?;
         diagnosis.chosen = answer.ids(&chosen.set);
         diagnosis.explained_share = Some(cause.chosen.share);
         diagnosis.leftover = locate(problem, &chosen.selection, &chosen.fit, white)?;
@@ -187,7 +200,7 @@ impl Course<'_> {
         let problem = &self.begun.problem;
         let chosen = ranking.at(best.at);
         let mut diagnosis = answer.skeleton(adequacy, Verdict::Explained, chosen, before)?;
-        diagnosis.mechanisms = answer.mechanisms(ranking, Some(best));
+        diagnosis.mechanisms = answer.mechanisms(ranking, Some(best))?;
         diagnosis.final_p_value = Some(best.p_value);
         diagnosis.chosen = answer.ids(&chosen.set);
         diagnosis.explained_share = judge.share(&chosen.set);

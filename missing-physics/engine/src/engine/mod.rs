@@ -5,11 +5,12 @@ mod course;
 mod input;
 
 use crate::data::Recording;
-use crate::diagnosis::Diagnosis;
+use crate::diagnosis::{Contradiction, Diagnosis, Verdict};
 use crate::model::{Experiment, Model};
 use crate::observer::Observer;
+use crate::runs::contradicting::Contradicting;
 use begin::{begin, least_squares_baseline};
-use course::{Course, tell};
+use course::{Course, Outcome, tell};
 use input::check_experiment;
 
 pub use input::{DiagnoseError, Options};
@@ -43,9 +44,55 @@ fn diagnose_with(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    tell(observer, "reading the noise", 0.0)?;
     experiments.iter().try_for_each(|e| check_experiment(model.spec(), recording, e))?;
+    let Outcome { mut diagnosis, contradicting } = outcome(model, recording, experiments, options, observer)?;
+    if let Some(Contradicting { runs, share }) = contradicting {
+        tell(observer, "the answer without the runs that contradict the rest", 0.0)?;
+        let mut rest = recording.clone();
+        let mut contradicting = Vec::new();
+        for run in runs.iter().rev() {
+            contradicting.insert(0, rest.runs.remove(*run).label);
+        }
+        // Without those runs nothing may be left to tell, which is no failure of the whole.
+        let without = match outcome(model, &rest, &[], options, observer) {
+            Err(DiagnoseError::Stopped) => return Err(DiagnoseError::Stopped),
+            without => without.ok().map(|without| without.diagnosis),
+        };
+        diagnosis.contradiction = without
+            .filter(|without| says(without.verdict) > says(diagnosis.verdict))
+            .map(|without| contradiction(contradicting, share, without));
+    }
+    tell(observer, "done", 1.0)?;
+    Ok(diagnosis)
+}
+
+/// One diagnosis of all runs of a recording.
+fn outcome(
+    model: &dyn Model,
+    recording: &Recording,
+    experiments: &[Experiment],
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Outcome, DiagnoseError> {
+    tell(observer, "reading the noise", 0.0)?;
     let begun = begin(model, recording, options)?;
     let least_squares = least_squares_baseline(&begun)?;
     Course { begun: &begun, least_squares: &least_squares, experiments, options, observer }.run()
+}
+
+/// How much a verdict says.
+fn says(verdict: Verdict) -> usize {
+    match verdict {
+        Verdict::Unexplained => 0,
+        Verdict::Partly => 1,
+        Verdict::Ambiguous => 2,
+        Verdict::Explained | Verdict::Adequate => 3,
+    }
+}
+
+fn contradiction(runs: Vec<String>, share: f64, without: Diagnosis) -> Contradiction {
+    let Diagnosis { verdict, chosen, confused_with, mechanisms, .. } = without;
+    let of_chosen = mechanisms.into_iter().filter(|m| chosen.contains(&m.id));
+    let parameters = of_chosen.flat_map(|m| m.parameters).collect();
+    Contradiction { runs, share, verdict, chosen, confused_with, parameters }
 }

@@ -6,4 +6,4 @@ pub(crate) mod open_noise;
 mod over_runs;
 pub(crate) mod profile;
 mod propagate;
-mod reach;
+pub(crate) mod reach;

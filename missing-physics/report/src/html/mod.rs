@@ -11,7 +11,7 @@ use missing_physics::diagnosis::{Diagnosis, Law, NextExperiment, Verdict};
 use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::svg::{CHART_STYLE, escape};
-use super::text::{closest, headline, law_kind, leftover_sentence, limits, noise_sentence, where_sentence};
+use super::text::{closest, headline, law_kind, leftover_sentence, limits, noise_sentence, runs, where_sentence};
 use super::{corner, explore, plots};
 
 pub use index::{Entry, index};
@@ -55,6 +55,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     let misses: Vec<String> = d.location.iter().map(|l| where_sentence(d, l)).collect();
     section(&mut page, "Where it misses", &list(&misses));
     section(&mut page, "How much better", &tables::errors(d, context));
+    section(&mut page, "Runs that differ", &list(&runs(d)));
     section(&mut page, "What would have shown, if larger", &list(&limits(d)));
     let unsure: Vec<String> = d.undetermined.iter().chain(&d.remarks).cloned().collect();
     section(&mut page, "What these data cannot say", &list(&unsure));

@@ -42,28 +42,33 @@ impl Linearised<'_> {
         (self.chi2(products, &beside, nuisance, shared, &without) - with).max(0.0)
     }
 
-    /// The whitened residual of a data vector under the model alone, `[run][channel]`.
-    pub(crate) fn whitened_residual(&self, data: &[Vec<Vec<f64>>], reading: &Reading) -> Vec<Vec<Vec<f64>>> {
+    /// The residual of a data vector under the model alone, `[run][channel]`.
+    pub(crate) fn residual(&self, data: &[Vec<Vec<f64>>], reading: &Reading) -> Vec<Vec<Vec<f64>>> {
         let used = self.n_nuisance + self.n_shared;
-        data.iter()
-            .enumerate()
-            .map(|(run, row)| {
-                row.iter()
-                    .enumerate()
-                    .map(|(channel, raw)| {
-                        let (shape, sigma) = reading.noise[channel];
-                        let mut y = raw.clone();
-                        for (column, x) in
-                            self.blocks[run][channel].raw[..used].iter().zip(&reading.coefficients[run])
-                        {
-                            y.iter_mut().zip(column).for_each(|(v, c)| *v -= x * c);
-                        }
-                        self.problem.whitener(run, channel, self.in_play[shape]).whiten(&mut y);
-                        y.iter_mut().for_each(|v| *v /= sigma);
-                        y
-                    })
-                    .collect()
-            })
-            .collect()
+        let column = |run: usize, channel: usize, measured: &[f64]| {
+            let mut left = measured.to_vec();
+            let fitted = self.blocks[run][channel].raw[..used].iter().zip(&reading.coefficients[run]);
+            for (column, x) in fitted {
+                left.iter_mut().zip(column).for_each(|(v, c)| *v -= x * c);
+            }
+            left
+        };
+        let of_run = |(run, row): (usize, &Vec<Vec<f64>>)| {
+            row.iter().enumerate().map(|(channel, measured)| column(run, channel, measured)).collect()
+        };
+        data.iter().enumerate().map(of_run).collect()
+    }
+
+    /// A residual, whitened and in units of its noise.
+    pub(crate) fn whitened(&self, residual: &[Vec<Vec<f64>>], reading: &Reading) -> Vec<Vec<Vec<f64>>> {
+        let mut white = residual.to_vec();
+        for (run, row) in white.iter_mut().enumerate() {
+            for (channel, column) in row.iter_mut().enumerate() {
+                let (shape, sigma) = reading.noise[channel];
+                self.problem.whitener(run, channel, self.in_play[shape]).whiten(column);
+                column.iter_mut().for_each(|v| *v /= sigma);
+            }
+        }
+        white
     }
 }

@@ -1,0 +1,101 @@
+//! Runs that differ, and runs that contradict the others.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test stops where it fails")]
+
+mod common;
+
+use common::{Ball, World};
+use missing_physics::data::Recording;
+use missing_physics::diagnosis::{Diagnosis, Verdict};
+use missing_physics::engine::{Options, diagnose};
+use missing_physics::observer::Silent;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+fn answer(recording: &Recording) -> Diagnosis {
+    let options = Options { replicates: 199, ..Options::default() };
+    diagnose(&Ball::default(), recording, &[], &options, &Silent).unwrap()
+}
+
+/// Eight flights, each with a drag of its own.
+fn flights(seed: u64, scatter: f64) -> Recording {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let drag = Normal::new(0.3, scatter).unwrap();
+    let mut one = |run: u64| {
+        World { runs: 1, linear_drag: drag.sample(&mut rng), ..World::NULL }.draw(1000 * seed + run)
+    };
+    let mut recording = one(0);
+    for run in 1..8 {
+        let mut next = one(run).runs.remove(0);
+        next.label = (run + 1).to_string();
+        recording.runs.push(next);
+    }
+    recording
+}
+
+/// How often runs are said to differ, and how often the interval holds the mean drag, of answers that name the drag.
+fn judged(scatter: f64) -> [usize; 3] {
+    let (mut named, mut differ, mut hold) = (0, 0, 0);
+    for seed in 0..60 {
+        let answer = answer(&flights(seed, scatter));
+        let Some(drag) =
+            answer.mechanisms.iter().find(|m| m.id == "linear-drag" && answer.chosen == [m.id.clone()])
+        else {
+            continue;
+        };
+        let [low, high] = drag.parameters[0].ci95;
+        named += 1;
+        differ += usize::from(!answer.between_runs.is_empty());
+        hold += usize::from(low <= 0.3 && 0.3 <= high);
+    }
+    println!("scatter {scatter}: {named} named, {differ} said to differ, {hold} intervals hold");
+    [named, differ, hold]
+}
+
+#[test]
+fn an_interval_allows_for_runs_that_differ() {
+    let [named, differ, hold] = judged(0.0);
+    assert!(named >= 55 && differ <= 3 && hold as f64 >= 0.88 * named as f64);
+    let [named, differ, hold] = judged(0.05);
+    assert!(named >= 40 && differ as f64 >= 0.8 * named as f64 && hold as f64 >= 0.85 * named as f64);
+}
+
+/// Six flights, the fourth of which is knocked half way.
+fn knocked(linear_drag: f64) -> Recording {
+    let mut recording = World { runs: 6, linear_drag, ..World::NULL }.draw(11);
+    let run = &mut recording.runs[3];
+    for (z, t) in run.outputs[0].iter_mut().zip(&run.inputs[0]) {
+        *z += 0.5 * (t - 0.6).max(0.0);
+    }
+    recording
+}
+
+#[test]
+fn a_run_that_contradicts_the_others_is_named_and_the_answer_without_it_said() {
+    for (drag, verdict, chosen) in
+        [(0.0, Verdict::Adequate, None), (0.4, Verdict::Explained, Some("linear-drag"))]
+    {
+        let options = Options::default();
+        let answer = diagnose(&Ball::default(), &knocked(drag), &[], &options, &Silent).unwrap();
+        assert_ne!(answer.verdict, Verdict::Adequate);
+        let found = answer.contradiction.unwrap();
+        assert_eq!((found.runs, found.verdict), (vec!["4".to_owned()], verdict));
+        assert!(
+            found.share > 0.8 && found.chosen.iter().map(String::as_str).eq(chosen),
+            "{:?}",
+            found.chosen
+        );
+    }
+}
+
+#[test]
+fn runs_that_share_a_misfit_do_not_contradict_each_other() {
+    let mut recording = World { runs: 6, ..World::NULL }.draw(12);
+    for run in &mut recording.runs {
+        for (z, t) in run.outputs[0].iter_mut().zip(&run.inputs[0]) {
+            *z += 0.02 * (15.0 * t).sin();
+        }
+    }
+    let answer = answer(&recording);
+    assert_eq!((answer.verdict, answer.contradiction), (Verdict::Unexplained, None));
+}
