@@ -16,7 +16,7 @@ use crate::noise::rule::NoiseState;
 use crate::observer::{Observer, Progress};
 use crate::problem::Problem;
 use crate::runs::contradicting::{Contradicting, contradicting};
-use crate::selection::candidate::{Candidate, candidate};
+use crate::selection::candidate::{Candidate, candidate, nested};
 use crate::selection::confusion::confusion;
 use crate::selection::held_out::held_out;
 use crate::selection::main_cause::{Judge, MainCause};
@@ -96,7 +96,10 @@ impl Course<'_> {
             judge.filter(|judge| judge.holds(&chosen.set))
         });
         let (judge, cause) = match sound {
-            Some(judge) => (judge, None),
+            // What explains the data doubtfully is weighed against less of it beside a leftover.
+            Some(judge) => {
+                (judge, explained.and_then(|best| self.less_beside_a_leftover(&ranking, best, &white)))
+            }
             None => {
                 self.tell("what the closest explanation leaves", 0.0)?;
                 let judge = Judge::new(problem, rule, ranking.all(), &white, |_| true);
@@ -133,6 +136,21 @@ impl Course<'_> {
         };
         diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &sigma)?;
         Ok(Outcome { diagnosis, contradicting })
+    }
+
+    /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of
+    /// what is left without them.
+    fn less_beside_a_leftover(&self, ranking: &Ranking, best: &Best, white: &[f64]) -> Option<MainCause> {
+        let Begun { problem, rule, .. } = self.begun;
+        let chosen = ranking.at(best.at);
+        if best.p_value > self.options.alpha || chosen.set.len() < 2 {
+            return None;
+        }
+        let cause = Judge::new(problem, rule, ranking.all(), white, |_| true).main_cause();
+        cause.filter(|cause| {
+            let less = &cause.chosen.candidate;
+            less.set.len() < chosen.set.len() && nested(less, chosen)
+        })
     }
 
     /// Errors of the plain simulation.
