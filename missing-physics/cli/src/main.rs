@@ -245,6 +245,10 @@ fn deliver(said: &Said, quiet: bool) -> Result<(), String> {
         let text = shown(&said.text, std::io::stdout().is_terminal());
         out.write_all(text.as_bytes()).and_then(|()| out.flush())
     };
+    if let Some(note) = said.note.as_ref().filter(|_| !quiet) {
+        // A reader that has gone away misses a note, no more.
+        let _ = writeln!(std::io::stderr(), "note: {}", shown(note, std::io::stderr().is_terminal()));
+    }
     said.write_files().map_err(|error| error.to_string())?;
     match printed {
         // A reader that has gone away is no failure of ours.

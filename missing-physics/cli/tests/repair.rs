@@ -90,6 +90,25 @@ fn the_end_of_a_flight_is_predicted_from_its_beginning() {
     assert!(plain > 5.0 * error && overconfident < 0.5, "{plain} m, {overconfident}");
 }
 
+/// A model of a recording that is explained in part predicts with a note; one of an adequate recording without.
+#[test]
+fn a_model_says_what_its_diagnosis_left_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("model.json");
+    let unexplained = Some("leaves a part of its recording unexplained");
+    for (name, open) in [("measured/trajectory/desilva-tennis-ball", unexplained), ("steel-ball", None)] {
+        let recording = recordings().join(name);
+        model_of(&recording, &file);
+        let tool = env!("CARGO_BIN_EXE_missing-physics");
+        let output = Command::new(tool).arg("predict").arg(&file).arg(&recording).output().unwrap();
+        let noted = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            output.status.success() && open.map_or(noted.is_empty(), |open| noted.contains(open)),
+            "{noted}"
+        );
+    }
+}
+
 #[test]
 fn what_does_not_fit_is_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,6 +10,8 @@ use super::error::CommandError;
 pub struct Said {
     /// For a person.
     pub text: String,
+    /// What the person should know beside it, for standard error.
+    pub note: Option<String>,
     /// What failed beside what is said, for the end: the exit status says it as well.
     pub failure: Option<String>,
     files: Vec<(Place, Vec<u8>)>,
@@ -51,6 +53,7 @@ impl Said {
     pub(super) fn join(&mut self, other: Self) {
         self.text.push_str(&other.text);
         self.files.extend(other.files);
+        self.note = self.note.take().or(other.note);
         self.failure = self.failure.take().or(other.failure);
     }
 

@@ -10,7 +10,8 @@ use missing_physics_domains::repair::Repair;
 /// Half the width of a 95 % interval of a normal law, in sigmas.
 const SIGMAS: f64 = 1.959_963_984_540_054;
 
-/// Predicts a recording and returns a table, or has it written to a file and says so.
+/// Predicts a recording and returns a table, or has it written to a file and says so; a model of a diagnosis that left something open comes
+/// with a note.
 ///
 /// Columns: `run`, the inputs, and for each channel its simulated value, one sigma of that, and the bounds between which a
 /// reading lies with 95 %.
@@ -48,9 +49,16 @@ pub fn predict(model: &Path, folder: &Path, csv: Option<&Path>) -> Result<Said, 
             text.push('\n');
         }
     }
-    let (Some(path), Some(place)) = (csv, places.first()) else { return Ok(text.into()) };
-    let mut said = Said::from(format!("{}: {} runs predicted\n", path.display(), predicted.runs.len()));
-    said.write(place, text);
+    let mut said = match (csv, places.first()) {
+        (Some(path), Some(place)) => {
+            let mut said =
+                Said::from(format!("{}: {} runs predicted\n", path.display(), predicted.runs.len()));
+            said.write(place, text);
+            said
+        }
+        _ => text.into(),
+    };
+    said.note = repair.caveat().map(|why| format!("{}: {why}", model.display()));
     Ok(said)
 }
 

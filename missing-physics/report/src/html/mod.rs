@@ -11,7 +11,9 @@ use missing_physics::diagnosis::{Diagnosis, Law, NextExperiment, Verdict};
 use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::svg::{CHART_STYLE, escape};
-use super::text::{closest, headline, law_kind, leftover_sentence, limits, noise_sentence, runs, where_sentence};
+use super::text::{
+    closest, headline, law_kind, leftover_sentence, limits, noise_sentence, runs, where_sentence,
+};
 use super::{corner, explore, plots};
 
 pub use index::{Entry, index};
