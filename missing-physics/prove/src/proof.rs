@@ -49,7 +49,12 @@ struct Plan {
 
 /// The domains of which worlds can be drawn.
 pub fn provable() -> Vec<&'static str> {
-    makers().iter().map(|m| m.name()).collect()
+    known().map(|m| m.name()).collect()
+}
+
+/// The makers of worlds whose domain is compiled in.
+fn known() -> impl Iterator<Item = &'static dyn Maker> {
+    makers().iter().copied().filter(|m| missing_physics_domains::find(m.domain()).is_ok())
 }
 
 /// Draws the worlds, seals their answers, diagnoses each from its files, opens the seal and scores; goes on where a proof of the same
@@ -58,11 +63,8 @@ pub fn provable() -> Vec<&'static str> {
 /// # Errors
 /// [`ProveError`]: an unknown domain, another proof in the folder, a file that cannot be written, or a stop.
 pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<String, ProveError> {
-    let chosen: Vec<&'static dyn Maker> = makers()
-        .iter()
-        .copied()
-        .filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name()))
-        .collect();
+    let chosen: Vec<&'static dyn Maker> =
+        known().filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name())).collect();
     if chosen.is_empty() {
         let domain = arguments.domain.clone().unwrap_or_default();
         return Err(ProveError::UnknownDomain { domain, known: provable() });

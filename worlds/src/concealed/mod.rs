@@ -9,6 +9,7 @@ mod indentation;
 mod key;
 mod liquid_tilt;
 mod maker;
+mod motion;
 mod nuisances;
 mod rig;
 mod slosh;
@@ -28,6 +29,7 @@ pub fn makers() -> &'static [&'static dyn Maker] {
         &RigMaker::<liquid_tilt::Container>::NEW,
         &RigMaker::<indentation::Press>::NEW,
         &RigMaker::<dough_roll::Table>::NEW,
+        &RigMaker::<motion::Machine>::NEW,
         &custom::Custom,
     ]
 }

@@ -39,15 +39,42 @@ impl Nuisances {
     pub(crate) fn residual_norm(&self, change: &[f64]) -> f64 {
         norm(&self.residual(change))
     }
+}
 
-    /// The spaces with any two of the directions added: two listed mechanisms that might mimic an unlisted effect.
-    pub(crate) fn with_pairs(&self, directions: &[Vec<f64>]) -> Vec<Self> {
-        let mut pairs = Vec::new();
-        for (i, first) in directions.iter().enumerate() {
-            let one = self.with(first);
-            pairs.extend(directions[i + 1..].iter().map(|second| one.with(second)));
+/// A space to which any two of some directions may be added: two listed mechanisms that might mimic an unlisted effect.
+pub(crate) struct Pairs {
+    space: Nuisances,
+    /// What the space leaves of the directions, each of length one.
+    rests: Vec<Vec<f64>>,
+    /// Their products.
+    products: Vec<Vec<f64>>,
+}
+
+impl Pairs {
+    pub(crate) fn new(space: Nuisances, directions: &[Vec<f64>]) -> Self {
+        let rests: Vec<Vec<f64>> =
+            directions.iter().flat_map(|d| space.with(d).0.split_off(space.0.len())).collect();
+        let products = rests.iter().map(|a| rests.iter().map(|b| dot(a, b)).collect()).collect();
+        Self { space, rests, products }
+    }
+
+    /// The root of the sum of squares of what the space and the best pair leave of a change.
+    pub(crate) fn residual_norm(&self, change: &[f64]) -> f64 {
+        let rest = self.space.residual(change);
+        let whole = dot(&rest, &rest);
+        let along: Vec<f64> = self.rests.iter().map(|r| dot(r, &rest)).collect();
+        let mut most: f64 = along.iter().map(|a| a * a).fold(0.0, f64::max);
+        for (i, a) in along.iter().enumerate() {
+            for (j, b) in along.iter().enumerate().skip(i + 1) {
+                let c = self.products[i][j];
+                let apart = 1.0 - c * c;
+                // Two that are all but one.
+                if apart > 1e-10 {
+                    most = most.max((a * a + b * b - 2.0 * a * b * c) / apart);
+                }
+            }
         }
-        pairs
+        (whole - most).max(0.0).sqrt()
     }
 }
 
@@ -63,7 +90,11 @@ pub(crate) fn size_of_strength(wanted: f64, [low, high]: [f64; 2], strength: imp
 }
 
 fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|v| v * v).sum::<f64>().sqrt()
+    dot(x, x).sqrt()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -85,8 +116,16 @@ mod tests {
         let expected = (f64::from(n) * 25.0 * 4.0 / 45.0).sqrt();
         approx::assert_relative_eq!(space.residual_norm(&parabola), expected, max_relative = 2e-3);
         let square: Vec<f64> = x.iter().map(|v| v * v).collect();
-        let pairs = space.with_pairs(&[square, x.iter().map(|v| v.powi(3)).collect()]);
-        assert!(pairs.len() == 1 && pairs[0].residual_norm(&parabola) < 1e-9);
+        let cube: Vec<f64> = x.iter().map(|v| v.powi(3)).collect();
+        let fourth: Vec<f64> = x.iter().map(|v| v.powi(4)).collect();
+        let pairs = Pairs::new(space.clone(), &[square.clone(), cube.clone(), x.clone()]);
+        assert!(pairs.residual_norm(&parabola) < 1e-5);
+        // The pair that takes most, as the space of all three pairs says.
+        let bent: Vec<f64> = x.iter().map(|v| v.powi(5) + 0.1 * v.exp()).collect();
+        let plainly = |a, b| space.with(a).with(b).residual_norm(&bent);
+        let least = plainly(&square, &cube).min(plainly(&square, &fourth)).min(plainly(&cube, &fourth));
+        let pairs = Pairs::new(space.clone(), &[square, cube, fourth]);
+        approx::assert_relative_eq!(pairs.residual_norm(&bent), least, max_relative = 1e-9);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::draw::{great_strength, log_between, sign, strength};
 use super::key::{Concealed, Hidden, Key};
 use super::maker::Maker;
-use super::nuisances::{Nuisances, difference, size_of_strength};
+use super::nuisances::{Nuisances, Pairs, difference, size_of_strength};
 
 /// The size of a leftover beside that of the main effect.
 const LEFT: std::ops::Range<f64> = 0.03..0.3;
@@ -111,15 +111,15 @@ pub(crate) trait Rig: Sized {
             let which = choice.unlisted;
             // What could pass for the unlisted effect: what is truly at work beside it, or any two of the list, or none.
             let truth = nuisances.with(&self.response(effects));
-            let spaces = match hidden {
-                Hidden::Leftover => vec![truth.clone()],
-                Hidden::Imitated => vec![nuisances],
-                _ => nuisances.with_pairs(&self.directions()),
+            let mimics = match hidden {
+                Hidden::Leftover => Pairs::new(truth.clone(), &[]),
+                Hidden::Imitated => Pairs::new(nuisances, &[]),
+                _ => Pairs::new(nuisances, &self.directions()),
             };
             let before = self.response(effects);
             let strength_of = |all| {
                 let change = difference(&before, &self.response(all));
-                spaces.iter().map(|s| s.residual_norm(&change)).fold(f64::INFINITY, f64::min)
+                mimics.residual_norm(&change)
             };
             let wanted = match hidden {
                 Hidden::Leftover => key.strength.unwrap_or(0.0) * log_between(rng, 0.03, 0.3),

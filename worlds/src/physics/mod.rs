@@ -6,6 +6,7 @@ pub mod dough;
 pub mod flight;
 pub mod indentation;
 mod layer;
+pub mod machine;
 pub mod pendulum;
 mod quadrature;
 pub(crate) mod runge_kutta;
