@@ -10,6 +10,8 @@ pub enum ErrorKind {
     Timeout,
     /// A command is outside what the device can do; the same command will fail again.
     OutOfRange,
+    /// A command was refused since the last reading of what it moves is too old; read, and command again.
+    Stale,
     /// A reading is beyond the sensor's range: its value says nothing.
     Saturated,
     /// The device stopped for safety, and moves again only after somebody has cleared it.
@@ -28,12 +30,35 @@ impl std::fmt::Display for ErrorKind {
             Self::Link => "the device does not answer",
             Self::Timeout => "the device answered too late",
             Self::OutOfRange => "the command is outside the device's range",
+            Self::Stale => "the last reading is too old for a command",
             Self::Saturated => "the reading is beyond the sensor's range",
             Self::Stopped => "the device has stopped for safety",
             Self::EndOfRecording => "the recording has ended",
             Self::NotAsRecorded => "the recording was made with other commands",
             Self::Other => "something else went wrong",
         })
+    }
+}
+
+/// What a program can do about an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Severity {
+    /// The same call may succeed the next time.
+    Transient,
+    /// The same call fails again: a command or a load is beyond what the device can do.
+    Limit,
+    /// Nothing more comes before somebody has looked at the device or the recording.
+    Fatal,
+}
+
+impl ErrorKind {
+    /// What a program can do about it.
+    pub fn severity(self) -> Severity {
+        match self {
+            Self::Link | Self::Timeout | Self::Stale => Severity::Transient,
+            Self::OutOfRange | Self::Saturated => Severity::Limit,
+            Self::Stopped | Self::EndOfRecording | Self::NotAsRecorded | Self::Other => Severity::Fatal,
+        }
     }
 }
 

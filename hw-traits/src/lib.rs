@@ -2,11 +2,12 @@
 
 mod error;
 mod forward;
-pub use error::{Error, ErrorKind, ErrorType};
+pub use error::{Error, ErrorKind, ErrorType, Severity};
 
 pub mod arm;
 pub mod camera;
 pub mod clock;
+pub mod conformance;
 pub mod force_torque;
 pub mod gripper;
 pub mod microphones;
@@ -15,3 +16,4 @@ pub mod pneumatics;
 pub mod programme;
 pub mod replay;
 pub mod rotary;
+pub mod tape;
