@@ -1,0 +1,11 @@
+//! Devices that are not there: emulators of the protocols on loopback, for tests, for a first look, and for teaching.
+//!
+//! They are written from the makers' documents and share no code with the drivers. What goes wrong on a line can be made to go
+//! wrong: see each emulator's faults.
+
+mod ati;
+mod life;
+mod ur;
+
+pub use ati::{AtiEmulator, AtiFaults, AtiPages};
+pub use ur::{UrEmulator, UrFaults, UrWorld};
