@@ -8,5 +8,9 @@ pub use error::DriverError;
 pub mod ati;
 #[cfg(feature = "emulator")]
 pub mod emulator;
+#[cfg(any(feature = "dcon", feature = "dynamixel", feature = "robotiq"))]
+pub mod line;
+#[cfg(feature = "robotiq")]
+pub mod robotiq;
 #[cfg(feature = "ur")]
 pub mod ur;

@@ -5,7 +5,9 @@
 
 mod ati;
 mod life;
+mod robotiq;
 mod ur;
 
 pub use ati::{AtiEmulator, AtiFaults, AtiPages};
+pub use robotiq::{RobotiqEmulator, RobotiqFaults, RobotiqProtocol};
 pub use ur::{UrEmulator, UrFaults, UrWorld};
