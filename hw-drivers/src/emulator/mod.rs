@@ -4,10 +4,14 @@
 //! wrong: see each emulator's faults.
 
 mod ati;
+mod dcon;
+mod dynamixel;
 mod life;
 mod robotiq;
 mod ur;
 
 pub use ati::{AtiEmulator, AtiFaults, AtiPages};
+pub use dcon::{DconEmulator, DconFaults};
+pub use dynamixel::{DynamixelEmulator, DynamixelFaults};
 pub use robotiq::{RobotiqEmulator, RobotiqFaults, RobotiqProtocol};
 pub use ur::{UrEmulator, UrFaults, UrWorld};

@@ -46,7 +46,7 @@ struct Hand {
     faults: RobotiqFaults,
 }
 
-/// A two-finger gripper on loopback; 13 mm/s are 25 counts a second at speed 0, and seven times as much at 255.
+/// A two-finger gripper on loopback: 54 counts a second at speed 0 (20 mm/s of a 2F-85), 406 at 255.
 #[derive(Debug)]
 pub struct RobotiqEmulator {
     address: SocketAddr,

@@ -18,7 +18,6 @@ impl UrCap {
     }
 
     fn get(&mut self, name: &'static str) -> Result<u8, DriverError> {
-        // A number ends with the line; a lone answer without one is complete where it has three digits, or waits for its end.
         let whole = |bytes: &[u8]| bytes.iter().position(|b| *b == b'\n').map(|at| at + 1);
         let answer = self.line.ask(format!("GET {name}\n").as_bytes(), whole)?;
         let answer = String::from_utf8_lossy(&answer).trim().to_owned();
