@@ -191,6 +191,7 @@ impl<M: Machine> DeadMan<M> {
     }
 
     /// The machine, for what is no motion.
+    #[cfg(feature = "ur")]
     pub(crate) fn with<T>(&self, ask: impl FnOnce(&mut M) -> T) -> T {
         ask(&mut self.shared.lock().machine)
     }

@@ -30,29 +30,12 @@ pub fn tcp(address: SocketAddr, timeout_s: f64) -> Opener {
 pub fn serial(path: &str, baud: u32, timeout_s: f64) -> Opener {
     let path = path.to_owned();
     let timeout = Duration::try_from_secs_f64(timeout_s).unwrap_or(Duration::from_secs(1));
-    Box::new(move || Ok(Box::new(Native(serialport::new(path.clone(), baud).timeout(timeout).open()?))))
-}
-
-/// A serial port as one that reads and writes.
-#[cfg(feature = "serial")]
-struct Native(Box<dyn serialport::SerialPort>);
-
-#[cfg(feature = "serial")]
-impl Read for Native {
-    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        self.0.read(bytes)
-    }
-}
-
-#[cfg(feature = "serial")]
-impl Write for Native {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.write(bytes)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.flush()
-    }
+    Box::new(move || {
+        let mut port = serial2::SerialPort::open(&path, baud)?;
+        port.set_read_timeout(timeout)?;
+        port.set_write_timeout(timeout)?;
+        Ok(Box::new(port))
+    })
 }
 
 /// Questions and answers on a line.
@@ -86,6 +69,7 @@ impl Line {
     }
 
     /// Sends what has no answer.
+    #[cfg(feature = "dcon")]
     pub(crate) fn tell(&mut self, words: &[u8]) -> Result<(), DriverError> {
         self.ask(words, |_| Some(0)).map(drop)
     }
@@ -121,6 +105,7 @@ impl Line {
         }
     }
 
+    #[cfg(any(feature = "dcon", feature = "dynamixel", feature = "robotiq"))]
     /// Closes the line; the next question opens it.
     pub(crate) fn hang_up(&mut self) {
         self.port = None;

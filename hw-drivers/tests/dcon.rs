@@ -31,7 +31,7 @@ fn the_contracts_hold_whole_and_in_pieces() {
         emulator.fail(DconFaults { in_pieces, ..Default::default() });
         let mut chamber = chamber(&emulator);
         conformance::pressure(&mut chamber, 5).unwrap();
-        conformance::valve(&mut chamber, |c| drop(c.pressure_pa().unwrap())).unwrap();
+        conformance::valve(&mut chamber, |c| assert!(c.pressure_pa().is_ok())).unwrap();
     }
 }
 

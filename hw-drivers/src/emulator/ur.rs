@@ -186,17 +186,18 @@ fn follow(world: &mut UrWorld, session: &Session, dt: f64, protective_stop: bool
                 part = part.min(most / left);
             }
         }
-        for k in 0..6 {
-            world.speed[k] = if dt > 0.0 { way[k] * part / dt } else { 0.0 };
-            world.tool_in_base[k] += way[k] * part;
+        let tool = world.tool_in_base.iter_mut().zip(&mut world.speed);
+        for ((place, speed), way) in tool.zip(&way) {
+            *speed = if dt > 0.0 { way * part / dt } else { 0.0 };
+            *place += way * part;
         }
         if part >= 1.0 {
             world.numbers[1] = number;
         }
         return;
     }
-    for k in 0..6 {
-        world.tool_in_base[k] += world.speed[k] * dt;
+    for (place, speed) in world.tool_in_base.iter_mut().zip(world.speed) {
+        *place += speed * dt;
     }
 }
 
