@@ -203,14 +203,7 @@ impl Ready {
             slope2 += ws * slope;
         }
         let scale = stride as f64;
-        let over = |x: f64, y: f64| if y > 0.0 { x / y } else { 0.0 };
-        let (mut weight, mut spread) = (0.0, 0.0);
-        if fit.baseline != Baseline::Zero {
-            weight = over(scale * scale, s.weight);
-        }
-        if fit.baseline == Baseline::Tilt {
-            spread = over(scale * scale, s.spread);
-        }
+        let (weight, spread) = self.over(fit, scale);
         let (f1, fu) = (s.force / scale, s.moment / scale);
         Projected {
             a: scale * phi2 - weight * one * one - spread * u1 * u1,
@@ -220,6 +213,37 @@ impl Ready {
             e: scale * slope2 - weight * slope1 * slope1 - spread * slope_u * slope_u,
             rest: if fit.baseline == Baseline::Tilt { self.rest_of_line() } else { s.square },
         }
+    }
+
+    /// The misfit of the best stiffness at a contact point, by every `stride`-th sample: what [`Ready::project`] gives, without slopes.
+    pub(super) fn least_misfit(&self, fit: &Fit, at: f64, stride: usize) -> f64 {
+        let shape = Shape::new(fit, self.span_m);
+        let (mut one, mut u1, mut phi2, mut force1) = (0.0, 0.0, 0.0, 0.0);
+        let s = &self.sums;
+        for p in self.samples.iter().step_by(stride) {
+            if p.u > self.cut || p.u <= at {
+                continue;
+            }
+            let phi = shape.at(p.u - at).0;
+            let weighted = p.weight * phi;
+            one += weighted;
+            u1 += weighted * (p.u - s.centre);
+            phi2 += weighted * phi;
+            force1 += weighted * p.force;
+        }
+        let scale = stride as f64;
+        let (weight, spread) = self.over(fit, scale);
+        let a = scale * phi2 - weight * one * one - spread * u1 * u1;
+        let b = scale * force1 - weight * one * s.force / scale - spread * u1 * s.moment / scale;
+        let stiffness = if a > 0.0 { (b / a).max(0.0) } else { 0.0 };
+        -stiffness * (2.0 * b - stiffness * a)
+    }
+
+    /// By what sums of every `scale`-th sample with the baseline's columns are divided: zero for a column that the baseline has not.
+    fn over(&self, fit: &Fit, scale: f64) -> (f64, f64) {
+        let over = |has: bool, y: f64| if has && y > 0.0 { scale * scale / y } else { 0.0 };
+        let s = &self.sums;
+        (over(fit.baseline != Baseline::Zero, s.weight), over(fit.baseline == Baseline::Tilt, s.spread))
     }
 
     /// Baseline at the middle of the sums and its slope, in own units, at a contact point and a stiffness.

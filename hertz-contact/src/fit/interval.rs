@@ -29,7 +29,11 @@ pub(super) fn report(fit: &Fit, work: &mut Workspace, settled: Settled) -> Repor
         for (state, at) in work.curves.iter_mut().zip(&points) {
             state.at = *at;
         }
-        modulus_end(fit, &mut work.curves, modulus, total, room, up)
+        let along = match work.curves.as_slice() {
+            [one] => end_of_one(fit, one, modulus, room, up),
+            _ => None,
+        };
+        along.unwrap_or_else(|| modulus_end(fit, &mut work.curves, modulus, total, room, up))
     };
     let modulus_interval_pa = ((end(false) - shift).max(0.0), end(true) + shift);
     for (state, at) in work.curves.iter_mut().zip(&points) {
@@ -72,6 +76,38 @@ fn rounding(fit: &Fit, work: &mut Workspace, modulus: f64, points: &[f64]) -> f6
         }
     }
     shift
+}
+
+/// As [`modulus_end`] of a single curve: the farthest modulus at which the misfit has risen by no more than `room`, over contact points.
+/// Nothing where it does not settle at once.
+fn end_of_one(fit: &Fit, state: &State, modulus: f64, room: f64, up: bool) -> Option<f64> {
+    /// Of a standard error of the contact point: the modulus goes with the square of it.
+    const NEAR: f64 = 1e-3;
+    let sign = if up { 1.0 } else { -1.0 };
+    let k = modulus * state.per_pa;
+    let p = state.ready.project(fit, state.at, 1);
+    let least = p.misfit(k);
+    let sharp = p.curvature();
+    let mut at = state.at + sign * (room / sharp).sqrt() * p.c / (k * p.e);
+    let mut way = f64::INFINITY;
+    for _ in 0..8 {
+        if !(at > state.bounds.0 && at < state.bounds.1) {
+            return None;
+        }
+        let p = state.ready.project(fit, at, 1);
+        // The misfit is a parabola over the stiffness.
+        let inner = p.b * p.b - p.a * (p.rest - least - room);
+        let k = (p.b + sign * inner.sqrt()) / p.a;
+        let step = (p.d - k * p.c) / (k * p.e);
+        if !(p.a > 0.0 && p.e > 0.0 && k > 0.0 && step.abs() < 0.5 * way) {
+            return None;
+        }
+        if step * step * k * k * p.e < NEAR * NEAR * room {
+            return Some(k / state.per_pa);
+        }
+        (at, way) = (at - step, step.abs());
+    }
+    None
 }
 
 /// Where the misfit has risen by `room` above its smallest, on one side of the modulus.
@@ -125,10 +161,14 @@ fn curve_report(fit: &Fit, s: &State, modulus: f64, others: f64, room: f64) -> C
         let misfit = p.misfit(best) + others * (best - k) * (best - k);
         (misfit, 2.0 * best * (p.d - best * p.c))
     };
+    let here = ready.project(fit, s.at, 1);
     let least = risen(s.at).0;
+    // Where it would be if the misfit were a parabola.
+    let sharp = k * k * (here.e - here.c * here.c / (here.a + others));
+    let likely = if sharp > 0.0 { (room / sharp).sqrt() } else { 1e-3 };
     let end = |sign: f64, bound: f64| {
         let limit = (bound - s.at).abs();
-        let (mut low, mut high) = (0.0, limit.min(1e-3));
+        let (mut low, mut high) = (0.0, limit.min(1.5 * likely));
         loop {
             if risen(s.at + sign * high).0 - least > room {
                 break;
@@ -143,7 +183,7 @@ fn curve_report(fit: &Fit, s: &State, modulus: f64, others: f64, room: f64) -> C
             let (misfit, slope) = risen(s.at + sign * way);
             (misfit - least - room, sign * slope)
         };
-        let way = rising_to(1e-4 * high, f, low, high, high);
+        let way = rising_to(1e-4 * high, f, low, high, likely.max(low));
         ready.middle_m + ready.span_m * (s.at + sign * (way + s.moved))
     };
     let contact_interval_m = (end(-1.0, s.bounds.0), end(1.0, s.bounds.1));
@@ -182,5 +222,53 @@ fn curve_report(fit: &Fit, s: &State, modulus: f64, others: f64, room: f64) -> C
             beyond_law: beyond_layer
                 || matches!(law.validity(depth_m * (1.0 - 1e-9)), Validity::Beyond { .. }),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+
+    use super::super::settings::{Baseline, Curve, Fit, Loss};
+    use super::super::solve::{Workspace, settle};
+    use super::super::state::State;
+    use super::{end_of_one, modulus_end};
+    use crate::indenter::Indenter;
+    use crate::law::{Elastic, Law};
+
+    /// The way along the valley ends where the profile over contact points does.
+    #[test]
+    fn the_end_of_one_curve_is_that_of_the_profile() {
+        let sphere = Indenter::Sphere { radius_m: 0.01 };
+        let law = Elastic { indenter: sphere, modulus_pa: 1e4, poisson_ratio: 0.5 };
+        let stage: Vec<f64> = (0..300).map(|i| 5e-6 * f64::from(i)).collect();
+        let force: Vec<f64> = stage
+            .iter()
+            .enumerate()
+            .map(|(i, d)| law.force(d - 4e-4) + 1e-3 * (1.7 * i as f64).sin())
+            .collect();
+        let curve = Curve { indentation_m: &stage, force_n: &force, sigma_n: None };
+        for baseline in [Baseline::Zero, Baseline::Offset, Baseline::Tilt] {
+            let fit = Fit { baseline, loss: Loss::Square, ..Fit::new(sphere, 0.5) };
+            let mut work = Workspace::new();
+            let mut state = State::default();
+            state.load(&fit, 0, &curve).unwrap();
+            work.curves.push(state);
+            let settled = settle(&fit, &mut work).unwrap();
+            let at = work.curves[0].at;
+            let room = 4.0 * settled.inflation;
+            let sharp = work.curves[0].ready.project(&fit, at, 1).curvature() * work.curves[0].per_pa.powi(2);
+            for up in [false, true] {
+                let along = end_of_one(&fit, &work.curves[0], settled.modulus, room, up).unwrap();
+                work.curves[0].at = at;
+                let profile = modulus_end(&fit, &mut work.curves, settled.modulus, sharp, room, up);
+                work.curves[0].at = at;
+                let half = (profile - settled.modulus).abs();
+                assert!(
+                    half > 0.0 && (along - profile).abs() < 1e-3 * half,
+                    "{baseline:?} {up}: {along} {profile}"
+                );
+            }
+        }
     }
 }

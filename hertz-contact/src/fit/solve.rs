@@ -97,6 +97,7 @@ pub(super) fn settle(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitErro
     let mut pairs = std::mem::take(&mut work.pairs);
     let modulus = best_modulus(fit, &mut work.curves);
     let mut settled = Settled { modulus, converged: false, inflation: 1.0, freedom: 1.0, widened: 1.0 };
+    let weights_move = fit.loss != Loss::Square || fit.noise == Noise::Proportional;
     for round in 0..ROUNDS {
         let old = settled.modulus;
         let mut influence = Influence::default();
@@ -110,13 +111,18 @@ pub(super) fn settle(fit: &Fit, work: &mut Workspace) -> Result<Settled, FitErro
                 state.scan(fit);
             }
         }
+        if !weights_move && work.curves.len() == 1 {
+            // All weights have grown by one factor: what was best is best.
+            settled = influence.settled(fit, work.curves.len(), modulus);
+            settled.converged = modulus.is_finite();
+            break;
+        }
         let reach = |curves: &[State]| curves.iter().map(|s| s.at.abs()).sum::<f64>();
         let before = reach(&work.curves);
         let modulus = best_modulus(fit, &mut work.curves);
         settled = influence.settled(fit, work.curves.len(), modulus);
         let moved = (reach(&work.curves) - before).abs();
         let still = (modulus - old).abs() <= 1e-6 * modulus.abs() && moved <= 1e-6 * work.curves.len() as f64;
-        let weights_move = fit.loss != Loss::Square || fit.noise == Noise::Proportional;
         if (still && round > 3) || (!weights_move && round > 1) {
             settled.converged = modulus.is_finite();
             break;

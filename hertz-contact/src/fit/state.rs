@@ -8,6 +8,9 @@ use crate::root::rising;
 /// Samples that a contact needs beyond its parameters, and at least in contact.
 pub(super) const SPARE: usize = 3;
 pub(super) const IN_CONTACT: usize = 4;
+/// A step of a contact point (spans) with which it has settled.
+const SETTLED: f64 = 1e-9;
+
 /// A curve with what is believed of it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct State {
@@ -119,10 +122,7 @@ impl State {
     pub(super) fn scan(&mut self, fit: &Fit) {
         let stride = (self.ready.samples.len() / 400).max(1);
         let (low, high) = self.bounds;
-        let misfit = |at: f64| {
-            let p = self.ready.project(fit, at, stride);
-            p.misfit(p.stiffness())
-        };
+        let misfit = |at: f64| self.ready.least_misfit(fit, at, stride);
         let ahead = (0..8).map(|i| low + (-0.5 - low) * f64::from(i) / 8.0);
         let within = (0..=48).map(|i| -0.5 + (high + 0.5) * f64::from(i) / 48.0);
         let best = ahead.chain(within).map(|at| (misfit(at), at)).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -133,13 +133,43 @@ impl State {
 
     /// The contact point nearest to the present one at which the misfit is smallest, for a stiffness or for the best one.
     pub(super) fn refine(&mut self, fit: &Fit, stiffness: Option<f64>) -> Projected {
+        match self.near(fit, stiffness) {
+            Some(found) => found,
+            None => self.bracketed(fit, stiffness),
+        }
+    }
+
+    /// As [`State::refine`] from close by: Newton's steps, then the secant's, as long as each is less than half of the last one.
+    fn near(&mut self, fit: &Fit, stiffness: Option<f64>) -> Option<Projected> {
+        let (mut at, mut way) = (self.at, 0.1);
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..10 {
+            let p = self.ready.project(fit, at, 1);
+            let (value, curvature) = slope(&p, stiffness);
+            let secant = before.map(|(old, slope)| (value - slope) / (at - old));
+            // Far off the linearised curvature a secant is rounding, or across a kink.
+            let steep = secant.filter(|s| *s > 0.5 * curvature && *s < 2.0 * curvature).unwrap_or(curvature);
+            let step = value / steep;
+            if !(steep > 0.0 && step.abs() < 0.5 * way) {
+                return None;
+            }
+            if step.abs() < SETTLED {
+                self.at = at;
+                return Some(p);
+            }
+            before = Some((at, value));
+            (at, way) = (at - step, step.abs());
+            if at <= self.bounds.0 || at >= self.bounds.1 {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// As [`State::refine`] from anywhere: bracketed first.
+    fn bracketed(&mut self, fit: &Fit, stiffness: Option<f64>) -> Projected {
         let ready = &self.ready;
-        let slope = |at: f64| {
-            let p = ready.project(fit, at, 1);
-            let k = stiffness.unwrap_or_else(|| p.stiffness());
-            let along = if stiffness.is_none() && p.a > 0.0 { p.c * p.c / p.a } else { 0.0 };
-            (p.d - k * p.c, k * (p.e - along))
-        };
+        let slope = |at: f64| slope(&ready.project(fit, at, 1), stiffness);
         let (mut low, mut high) = (self.at, self.at);
         let (value, curvature) = slope(self.at);
         // First guess of the way: Newton's step, doubled until the slope changes sign.
@@ -159,7 +189,7 @@ impl State {
             }
             step *= 2.0;
         }
-        self.at = rising_to(1e-9, slope, low, high, self.at - value / curvature);
+        self.at = rising_to(SETTLED, slope, low, high, self.at - value / curvature);
         self.ready.project(fit, self.at, 1)
     }
 
@@ -172,8 +202,7 @@ impl State {
             for (x, p) in five.iter_mut().zip(&samples[first..]) {
                 *x = p.force;
             }
-            five.sort_unstable_by(f64::total_cmp);
-            samples[i].force - five[2]
+            samples[i].force - median_of_five(five)
         };
         let s = scale((0..n).map(|i| off(&self.ready.samples, i)), room);
         if !(s > 0.0) {
@@ -241,6 +270,20 @@ impl State {
     }
 }
 
+/// Derivative of the misfit with respect to the contact point over twice the stiffness, and its own, linearised.
+fn slope(p: &Projected, stiffness: Option<f64>) -> (f64, f64) {
+    let k = stiffness.unwrap_or_else(|| p.stiffness());
+    let along = if stiffness.is_none() && p.a > 0.0 { p.c * p.c / p.a } else { 0.0 };
+    (p.d - k * p.c, k * (p.e - along))
+}
+
+fn median_of_five([a, b, c, d, e]: [f64; 5]) -> f64 {
+    // Neither the smaller of the smaller ones nor the larger of the larger ones of two pairs is in the middle.
+    let low = a.min(b).max(c.min(d));
+    let high = a.max(b).min(c.max(d));
+    low.min(high).max(low.max(high).min(e))
+}
+
 /// Parameters of a curve and the modulus.
 pub(super) fn parameters(fit: &Fit) -> usize {
     2 + match fit.baseline {
@@ -272,4 +315,20 @@ pub(super) fn rising_to(
         high,
         if start.is_finite() { start } else { 0.5 * (low + high) },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median_of_five;
+
+    #[test]
+    fn the_median_of_five_is_the_third() {
+        // Every order of five numbers, and of three that repeat.
+        for k in 0..5_usize.pow(5) {
+            let five: [usize; 5] = std::array::from_fn(|i| k / 5_usize.pow(i as u32) % 5);
+            let mut sorted = five;
+            sorted.sort_unstable();
+            assert_eq!(median_of_five(five.map(|x| x as f64)), sorted[2] as f64, "{five:?}");
+        }
+    }
 }
