@@ -115,7 +115,7 @@ enum Command {
         /// Worlds of each domain.
         #[arg(long, default_value_t = 100)]
         worlds: usize,
-        /// One kind of worlds (nothing, one, two, unlisted, leftover, imitated); all in turns without it.
+        /// One kind of worlds (nothing, one, two, unlisted, leftover, imitated, local); all in turns without it.
         #[arg(long)]
         kind: Option<String>,
         /// Seed of the worlds.

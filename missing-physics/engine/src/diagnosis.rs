@@ -84,13 +84,25 @@ pub struct TestOutcome {
     pub p_value: f64,
 }
 
-/// A place where the baseline misses the data.
+/// One unknown more that would take a misfit away, acting at a place alone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AsIf {
+    /// What it is, for a person, with its article (`a force`).
+    pub what: String,
+    /// How large each of its components is there on average, with intervals for white noise.
+    pub sizes: Vec<Estimate>,
+}
+
+/// A place where the cause of a misfit acts, or, where no single cause is known that would take it away, where the baseline misses the
+/// data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Location {
     /// Name of the channel.
     pub channel: String,
     /// Name of the variable along which the place is an interval.
     pub variable: Option<String>,
+    /// Its unit; empty for a pure number.
+    pub variable_unit: String,
     /// Start of the interval.
     pub from: Option<f64>,
     /// End of the interval.
@@ -109,6 +121,8 @@ pub struct Location {
     pub sigma: f64,
     /// Size of the misfit in standard errors.
     pub z: f64,
+    /// What acts there, where the model tells of something that would take the misfit away; `None` for an offset of the readings.
+    pub as_if: Option<AsIf>,
 }
 
 /// A parameter's estimate.

@@ -7,7 +7,9 @@ use common::{parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Location;
 use missing_physics::engine::{Options, diagnose};
-use missing_physics::model::{CoupledRows, Extensions, Model, Parameter, PredictError, Scope, Spec};
+use missing_physics::model::{
+    Extensions, LocalCauses, LocalUnknown, Model, Parameter, PredictError, Quantity, Scope, Spec,
+};
 use missing_physics::observer::Silent;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -38,15 +40,21 @@ impl Model for Steps {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { coupled_rows: self.tells.then_some(self as &dyn CoupledRows), ..Extensions::default() }
+        Extensions { local_causes: self.tells.then_some(self as &dyn LocalCauses), ..Extensions::default() }
     }
 }
 
-impl CoupledRows for Steps {
-    fn perturbation_response(
+impl LocalCauses for Steps {
+    fn unknowns(&self) -> Vec<LocalUnknown> {
+        vec![LocalUnknown { name: "longer steps".into(), components: vec![Quantity::new("part", "")] }]
+    }
+
+    fn response(
         &self,
+        _: (usize, usize),
         runs: &[Run],
         _: &[f64],
+        _: &[Vec<f64>],
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError> {
         let change = |(run, amounts): (&Run, &Vec<f64>)| {

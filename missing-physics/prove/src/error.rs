@@ -20,7 +20,7 @@ pub enum ProveError {
         known: Vec<&'static str>,
     },
     /// A kind of worlds that there is not.
-    #[error("no worlds of the kind {}, expected one of: nothing, one, two, unlisted, leftover, imitated", quoted(.kind))]
+    #[error("no worlds of the kind {}, expected one of: nothing, one, two, unlisted, leftover, imitated, local", quoted(.kind))]
     UnknownKind {
         /// The kind that was asked for.
         kind: String,

@@ -3,6 +3,7 @@ mod error;
 mod files;
 mod key;
 mod page;
+mod place;
 mod proof;
 mod score;
 mod table;

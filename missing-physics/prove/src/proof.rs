@@ -22,7 +22,7 @@ pub struct ProveArguments {
     pub domain: Option<String>,
     /// Worlds of each domain.
     pub worlds: usize,
-    /// One kind of worlds (`nothing`, `one`, `two`, `unlisted`, `leftover`, `imitated`); all in turns without it.
+    /// One kind of worlds (`nothing`, `one`, `two`, `unlisted`, `leftover`, `imitated`, `local`); all in turns without it.
     pub kind: Option<String>,
     /// Seed of the worlds.
     pub seed: u64,

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 use worlds::concealed::Hidden;
 
+use super::place;
 use super::world::Judged;
 
 /// A rate: so many of so many.
@@ -75,8 +76,7 @@ pub struct DomainScore {
     pub covered_beside: Part,
     /// Unlisted effects that a listed one imitates to 40 to 85 %: a name was given.
     pub imitated: Part,
-    /// Local effects with p at most 0.001: the first place named begins or ends where the effect does, to a tenth of the
-    /// variable's extent.
+    /// Local effects with p at most 0.001 for which variable, interval and runs of the first place are right.
     pub located: Part,
     /// Intervals of 95 % that hold the true value, where the set is right.
     pub covered: Part,
@@ -105,8 +105,6 @@ pub struct Score {
 
 /// Edges of the bins of `sqrt` of the oracle's likelihood ratio.
 const EDGES: [f64; 9] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, f64::INFINITY];
-/// A place is found where an end of it is, to this part of the variable's extent.
-const CLOSE: f64 = 0.1;
 /// Where the oracle's log Bayes factor against every rival is at least this, the data decide.
 const DECISIVE: f64 = 5.0;
 
@@ -147,8 +145,9 @@ impl DomainScore {
                 self.alarms_5.add(doubted);
                 self.alarms_1.add(o.p_value <= 0.01);
             }
-            Hidden::Unlisted => {
-                if doubted {
+            Hidden::Unlisted | Hidden::Local => {
+                // Impacts that go unheard are on the list, wherever they are.
+                if doubted && w.key.events.is_empty() {
                     self.unexplained.add(o.verdict == "unexplained");
                 }
             }
@@ -166,16 +165,12 @@ impl DomainScore {
         }
         // Beside a second effect the baseline misses where that acts, too.
         let alone = !matches!(w.key.hidden, Hidden::Two | Hidden::Leftover) && o.p_value <= 0.001;
-        if let Some(place) = w.key.place.as_ref().filter(|_| alone) {
-            let hit = o.places.first().is_some_and(|found| {
-                let near = |found: Option<f64>, extent: f64| {
-                    let ends = [place.from, place.to].into_iter().filter(|end| end.is_finite());
-                    found.is_some_and(|f| ends.into_iter().any(|end| (f - end).abs() <= CLOSE * extent))
-                };
-                found.variable.as_deref() == Some(&place.variable)
-                    && found.extent.is_some_and(|extent| near(found.from, extent) || near(found.to, extent))
-            });
-            self.located.add(hit);
+        if alone && (w.key.place.is_some() || !w.key.events.is_empty()) {
+            let found = match &w.key.place {
+                Some(place) => place::found(place, &o.places, &o.runs),
+                None => place::found_events(&w.key.events, &o.places),
+            };
+            self.located.add(found);
         }
     }
 

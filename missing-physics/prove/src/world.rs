@@ -17,10 +17,10 @@ use missing_physics_report::{self as report, ReportContext};
 use crate::error::ProveError;
 use crate::files::{make_folder, read_json, write_json, write_whole};
 
-/// Kinds of worlds, in the order in which they take turns: 35 % nothing, 25 % one, 10 % each of two, unlisted, leftover, imitated.
+/// Kinds of worlds, in the order in which they take turns: 30 % nothing, 20 % one, 10 % each of two, unlisted, leftover, imitated, local.
 const TURNS: [Hidden; 20] = {
-    use Hidden::{Imitated as I, Leftover as L, Nothing as N, One as O, Two as T, Unlisted as U};
-    [N, O, L, U, O, N, T, I, O, N, N, L, N, U, O, I, T, N, O, N]
+    use Hidden::{Imitated as I, Leftover as L, Local as P, Nothing as N, One as O, Two as T, Unlisted as U};
+    [N, O, L, U, O, N, T, I, O, P, N, L, N, U, O, I, T, N, P, N]
 };
 
 /// The file of what an oracle finds in a world.
@@ -45,6 +45,8 @@ pub(super) struct Outcome {
     pub(super) confused_with: Vec<Vec<String>>,
     pub(super) estimates: Vec<Estimated>,
     pub(super) places: Vec<Located>,
+    /// Labels of all runs.
+    pub(super) runs: Vec<String>,
     pub(super) heldout_rmse: Vec<Option<f64>>,
     pub(super) seconds: f64,
 }
@@ -63,8 +65,9 @@ pub(super) struct Located {
     pub(super) variable: Option<String>,
     pub(super) from: Option<f64>,
     pub(super) to: Option<f64>,
-    /// Extent of the variable in the recording.
-    pub(super) extent: Option<f64>,
+    /// Least and largest value of the variable in the recording; none of one that the model follows.
+    pub(super) extent: Option<[f64; 2]>,
+    pub(super) runs: Vec<String>,
 }
 
 /// What somebody who knows the truth finds.
@@ -202,8 +205,10 @@ impl Outcome {
                     from: l.from,
                     to: l.to,
                     extent: l.variable.as_deref().and_then(|v| extent(recording, v)),
+                    runs: l.runs.clone(),
                 })
                 .collect(),
+            runs: recording.runs.iter().map(|run| run.label.clone()).collect(),
             heldout_rmse: d.after.iter().map(|f| finite(f.heldout_rmse)).collect(),
             seconds,
         }
@@ -223,12 +228,12 @@ impl OracleFit {
     }
 }
 
-/// By how much a variable differs over a recording.
-fn extent(recording: &Recording, variable: &str) -> Option<f64> {
+/// The least and the largest value of a variable over a recording.
+fn extent(recording: &Recording, variable: &str) -> Option<[f64; 2]> {
     let at = recording.variables.iter().position(|v| v.name == variable)?;
     let values = recording.runs.iter().flat_map(|r| &r.inputs[at]);
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    finite(high - low)
+    (high - low).is_finite().then_some([low, high])
 }
 
 fn finite(value: f64) -> Option<f64> {

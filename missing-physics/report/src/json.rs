@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use missing_physics::diagnosis::{
-    ChannelFit, ChannelNoise, Closest, Confusion, Contradiction, Diagnosis, Estimate, Law, Limit, Location,
+    AsIf, ChannelFit, ChannelNoise, Closest, Confusion, Contradiction, Diagnosis, Estimate, Law, Limit, Location,
     MechanismReport, NextExperiment, Outlier, RunSpread, SetReport, TestOutcome,
 };
 use serde::Serialize;
@@ -98,7 +98,11 @@ fn noise(n: &ChannelNoise) -> Value {
 fn place(l: &Location) -> Value {
     value!({"channel": l.channel, "variable": l.variable, "from": l.from, "to": l.to, "runs": l.runs,
         "share": l.share, "mean_residual": l.mean_residual, "z": l.z, "largest_residual": l.largest_residual,
-        "rms": l.rms, "sigma": l.sigma})
+        "rms": l.rms, "sigma": l.sigma, "as_if": l.as_if.as_ref().map(as_if)})
+}
+
+fn as_if(a: &AsIf) -> Value {
+    value!({"what": a.what, "parameters": estimates(&a.sizes)})
 }
 
 fn closest(c: &Closest) -> Value {

@@ -18,6 +18,7 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
     for place in d.location.iter().take(3) {
         page.entry("where", &where_sentence(d, place));
     }
+    as_if(d).into_iter().for_each(|line| page.entry("where", &line));
     for line in what(d) {
         page.entry("what", &line);
     }
@@ -162,6 +163,19 @@ pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
     )
 }
 
+/// What would take the misfit away if it acted at its places alone, where no mechanism of the list does.
+pub(super) fn as_if(d: &Diagnosis) -> Vec<String> {
+    let said = |l: &Location| {
+        let as_if = l.as_if.as_ref()?;
+        let sizes: Vec<String> = as_if.sizes.iter().map(estimate).collect();
+        Some(format!("as if {} acted there: {}", as_if.what, sizes.join(", ")))
+    };
+    let places = d.location.iter().take(3).filter(|_| d.verdict == Verdict::Unexplained);
+    let mut lines: Vec<String> = places.filter_map(said).collect();
+    lines.dedup();
+    lines
+}
+
 /// What the chosen mechanisms leave, in one sentence.
 pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
     format!(
@@ -243,10 +257,10 @@ fn place_words(d: &Diagnosis, l: &Location) -> String {
     };
     let interval = match (&l.variable, l.from, l.to) {
         (Some(v), Some(from), Some(to)) => {
-            let unit = unit_of(d, v);
-            format!(", {v} from {} to {} {unit}", significant(from, 3), significant(to, 3))
-                .trim_end()
-                .to_owned()
+            let unit = &l.variable_unit;
+            let (from, to) = (significant(from, 3), significant(to, 3));
+            let ends = if from == to { format!("at {v} = {from}") } else { format!("{v} from {from} to {to}") };
+            format!(", {ends} {unit}").trim_end().to_owned()
         }
         _ => String::new(),
     };

@@ -4,9 +4,9 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::draw::{between, choose, log_between, sign, whole};
-use super::key::{Concealed, Hidden, Key};
+use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
-use crate::physics::bounce::{BounceWorld, Effects};
+use crate::physics::bounce::{BounceWorld, Effects, Softer};
 
 /// Makes worlds of the domain `bounce` from times and places of impacts.
 #[derive(Debug, Clone, Copy)]
@@ -37,21 +37,62 @@ impl Maker for Bounce {
         for which in choose(&mut rng, LISTED, hidden.listed()) {
             listed(&mut world, which, &mut key, &mut rng);
         }
-        if hidden.unlisted() {
+        if hidden == Hidden::Local {
+            local(&mut world, whole(&mut rng, 0, 3), &mut key, &mut rng);
+        } else if hidden.unlisted() {
             world.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
         let mut seed = seed ^ 0x5eed;
         let mut made = world.files_and_unheard(seed);
         // Drops in which all was heard hide no unheard impact.
-        while made.1 == 0 && world.effects.unheard > 0.0 {
+        while made.1.is_empty() && world.effects.unheard > 0.0 {
             seed = seed.wrapping_add(1);
             made = world.files_and_unheard(seed);
         }
         let ([header, data], unheard) = made;
-        key.state_missed(unheard, world.runs);
+        key.state_missed(unheard.len(), world.runs);
+        if hidden == Hidden::Local && world.effects.unheard > 0.0 {
+            key.events = unheard.iter().map(|[run, impact]| (run.to_string(), *impact as f64)).collect();
+        }
         Concealed::table(header, data, key)
     }
+}
+
+/// A restitution that is lower on a stripe of the table, from a drop on, or at some speeds; or a few impacts that go unheard.
+pub(crate) fn local(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
+    let by = log_between(rng, 0.03, 0.15);
+    let all = [f64::NEG_INFINITY, f64::INFINITY];
+    let of_run = |run: usize| (run + 1).to_string();
+    let (what, softer, place) = match which {
+        0 => {
+            // As wide as a third of where balls land.
+            let low = between(rng, -0.01, 0.02);
+            let x_m = [low, low + between(rng, 0.02, 0.04)];
+            let place = Place::new("x_m", x_m[0], x_m[1]);
+            ("a softer stripe of the table", Softer { by, x_m, ..Softer::default() }, Some(place))
+        }
+        1 => {
+            let from_run = whole(rng, world.runs / 5, 4 * world.runs / 5);
+            let runs = (from_run..world.runs).map(of_run);
+            let place = Place::new("run", all[0], all[1]).in_runs(runs);
+            ("a softer ball from one drop on", Softer { by, from_run, ..Softer::default() }, Some(place))
+        }
+        2 => {
+            let fastest = (2.0 * crate::GRAVITY_M_S2 * world.height_m).sqrt() * world.restitution;
+            let low = fastest * between(rng, 0.45, 0.6);
+            let speed_m_s = [low, low + fastest * between(rng, 0.2, 0.35)];
+            let place = Place::new("speed_m_s", low, speed_m_s[1]);
+            ("a restitution that dips at some speeds", Softer { by, speed_m_s, ..Softer::default() }, Some(place))
+        }
+        _ => {
+            world.effects.unheard = between(rng, 0.06, 0.2);
+            ("impacts that went unheard", Softer::default(), None)
+        }
+    };
+    world.effects.softer = softer;
+    key.unlisted = Some(what.into());
+    key.place = place;
 }
 
 pub(crate) fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {

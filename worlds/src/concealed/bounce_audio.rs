@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::bounce::{LISTED, listed};
+use super::bounce::{LISTED, listed, local};
 use super::draw::{between, choose, log_between, whole};
 use super::key::{Concealed, Hidden, Key};
 use super::maker::Maker;
@@ -41,7 +41,15 @@ impl Maker for BounceAudio {
         for which in choose(&mut rng, what.len(), hidden.listed()).into_iter().map(|k| what[k]) {
             world.hide(which, &mut key, &mut rng);
         }
-        if hidden.unlisted() {
+        if hidden == Hidden::Local {
+            local(&mut world.ball, whole(&mut rng, 0, 2), &mut key, &mut rng);
+            if let Some(place) = key.place.as_mut().filter(|place| place.variable == "x_m") {
+                // Balls land over the whole of the square between the microphones.
+                place.from += 0.35 * SIDE_M;
+                place.to += 0.5 * SIDE_M;
+                world.ball.effects.softer.x_m = [place.from, place.to];
+            }
+        } else if hidden.unlisted() {
             world.ball.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
@@ -147,7 +155,7 @@ impl SoundWorld {
         for run in 0..self.ball.runs {
             let silent = self.ball.unheard(rng);
             unheard += usize::from(silent.is_some());
-            files.push((format!("drop-{run:02}.wav"), self.sound(&table, silent, rng)));
+            files.push((format!("drop-{run:02}.wav"), self.sound(&table, silent, run, rng)));
         }
         let names: Vec<String> = files.iter().map(|(name, _)| format!("{name:?}")).collect();
         let mut header = format!(
@@ -164,11 +172,11 @@ impl SoundWorld {
     }
 
     /// The sound of one run, in which the impact of a number may be silent.
-    fn sound(&self, table: &TableModes, silent: Option<usize>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    fn sound(&self, table: &TableModes, silent: Option<usize>, run: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
         let from = [between(rng, 0.25, 0.75) * SIDE_M, between(rng, 0.25, 0.75) * SIDE_M];
         let height = self.ball.height_m * if self.ball.height_known { 1.0 } else { between(rng, 0.7, 1.3) };
         let impacts = self.ball.impacts + usize::from(silent.is_some());
-        let mut events = self.ball.drop(from, height, 0.0..1e-3, impacts, rng);
+        let mut events = self.ball.in_run(run).drop(from, height, 0.0..1e-3, impacts, rng);
         let early = events[0][0] - between(rng, 0.03, 0.12);
         events.iter_mut().for_each(|e| e[0] -= early);
         let last = events.last().map_or(0.0, |e| e[0]);

@@ -65,7 +65,7 @@ impl Maker for Custom {
 
     /// A simulator in columns has no list of mechanisms.
     fn kind(&self, hidden: Hidden) -> Hidden {
-        if hidden == Hidden::Nothing { hidden } else { Hidden::Unlisted }
+        if matches!(hidden, Hidden::Nothing | Hidden::Local) { hidden } else { Hidden::Unlisted }
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
@@ -74,7 +74,7 @@ impl Maker for Custom {
         let world = World::drawn(hidden, &mut rng);
         let mut key = Key::new(hidden);
         let mut size = 0.0;
-        if hidden == Hidden::Unlisted {
+        if hidden.unlisted() {
             let wanted = strength(&mut rng);
             size = size_of_strength(wanted, [1e-7, 10.0], |size| world.strength(size));
             key.strength = Some(world.strength(size));
@@ -111,7 +111,11 @@ impl World {
         let effects = [Effect::First, Effect::Second, Effect::Sudden];
         Self {
             plant,
-            effect: if hidden == Hidden::Nothing { Effect::Nothing } else { effects[whole(rng, 0, 2)] },
+            effect: match hidden {
+                Hidden::Nothing => Effect::Nothing,
+                Hidden::Local => Effect::Sudden,
+                _ => effects[whole(rng, 0, 2)],
+            },
             sign: sign(rng),
             at_s: duration_s * between(rng, 0.2, 0.7),
             starts: (0..runs).map(|_| level * between(rng, 0.6, 1.4)).collect(),
@@ -197,7 +201,7 @@ impl World {
         key.unlisted = Some(what.into());
         if self.effect == Effect::Sudden {
             let to = self.rows as f64 / self.rate_hz;
-            key.place = Some(Place { variable: "t_s".into(), from: self.at_s, to });
+            key.place = Some(Place::new("t_s", self.at_s, to));
         }
     }
 

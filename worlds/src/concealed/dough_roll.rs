@@ -15,6 +15,8 @@ use crate::physics::dough::{Band, DoughWorld, Effects, Long, Piece, PlannedRoll,
 const LISTED: usize = 6;
 const DRYING: usize = 1;
 const UNLISTED: usize = 4;
+/// The unlisted effect that acts at a place.
+const TOO_LONG: usize = 2;
 
 /// A table on which doughs were rolled: some to learn from, and some since.
 pub(crate) struct Table {
@@ -43,7 +45,11 @@ impl Rig for Table {
         let table = Self::drawn(rng);
         let tried = table.candidates();
         let listed = choose(rng, tried.len(), hidden.listed()).into_iter().map(|k| tried[k]).collect();
-        let unlisted = if hidden.unlisted() { whole(rng, 0, UNLISTED - 1) } else { 0 };
+        let unlisted = match hidden {
+            Hidden::Local => TOO_LONG,
+            _ if hidden.unlisted() => whole(rng, 0, UNLISTED - 1),
+            _ => 0,
+        };
         (table, Choice { listed, unlisted })
     }
 
@@ -129,8 +135,7 @@ impl Rig for Table {
             0 => "a response that alternates from roll to roll",
             1 => "a band that answers the throw in another way",
             2 => {
-                let to = f64::INFINITY;
-                key.place = Some(Place { variable: "length_m".into(), from: self.long_from_m, to });
+                key.place = Some(Place::new("length_m", self.long_from_m, f64::INFINITY));
                 "a dough that is too long for the band"
             }
             _ => "a dough that is harder after it was worked",

@@ -9,13 +9,17 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::indentation::{Effects, IndentationWorld, Indenter, Rim, Ripple, Slip, Step};
+use crate::physics::indentation::{Effects, IndentationWorld, Indenter, Later, Rim, Ripple, Slip, Step, Stratum};
 
 /// Listed effects; the last three act on spheres only, and viscoelasticity needs times.
 const LISTED: usize = 10;
 const FOR_ALL: usize = 7;
 const RELAXES: usize = 6;
 const UNLISTED: usize = 3;
+/// Unlisted effects that act at a place.
+const LOCAL: [usize; 3] = [2, 3, 4];
+/// Runs of one condition in which one may be off from a run on.
+const REPEATS: usize = 5;
 
 /// Conditions: name of the column, and their labels.
 type Conditions = (&'static str, Vec<String>);
@@ -38,6 +42,10 @@ pub(crate) struct Press {
     /// Depth at which a rim is met, or a membrane slips.
     depth_m: f64,
     pitch_m: f64,
+    /// Depths of a layer that is softer.
+    stratum_m: [f64; 2],
+    /// The first run that is stiffer, counted from 0.
+    from_run: usize,
 }
 
 impl Rig for Press {
@@ -47,9 +55,15 @@ impl Rig for Press {
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
         let sphere = whole(rng, 0, 4) > 0;
         let listed = choose(rng, if sphere { LISTED } else { FOR_ALL }, hidden.listed());
-        let unlisted = whole(rng, 0, UNLISTED - 1);
+        let unlisted = match hidden {
+            Hidden::Local => LOCAL[whole(rng, 0, LOCAL.len() - 1)],
+            _ => whole(rng, 0, UNLISTED - 1),
+        };
         let returns = hidden.unlisted() && unlisted == 0;
-        let press = Self::drawn(sphere, returns, listed.contains(&RELAXES), rng);
+        let mut press = Self::drawn(sphere, returns, listed.contains(&RELAXES), rng);
+        if hidden == Hidden::Local {
+            press.repeat(whole(rng, 2, REPEATS - 1), rng);
+        }
         (press, Choice { listed, unlisted })
     }
 
@@ -151,6 +165,8 @@ impl Rig for Press {
         match which {
             0 => [2e-3, 0.6],
             1 => [0.05 * self.sigma, 0.2 * self.force_n],
+            3 => [1e-3 * self.force_n / self.deepest_m, 3.0 * self.force_n / self.deepest_m],
+            4 => [1e-3, 0.5],
             _ => [0.05 * self.sigma, 0.3 * self.force_n],
         }
     }
@@ -159,6 +175,11 @@ impl Rig for Press {
         match which {
             0 => Effects { dent: size, ..beside },
             1 => Effects { ripple: Ripple { amplitude_n: size, pitch_m: self.pitch_m }, ..beside },
+            3 => {
+                let layer = Stratum { stiffness_n_m: -size, between_m: self.stratum_m };
+                Effects { layer, ..beside }
+            }
+            4 => Effects { later: Later { stiffer: size, from_run: self.from_run }, ..beside },
             _ => Effects { slip: Slip { depth_m: self.depth_m, force_n: size }, ..beside },
         }
     }
@@ -167,6 +188,15 @@ impl Rig for Press {
         let (what, place) = match which {
             0 => ("a dent that stays: the way back is another", None),
             1 => ("a ripple of the drive, periodic in depth", None),
+            3 => {
+                let [top, bottom] = self.stratum_m;
+                ("a softer layer", Some(Place::new("delta_m", top, bottom)))
+            }
+            4 => {
+                let later = (self.from_run..self.world.runs.len()).map(|run| (run + 1).to_string());
+                let place = Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(later);
+                ("a stiffer body from one run on", Some(place))
+            }
             _ => ("a membrane that slips at a depth", Some(self.after_slip())),
         };
         key.unlisted = Some(what.into());
@@ -258,7 +288,20 @@ impl Press {
             tau_s: log_between(rng, 0.3, 8.0),
             depth_m: deepest_m * between(rng, 0.4, 0.75),
             pitch_m: deepest_m * between(rng, 0.12, 0.3),
+            stratum_m: [0.0; 2],
+            from_run: 0,
         }
+    }
+
+    /// Runs of one condition, and where something local acts in them.
+    fn repeat(&mut self, from_run: usize, rng: &mut ChaCha8Rng) {
+        let path = self.world.runs[0].1.clone();
+        self.conditions = None;
+        self.world.moduli_pa.truncate(1);
+        self.world.runs = vec![(0, path); REPEATS];
+        self.from_run = from_run;
+        let top = self.deepest_m * between(rng, 0.35, 0.6);
+        self.stratum_m = [top, top + self.deepest_m * between(rng, 0.12, 0.25)];
     }
 
     /// Readings in sigmas.
@@ -268,7 +311,7 @@ impl Press {
     }
 
     fn beyond_depth(&self) -> Place {
-        Place { variable: "delta_m".into(), from: self.depth_m, to: self.deepest_m }
+        Place::new("delta_m", self.depth_m, self.deepest_m)
     }
 
     /// Where a slip shows: from a time on where there is a way back, on which the membrane stays slipped; else from a depth on.
@@ -278,7 +321,7 @@ impl Press {
             path.iter().find(|step| step.delta_m >= self.depth_m).filter(|_| path.iter().any(|s| !s.down));
         slips.map_or_else(
             || self.beyond_depth(),
-            |slips| Place { variable: "t_s".into(), from: slips.t_s, to: f64::INFINITY },
+            |slips| Place::new("t_s", slips.t_s, f64::INFINITY),
         )
     }
 }

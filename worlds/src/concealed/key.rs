@@ -15,13 +15,15 @@ pub enum Hidden {
     Leftover,
     /// A strong effect that is not on the list, of which the best mechanism on it takes away 40 to 85 % of the squares.
     Imitated,
+    /// An effect that is not on the list and acts at a place only: the key says where.
+    Local,
 }
 
 impl Hidden {
     /// How many mechanisms of the list are at work.
     pub(crate) const fn listed(self) -> usize {
         match self {
-            Self::Nothing | Self::Unlisted | Self::Imitated => 0,
+            Self::Nothing | Self::Unlisted | Self::Imitated | Self::Local => 0,
             Self::One | Self::Leftover => 1,
             Self::Two => 2,
         }
@@ -29,7 +31,7 @@ impl Hidden {
 
     /// Whether something is at work that is not on the list.
     pub(crate) const fn unlisted(self) -> bool {
-        matches!(self, Self::Unlisted | Self::Leftover | Self::Imitated)
+        matches!(self, Self::Unlisted | Self::Leftover | Self::Imitated | Self::Local)
     }
 
     /// The kind that stands in for this one where no world has a leftover or an imitation.
@@ -74,6 +76,8 @@ pub struct Key {
     pub unlisted: Option<String>,
     /// Where a local effect acts.
     pub place: Option<Place>,
+    /// Single events at which it acts, as run and number of the row: each acts at this row or between it and the next.
+    pub events: Vec<(String, f64)>,
     /// Strength of the hidden effects, where the maker knows it: the root of the sum of squares of their response in the readings,
     /// in sigmas of white noise, less the part that the baseline's nuisance parameters can take away (and, for an unlisted effect,
     /// any two listed mechanisms with them).
@@ -92,6 +96,7 @@ impl Key {
             parameters: Vec::new(),
             unlisted: None,
             place: None,
+            events: Vec::new(),
             strength: None,
             leftover: None,
         }
@@ -141,4 +146,19 @@ pub struct Place {
     pub from: f64,
     /// End of the interval; `inf` for the end.
     pub to: f64,
+    /// Labels of the runs in which it acts; empty for all of them.
+    pub runs: Vec<String>,
+}
+
+impl Place {
+    /// A place in all runs.
+    pub fn new(variable: &str, from: f64, to: f64) -> Self {
+        Self { variable: variable.into(), from, to, runs: Vec::new() }
+    }
+
+    /// The same place in some runs only.
+    #[must_use]
+    pub fn in_runs(self, runs: impl IntoIterator<Item = String>) -> Self {
+        Self { runs: runs.into_iter().collect(), ..self }
+    }
 }

@@ -14,6 +14,8 @@ use crate::physics::tilt::{Cable, Cavity, Effects, Sweep, TiltWorld};
 
 const LISTED: usize = 9;
 const UNLISTED: usize = 4;
+/// Unlisted effects that act at a place.
+const LOCAL: [usize; 3] = [0, 3, 4];
 
 /// A container in a gripper with its sensor.
 pub(crate) struct Container {
@@ -39,7 +41,11 @@ impl Rig for Container {
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
         let container = Self::drawn(rng);
         let listed = choose(rng, LISTED, hidden.listed());
-        let unlisted = if hidden.unlisted() { whole(rng, 0, UNLISTED - 1) } else { 0 };
+        let unlisted = match hidden {
+            Hidden::Local => LOCAL[whole(rng, 0, LOCAL.len() - 1)],
+            _ if hidden.unlisted() => whole(rng, 0, UNLISTED - 1),
+            _ => 0,
+        };
         (container, Choice { listed, unlisted })
     }
 
@@ -124,6 +130,7 @@ impl Rig for Container {
             0 => [1e-4, 0.05],
             1 => [2e-5, 0.01],
             2 => [1e-3, 5.0],
+            4 => [2e-5, 0.015],
             _ => [2e-4, 0.2 * self.world.sweeps[self.slip_run].mass_kg],
         }
     }
@@ -136,6 +143,7 @@ impl Rig for Container {
             },
             1 => Effects { play_nm: size, ..beside },
             2 => Effects { flex: sign * size, ..beside },
+            4 => Effects { regrasped_m: sign * size, slip_run: self.slip_run, ..beside },
             _ => Effects { spilt_kg: size, slip_run: self.slip_run, slip_pose: self.slip_pose, ..beside },
         }
     }
@@ -144,11 +152,16 @@ impl Rig for Container {
         let (what, place) = match which {
             0 => {
                 let to = self.world.sweeps[0].tilts_rad.iter().copied().fold(0.0, f64::max);
-                let place = Place { variable: "theta_rad".into(), from: self.taut_from_rad, to };
+                let place = Place::new("theta_rad", self.taut_from_rad, to);
                 ("a cable that is taut beyond an angle", Some(place))
             }
             1 => ("hysteresis of the torque sensor", None),
             2 => ("a gripper that gives way with the torque squared", None),
+            4 => {
+                let later = (self.slip_run..self.world.sweeps.len()).map(|run| (run + 1).to_string());
+                let place = Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(later);
+                ("another grip from one run on", Some(place))
+            }
             _ => ("liquid that is spilt once", Some(self.after_slip())),
         };
         key.unlisted = Some(what.into());
@@ -262,11 +275,9 @@ impl Container {
     /// Where the poses of a run from its slip on are.
     fn after_slip(&self) -> Place {
         let late = &self.world.sweeps[self.slip_run].tilts_rad[self.slip_pose..];
-        Place {
-            variable: "theta_rad".into(),
-            from: late.iter().copied().fold(f64::INFINITY, f64::min),
-            to: late.iter().copied().fold(0.0, f64::max),
-        }
+        let from = late.iter().copied().fold(f64::INFINITY, f64::min);
+        let to = late.iter().copied().fold(0.0, f64::max);
+        Place::new("theta_rad", from, to).in_runs([(self.slip_run + 1).to_string()])
     }
 }
 

@@ -40,11 +40,18 @@ mod tests {
 
     use super::*;
 
-    const KINDS: [Hidden; 6] =
-        [Hidden::Nothing, Hidden::One, Hidden::Two, Hidden::Unlisted, Hidden::Leftover, Hidden::Imitated];
+    const KINDS: [Hidden; 7] = [
+        Hidden::Nothing,
+        Hidden::One,
+        Hidden::Two,
+        Hidden::Unlisted,
+        Hidden::Leftover,
+        Hidden::Imitated,
+        Hidden::Local,
+    ];
 
     /// A domain with worlds of every kind.
-    type Drawn = (&'static str, [Concealed; 6]);
+    type Drawn = (&'static str, [Concealed; 7]);
 
     /// Every maker's worlds, drawn once from each seed.
     fn worlds(seed: u64) -> &'static [Drawn] {
@@ -144,6 +151,8 @@ mod tests {
                 assert!(key.mechanisms.iter().all(|m| key.parameters.iter().any(|p| p.mechanism == *m)));
                 assert!(key.strength.is_none_or(|s| s > 0.5 && s.is_finite()), "{key:?}");
                 assert!(key.place.as_ref().is_none_or(|p| p.from < p.to), "{key:?}");
+                let placed = key.place.is_some() || !key.events.is_empty();
+                assert!(hidden != Hidden::Local || placed, "{key:?}");
             }
         }
     }

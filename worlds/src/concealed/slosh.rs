@@ -10,10 +10,12 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::slosh::{Effects, Machine, Oscillation, ROOTS, Slip, SloshWorld, Start};
+use crate::physics::slosh::{Effects, Machine, Oscillation, Push, ROOTS, Slip, SloshWorld, Start};
 
 const LISTED: usize = 7;
 const UNLISTED: usize = 4;
+/// Unlisted effects that act at a place.
+const LOCAL: [usize; 3] = [2, 4, 5];
 
 /// A cylinder on its sensor.
 pub(crate) struct Bottle {
@@ -31,6 +33,7 @@ pub(crate) struct Bottle {
     lag_s: f64,
     machine: Machine,
     slip_s: f64,
+    push: Push,
 }
 
 impl Rig for Bottle {
@@ -38,7 +41,10 @@ impl Rig for Bottle {
     type Effects = Effects;
 
     fn draw(hidden: Hidden, rng: &mut ChaCha8Rng) -> (Self, Choice) {
-        let unlisted = whole(rng, 0, UNLISTED - 1);
+        let unlisted = match hidden {
+            Hidden::Local => LOCAL[whole(rng, 0, LOCAL.len() - 1)],
+            _ => whole(rng, 0, UNLISTED - 1),
+        };
         let bottle = Self::drawn(hidden.unlisted() && unlisted == 1, rng);
         (bottle, Choice { listed: choose(rng, LISTED, hidden.listed()), unlisted })
     }
@@ -137,6 +143,7 @@ impl Rig for Bottle {
         match which {
             0 | 2 => [0.02 * self.sigma, 0.5 * self.largest()],
             1 => [1e-3, 0.08],
+            4 | 5 => [0.02 * self.sigma, 300.0 * self.largest()],
             _ => [0.02, 1.0],
         }
     }
@@ -149,17 +156,29 @@ impl Rig for Bottle {
                 let run = self.world.starts.len() / 2;
                 Effects { slip: Slip { shift: sign * size, run, at_s: self.slip_s }, ..beside }
             }
+            4 => Effects { push: Push { size: sign * size, from_run: 0, ..self.push }, ..beside },
+            5 => Effects { push: Push { size: sign * size, ..self.push }, ..beside },
             _ => Effects { swirl_rad_s: size, ..beside },
         }
     }
 
     fn describe_unlisted(&self, which: usize, key: &mut Key) {
         let end = self.world.rows as f64 / self.world.rate_hz;
-        let from = |from: f64| Some(Place { variable: "t_s".into(), from, to: end });
+        let from = |from: f64| Some(Place::new("t_s", from, end));
+        let pushed = Place::new("t_s", self.push.window_s[0], self.push.window_s[1]);
+        let runs = self.world.starts.len();
         let (what, place) = match which {
             0 => ("a machine near by that starts", from(self.machine.from_s)),
             1 => ("a leak: less liquid from run to run", None),
-            2 => ("a grip that slips once, in one run", from(self.slip_s)),
+            2 => {
+                let run = (runs / 2 + 1).to_string();
+                ("a grip that slips once, in one run", from(self.slip_s).map(|place| place.in_runs([run])))
+            }
+            4 => ("a push on the liquid", Some(pushed)),
+            5 => {
+                let later = (self.push.from_run..runs).map(|run| (run + 1).to_string());
+                ("a push on the liquid, from one run on", Some(pushed.in_runs(later)))
+            }
             _ => ("a wave whose plane turns", None),
         };
         key.unlisted = Some(what.into());
@@ -243,6 +262,10 @@ impl Bottle {
             from_s: duration_s * between(rng, 0.2, 0.6),
         };
         let slip_s = duration_s * between(rng, 0.2, 0.8);
+        let begin = duration_s * between(rng, 0.15, 0.6);
+        let window_s = [begin, begin + duration_s * between(rng, 0.08, 0.2)];
+        let from_run = whole(rng, 1, world.starts.len() - 1);
+        let push = Push { size: 0.0, window_s, from_run };
         Self {
             sigma: draw::sigma(&noise),
             noise,
@@ -254,6 +277,7 @@ impl Bottle {
             frequency_sign,
             machine,
             slip_s,
+            push,
         }
     }
 

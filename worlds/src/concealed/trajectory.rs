@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::draw::{between, choose, log_between, noise, sign, whole};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
-use crate::physics::flight::{Effects, FlightWorld, Gust, Knock, Mast, Measured};
+use crate::physics::flight::{Effects, FlightWorld, Gust, Knock, Mast, Measured, Push};
 
 /// Makes worlds of the domain `trajectory`.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,9 @@ impl Maker for Trajectory {
         for which in choose(&mut rng, LISTED, hidden.listed()) {
             listed(effects, which, &mut key, &mut rng);
         }
-        if hidden.unlisted() {
+        if hidden == Hidden::Local {
+            local(&mut world, &mut key, &mut rng);
+        } else if hidden.unlisted() {
             unlisted(effects, &mut key, &mut rng);
         }
         let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n";
@@ -120,9 +122,39 @@ fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
             e.knock =
                 Knock { height_m: sign(rng) * log_between(rng, 0.005, 0.03), at_s: between(rng, 0.2, 0.5) };
             key.unlisted = Some("a camera that is knocked".into());
-            key.place = Some(Place { variable: "t_s".into(), from: e.knock.at_s, to: f64::INFINITY });
+            key.place = Some(Place::new("t_s", e.knock.at_s, f64::INFINITY));
         }
     }
+}
+
+/// A push for a while, in all runs or from one on, or at some heights.
+fn local(world: &mut FlightWorld, key: &mut Key, rng: &mut ChaCha8Rng) {
+    let size = log_between(rng, 1.5, 8.0);
+    let (turn, up) = (between(rng, 0.0, std::f64::consts::TAU), between(rng, -0.7, 0.7));
+    let level = (1.0_f64 - up * up).sqrt();
+    let acceleration_m_s2 = [size * level * turn.cos(), size * level * turn.sin(), size * up];
+    let push = Push { acceleration_m_s2, ..Push::default() };
+    let begin = between(rng, 0.1, 0.35);
+    let for_a_while = [begin, begin + between(rng, 0.08, 0.2)];
+    let (what, push, place) = match whole(rng, 0, 2) {
+        0 => ("a push", Push { between: for_a_while, ..push }, Place::new("t_s", begin, for_a_while[1])),
+        1 => {
+            world.runs = world.runs.max(5);
+            let from_run = whole(rng, 1, world.runs - 2);
+            let runs = (from_run..world.runs).map(|run| (run + 1).to_string());
+            let place = Place::new("t_s", begin, for_a_while[1]).in_runs(runs);
+            ("a push from one run on", Push { between: for_a_while, from_run, ..push }, place)
+        }
+        _ => {
+            let low = between(rng, 1.8, 2.2);
+            let heights = [low, low + between(rng, 0.4, 0.8)];
+            let push = Push { between: heights, at_height: true, ..push };
+            ("a jet of air at some heights", push, Place::new("z_m", low, heights[1]))
+        }
+    };
+    world.effects.push = push;
+    key.unlisted = Some(what.into());
+    key.place = Some(place);
 }
 
 #[cfg(test)]

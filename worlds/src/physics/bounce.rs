@@ -33,6 +33,28 @@ pub struct Effects {
     pub unheard: f64,
     /// Unlisted: fall of the restitution where x is above [`BounceWorld::soft_from_m`].
     pub softer_side: f64,
+    /// Unlisted: fall of the restitution at some impacts only.
+    pub softer: Softer,
+}
+
+/// A restitution that is lower at some impacts: between two places along x, two speeds, and from a run on, all of which have to hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Softer {
+    /// By how much.
+    pub by: f64,
+    /// Along x, m.
+    pub x_m: [f64; 2],
+    /// Speed at which the ball comes, m/s.
+    pub speed_m_s: [f64; 2],
+    /// The first run, counted from 0.
+    pub from_run: usize,
+}
+
+impl Default for Softer {
+    fn default() -> Self {
+        let all = [f64::NEG_INFINITY, f64::INFINITY];
+        Self { by: 0.0, x_m: all, speed_m_s: all, from_run: 0 }
+    }
 }
 
 /// How drops are recorded.
@@ -91,9 +113,19 @@ impl BounceWorld {
         self.files_and_unheard(seed).0
     }
 
-    /// The contents of `recording.toml` and `data.csv`, and the number of runs in which an impact went unheard.
-    pub fn files_and_unheard(&self, seed: u64) -> ([String; 2], usize) {
-        let mut runs_unheard = 0;
+    /// The same ball in a run, counted from 0.
+    pub(crate) fn in_run(&self, run: usize) -> Self {
+        let mut world = *self;
+        if run < world.effects.softer.from_run {
+            world.effects.softer = Softer::default();
+        }
+        world
+    }
+
+    /// The contents of `recording.toml` and `data.csv`, and for each impact that went unheard its run and the number of the last impact
+    /// before it that was heard, both counted from 1.
+    pub fn files_and_unheard(&self, seed: u64) -> ([String; 2], Vec<[usize; 2]>) {
+        let mut all_unheard = Vec::new();
         let mut header = String::from("format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n");
         if self.noise_known {
             let [time, place] = self.noise;
@@ -111,16 +143,16 @@ impl BounceWorld {
         for run in 1..=self.runs {
             let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
             let unheard = self.unheard(&mut rng);
-            runs_unheard += usize::from(unheard.is_some());
+            all_unheard.extend(unheard.map(|impact| [run, impact]));
             let impacts = self.impacts + usize::from(unheard.is_some());
-            let heard = self.drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
+            let heard = self.in_run(run - 1).drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
             for (number, (_, [t, x, y])) in kept.enumerate() {
                 let _ = write!(data, "{run},{},{t:.7}", number + 1);
                 let _ = if self.placed { writeln!(data, ",{x:.5},{y:.5}") } else { writeln!(data) };
             }
         }
-        ([header, data], runs_unheard)
+        ([header, data], all_unheard)
     }
 
     /// The impact of a run that goes unheard, if one does.
@@ -198,6 +230,10 @@ impl BounceWorld {
         let mut restitution = self.restitution - e.slope_s_m * (speed - 1.0);
         if place[0] > self.soft_from_m {
             restitution -= e.softer_side;
+        }
+        let Softer { by, x_m, speed_m_s, .. } = e.softer;
+        if place[0] > x_m[0] && place[0] < x_m[1] && speed > speed_m_s[0] && speed < speed_m_s[1] {
+            restitution -= by;
         }
         let up = unit(&[-e.table_slope[0], -e.table_slope[1], 1.0]);
         let into = v[0] * up[0] + v[1] * up[1] + v[2] * up[2];

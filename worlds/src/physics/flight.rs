@@ -51,6 +51,21 @@ pub struct Effects {
     pub gust: Gust,
     /// Unlisted: the camera is knocked.
     pub knock: Knock,
+    /// Unlisted: the ball is pushed for a while, or at some heights.
+    pub push: Push,
+}
+
+/// A force for a while, or within a range of heights, in some of the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Push {
+    /// Acceleration, m/s^2.
+    pub acceleration_m_s2: [f64; 3],
+    /// Beginning and end in s since the start of the run, or lowest and highest place in m.
+    pub between: [f64; 2],
+    /// Whether it acts between two heights.
+    pub at_height: bool,
+    /// The first run in which it acts, counted from 0.
+    pub from_run: usize,
 }
 
 /// A mast that swings with a new phase in each run: x by the amplitude, y by 0.3 and z by 0.1 of it.
@@ -188,7 +203,11 @@ impl FlightWorld {
             .into_iter()
             .enumerate()
             .map(|(r, (start, rows, phase))| {
-                let (t_s, mut channels) = self.fly(start, rows, phase, STEPS);
+                let mut world = *self;
+                if r < world.effects.push.from_run {
+                    world.effects.push = Push::default();
+                }
+                let (t_s, mut channels) = world.fly(start, rows, phase, STEPS);
                 for column in &mut channels {
                     self.noise.apply(column, &mut rng);
                 }
@@ -216,9 +235,9 @@ impl FlightWorld {
                     - GRAVITY_M_S2,
             ]
         };
-        let rates = |y: &[f64; 6], gust: [f64; 3]| {
+        let rates = |y: &[f64; 6], gust: [f64; 3], push: [f64; 3]| {
             let f = force(y, gust);
-            [y[3], y[4], y[5], f[0], f[1], f[2]]
+            [y[3], y[4], y[5], f[0] + push[0], f[1] + push[1], f[2] + push[2]]
         };
         // The clock states (1 + rate) times the true time: frames are that much closer together.
         let frame = 1.0 / self.frame_hz;
@@ -251,7 +270,10 @@ impl FlightWorld {
             }
             for step in i * steps..(i + 1) * steps {
                 let gust = gust_in(step);
-                y = runge_kutta::step(&y, 0.0, h, |y, _| rates(y, gust));
+                let at = if e.push.at_height { y[2] } else { (step as f64 + 0.5) * h };
+                let [begin, end] = e.push.between;
+                let push = if at > begin && at < end { e.push.acceleration_m_s2 } else { [0.0; 3] };
+                y = runge_kutta::step(&y, 0.0, h, |y, _| rates(y, gust, push));
             }
         }
         (t_s, channels)

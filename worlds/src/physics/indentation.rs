@@ -49,6 +49,28 @@ pub struct Effects {
     pub ripple: Ripple,
     /// Unlisted: a membrane that slips.
     pub slip: Slip,
+    /// Unlisted: a layer of another stiffness.
+    pub layer: Stratum,
+    /// Unlisted: another modulus from a run on.
+    pub later: Later,
+}
+
+/// Depths over which each further metre takes another force.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Stratum {
+    /// Change of the stiffness, N/m.
+    pub stiffness_n_m: f64,
+    /// Depth readings between which it is another one, m.
+    pub between_m: [f64; 2],
+}
+
+/// A modulus that changes between runs.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Later {
+    /// By how much it is larger, relative.
+    pub stiffer: f64,
+    /// The first run that has it, counted from 0.
+    pub from_run: usize,
 }
 
 /// A rim beside the contact.
@@ -169,12 +191,17 @@ impl IndentationWorld {
     /// Forces of all runs without noise, run after run, N.
     pub fn readings(&self) -> Vec<f64> {
         let layer = (self.effects.thickness_m > 0.0).then(|| Layer::new(self.poisson_ratio));
-        self.runs.iter().flat_map(|(condition, steps)| self.run(*condition, steps, layer.as_ref())).collect()
+        let later = self.effects.later;
+        let of_run = |(number, (condition, steps)): (usize, &(usize, Vec<Step>))| {
+            let stiffer = if number >= later.from_run { later.stiffer } else { 0.0 };
+            self.run(self.moduli_pa[*condition] * (1.0 + stiffer), steps, layer.as_ref())
+        };
+        self.runs.iter().enumerate().flat_map(of_run).collect()
     }
 
-    fn run(&self, condition: usize, steps: &[Step], layer: Option<&Layer>) -> Vec<f64> {
+    fn run(&self, modulus_pa: f64, steps: &[Step], layer: Option<&Layer>) -> Vec<f64> {
         let e = &self.effects;
-        let plane = self.moduli_pa[condition] / (1.0 - self.poisson_ratio * self.poisson_ratio);
+        let plane = modulus_pa / (1.0 - self.poisson_ratio * self.poisson_ratio);
         let mut depths: Vec<f64> = steps.iter().map(|s| s.delta_m).collect();
         let mut forces = self.forces(plane, steps, &depths, layer);
         if e.compliance_m_n > 0.0 {
@@ -192,6 +219,8 @@ impl IndentationWorld {
         for (force, step) in forces.iter_mut().zip(steps) {
             slipped |= e.slip.depth_m > 0.0 && step.delta_m >= e.slip.depth_m;
             *force += e.force_offset_n - if slipped { e.slip.force_n } else { 0.0 };
+            let [top, bottom] = e.layer.between_m;
+            *force += e.layer.stiffness_n_m * (step.delta_m.min(bottom) - top).max(0.0);
             if amplitude_n != 0.0 {
                 *force += amplitude_n * (2.0 * PI * step.delta_m / pitch_m).sin();
             }

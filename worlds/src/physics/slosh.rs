@@ -48,6 +48,19 @@ pub struct Effects {
     pub slip: Slip,
     /// Unlisted: the plane of the wave turns, rad/s.
     pub swirl_rad_s: f64,
+    /// Unlisted: the liquid is pushed for a while.
+    pub push: Push,
+}
+
+/// A push on the first mode, in some of the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Push {
+    /// Acceleration of the reading, in its unit over s^2.
+    pub size: f64,
+    /// Beginning and end, s.
+    pub window_s: [f64; 2],
+    /// The first run in which it acts, counted from 0.
+    pub from_run: usize,
 }
 
 /// A machine that shakes the sensor from a time on.
@@ -175,7 +188,12 @@ impl SloshWorld {
             let reading = if e.lag_s > 0.0 { state[6] } else { state[0] + state[2] + state[4] };
             let reading = if e.swirl_rad_s > 0.0 { reading * turned } else { reading };
             readings.push(reading + self.unlisted_reading(number, t));
-            for _ in 0..steps as usize {
+            for step in 0..steps as usize {
+                let middle = t + (step as f64 + 0.5) * step_s;
+                let [begin, end] = e.push.window_s;
+                if number >= e.push.from_run && middle > begin && middle < end {
+                    state[1] += e.push.size * step_s;
+                }
                 state = run.advance(state, step_s);
             }
         }

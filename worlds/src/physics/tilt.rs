@@ -106,6 +106,8 @@ pub struct Effects {
     pub flex: f64,
     /// Unlisted: kg of liquid spilt at the run and pose of the slip.
     pub spilt_kg: f64,
+    /// Unlisted: another grip from the run of the slip on, m.
+    pub regrasped_m: f64,
 }
 
 /// A cable to the sensor that turns it once it is taut.
@@ -154,7 +156,8 @@ impl TiltWorld {
             let mut reading = None;
             for (pose, &tilt) in sweep.tilts_rad.iter().enumerate() {
                 let late = run == e.slip_run && pose >= e.slip_pose;
-                let [force, torque] = self.load(sweep, tilt, late);
+                let regrasped = if run >= e.slip_run { e.regrasped_m } else { 0.0 };
+                let [force, torque] = self.load(sweep, tilt, late, regrasped);
                 let torque = torque + e.cable.stiffness_nm_rad * (tilt - e.cable.taut_from_rad).max(0.0);
                 // A play follows only where it is pushed.
                 let followed = reading
@@ -168,11 +171,11 @@ impl TiltWorld {
     }
 
     /// Force and torque of the weights at a tilt.
-    fn load(&self, sweep: &Sweep, stated_rad: f64, late: bool) -> [f64; 2] {
+    fn load(&self, sweep: &Sweep, stated_rad: f64, late: bool, regrasped_m: f64) -> [f64; 2] {
         let e = &self.effects;
         let slip = if late { e.slip_m } else { 0.0 };
         let spilt = if late { e.spilt_kg } else { 0.0 };
-        let grasp = self.grasp_m + e.grasp_offset_m + slip;
+        let grasp = self.grasp_m + e.grasp_offset_m + slip + regrasped_m;
         let liquid_kg = sweep.mass_kg - spilt;
         let volume = sweep.volume_m3 * liquid_kg / sweep.mass_kg;
         let cavity = Cavity {

@@ -9,6 +9,7 @@ mod chance;
 mod drop;
 mod effects;
 mod experiments;
+mod local;
 mod model;
 mod read;
 mod rows;

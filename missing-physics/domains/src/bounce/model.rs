@@ -21,12 +21,12 @@ use super::weights::{Linear, Spread, Weights};
 
 /// A drop with its weights and the errors that the engine is shown as its data.
 #[derive(Debug)]
-struct ShownDrop {
-    weights: Weights,
+pub(super) struct ShownDrop {
+    pub(super) weights: Weights,
     shown: Vec<f64>,
     /// Where each impact was heard, and when by each microphone.
     heard: Vec<([f64; 2], Vec<f64>)>,
-    rows: Rows,
+    pub(super) rows: Rows,
     /// What chance alone may do to it, in sigmas, `[world][copy][channel][row]`.
     null_samples: Vec<Vec<Vec<Vec<f64>>>>,
 }
@@ -72,6 +72,11 @@ impl BounceModel {
             nominal,
             drops: HashMap::new(),
         }
+    }
+
+    /// A drop by its label.
+    pub(super) fn shown(&self, label: &str) -> Option<&ShownDrop> {
+        self.drops.get(label)
     }
 
     pub(super) fn setup(&self) -> &Setup {
@@ -251,7 +256,12 @@ impl Model for BounceModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { errors: Some(self), modes: Some(self), ..Extensions::default() }
+        Extensions {
+            errors: Some(self),
+            modes: Some(self),
+            local_causes: Some(self),
+            ..Extensions::default()
+        }
     }
 }
 

@@ -107,7 +107,7 @@ impl TimesModel {
         run: &Run,
         shared: &[f64],
         nuisance: &[f64],
-        hidden: usize,
+        (hidden, springier): (usize, &[f64]),
         out: &mut [f64],
     ) -> Result<(), String> {
         let p = &self.layout;
@@ -123,7 +123,7 @@ impl TimesModel {
             (Some(at), _) => nuisance[at.slot],
             (None, Some(height)) => {
                 let fell = speed_after_drop(height, gravity, drag);
-                restitution(fell) * fell
+                restitution(fell) * fell * springier.first().map_or(1.0, |by| by.exp())
             }
             (None, None) => return Err("neither a height nor a speed is known".into()),
         };
@@ -136,21 +136,32 @@ impl TimesModel {
                 elapsed += duration;
                 leaves = restitution(lands) * lands;
                 impact += 1.0;
+                if impact == wanted {
+                    leaves *= springier.get(i).map_or(1.0, |by| by.exp());
+                }
             }
             *time = nuisance[self.begins.slot] + (1.0 + rate) * elapsed;
         }
         Ok(())
     }
 
-    fn fill(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
+    /// The times where the logarithm of the restitution of each row's impact is larger by some amounts (none: empty).
+    pub(super) fn fill(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        springier: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), String> {
         if run.inputs.len() <= FOUND {
             return Err("its impacts are not numbered".into());
         }
-        self.times(run, shared, nuisance, KNOWN, out)?;
+        self.times(run, shared, nuisance, (KNOWN, springier), out)?;
         let split = self.layout.unheard.map_or(0.0, |at| shared[at.slot]);
         if split != 0.0 {
             let mut apart = vec![0.0; out.len()];
-            self.times(run, shared, nuisance, FOUND, &mut apart)?;
+            self.times(run, shared, nuisance, (FOUND, springier), &mut apart)?;
             out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
         }
         Ok(())
@@ -181,7 +192,7 @@ impl Model for TimesModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.fill(run, shared, nuisance, out)
+        self.fill(run, shared, nuisance, &[], out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
@@ -197,7 +208,7 @@ impl Model for TimesModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { errors: Some(self), ..Extensions::default() }
+        Extensions { errors: Some(self), local_causes: Some(self), ..Extensions::default() }
     }
 }
 

@@ -82,6 +82,11 @@ impl Linear {
         }
     }
 
+    /// By how much the errors change where a measured time does by a second.
+    pub(super) fn by_time(&self, impact: usize) -> DVector<f64> {
+        self.sensitivity[0].column(impact).into_owned()
+    }
+
     /// The errors under some effects.
     pub(super) fn errors(&self, effects: &Effects) -> DVector<f64> {
         self.errors_of(&self.drop, effects)
@@ -258,6 +263,16 @@ impl Weights {
     pub(super) fn new(linear: Linear, spread: Spread) -> Option<Self> {
         let factor = linear.factor(&spread, 0.0)?;
         factor.l_dirty().iter().all(|v| v.is_finite()).then_some(Self { linear, spread, factor })
+    }
+
+    /// What a change of the errors does to the white ones; `None` where that cannot be had.
+    pub(super) fn white_change(&self, mut change: DVector<f64>) -> Option<DVector<f64>> {
+        let drop = &self.linear.drop;
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut change).then_some(())?;
+        for (channel, scale) in self.spread.of_channels().into_iter().enumerate() {
+            (0..drop.impacts()).for_each(|impact| change[drop.row(impact, channel)] *= scale);
+        }
+        Some(change)
     }
 
     /// The white errors under some effects, its impacts moved by `[t, x, y]` (s, m; empty: as heard); `None` where they cannot be had.

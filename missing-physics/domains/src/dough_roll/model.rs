@@ -13,7 +13,7 @@ use dough_mbrl::sensitivity::{PER_ROLL, negative_log_likelihood, whitened};
 use dough_mbrl::whitener::CommonModeWhitener;
 use missing_physics::data::Run;
 use missing_physics::model::{
-    CoupledRows, ErrorModel, Extensions, Model, MultimodalModel, PredictError, Spec,
+    ErrorModel, Extensions, LocalCauses, LocalUnknown, Model, MultimodalModel, PredictError, Quantity, Spec,
 };
 use nalgebra::{DVector, Vector3};
 
@@ -282,7 +282,7 @@ impl Model for DoughModel {
         Extensions {
             errors: Some(self),
             modes: Some(self),
-            coupled_rows: Some(self),
+            local_causes: Some(self),
             ..Extensions::default()
         }
     }
@@ -314,12 +314,24 @@ impl MultimodalModel for DoughModel {
     }
 }
 
-impl CoupledRows for DoughModel {
+impl LocalCauses for DoughModel {
+    fn unknowns(&self) -> Vec<LocalUnknown> {
+        let part = Quantity::new("relative_response", "");
+        vec![LocalUnknown { name: "another response".into(), components: vec![part] }]
+    }
+
+    /// What was learned ties rolls of all doughs together.
+    fn runs_are_alone(&self) -> bool {
+        false
+    }
+
     /// The response of each roll: what follows from that is measured in all rolls that what was learned ties to it.
-    fn perturbation_response(
+    fn response(
         &self,
+        _: (usize, usize),
         runs: &[Run],
         shared: &[f64],
+        _: &[Vec<f64>],
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError> {
         const PART: f64 = 1e-4;

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod derivatives;
 mod experiments;
+mod local;
 mod model;
 mod setup;
 mod spec;

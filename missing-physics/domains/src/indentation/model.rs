@@ -59,6 +59,11 @@ impl IndentationModel {
         &self.setup
     }
 
+    /// Where a run's contact begins, m, and what its sensor reads without one, N.
+    pub(super) fn offsets(&self, nuisance: &[f64]) -> [f64; 2] {
+        [nuisance[self.layout.offset.slot], nuisance[self.layout.lift.slot]]
+    }
+
     /// The modulus of a run's condition.
     fn modulus(&self, run: &Run) -> Option<ParameterRef> {
         let moduli = &self.layout.moduli;
@@ -182,7 +187,7 @@ impl Model for IndentationModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { modes: Some(self), ..Extensions::default() }
+        Extensions { modes: Some(self), local_causes: Some(self), ..Extensions::default() }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The domain `liquid-tilt`: a closed container of liquid, tilted slowly and felt at the wrist.
 
 mod experiments;
+mod local;
 mod model;
 mod setup;
 mod spec;

@@ -4,6 +4,7 @@ use liquid_haptics::wrench::Departures;
 use missing_physics::data::Run;
 use missing_physics::model::{ErrorModel, Extensions, Model, MultimodalModel, PredictError, Scope, Spec};
 
+use super::local::Off;
 use super::setup::{Cavity, Setup, Vessel};
 use super::spec::{Layout, build};
 use crate::memo::Memo;
@@ -74,38 +75,48 @@ impl LiquidTiltModel {
 
     /// What the wrist feels in each pose of a run.
     fn wrenches(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
+        let n = run.len();
+        for row in 0..n {
+            let felt = self.wrench(run, shared, nuisance, row, Off::default())?;
+            felt.iter().enumerate().for_each(|(channel, v)| out[channel * n + row] = *v);
+        }
+        Ok(())
+    }
+
+    /// What it feels in one of them, which may be off: forces (N) and torque (N m).
+    pub(super) fn wrench(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        at: usize,
+        off: Off,
+    ) -> Result<[f64; 3], String> {
         let p = &self.layout;
         let [theta, row, ..] = run.inputs.as_slice() else {
             return Err("theta_rad and row are missing".into());
         };
         let cavity = self.cavity(shared[p.thickness.slot])?;
         let (mass, volume) = self.load(run, nuisance);
+        let (mass, volume) = (mass * (1.0 + off.liquid), volume * (1.0 + off.liquid));
         let volume = volume.clamp(0.0, cavity.capacity_m3());
-        let mut departures = Departures {
+        let slip_row = shared[p.slip_row.slot];
+        let slipped = if row[at] >= slip_row && row.contains(&slip_row) { shared[p.slip.slot] } else { 0.0 };
+        let departures = Departures {
             force_gain: shared[p.gain.slot],
-            torque_offset_nm: 0.0,
+            torque_offset_nm: shared[p.torque.slot] + shared[p.drift.slot] * row[at],
             angle_offset_rad: shared[p.angle.slot],
-            grasp_offset_m: 0.0,
+            grasp_offset_m: shared[p.grasp.slot] + slipped + off.grasp_m,
             shell_shift_m: shared[p.shift.slot],
             surface_lag_rad: shared[p.lag.slot],
         };
-        let slip_row = shared[p.slip_row.slot];
-        let slips = row.contains(&slip_row);
-        let n = theta.len();
-        for (i, (theta, row)) in theta.iter().zip(row).enumerate() {
-            let slipped = if slips && *row >= slip_row { shared[p.slip.slot] } else { 0.0 };
-            departures.grasp_offset_m = shared[p.grasp.slot] + slipped;
-            departures.torque_offset_nm = shared[p.torque.slot] + shared[p.drift.slot] * row;
-            let felt = self
-                .setup
-                .grasp
-                .wrench(&*cavity, *theta, mass, volume, &departures)
-                .map_err(|e| e.to_string())?;
-            out[i] = felt.fx_n;
-            out[n + i] = felt.fy_n;
-            out[2 * n + i] = felt.tau_z_nm;
-        }
-        Ok(())
+        let angle = theta[at] + off.angle_rad;
+        let felt = self
+            .setup
+            .grasp
+            .wrench(&*cavity, angle, mass, volume, &departures)
+            .map_err(|e| e.to_string())?;
+        Ok([felt.fx_n, felt.fy_n, felt.tau_z_nm])
     }
 }
 
@@ -164,7 +175,12 @@ impl Model for LiquidTiltModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { errors: Some(self), modes: Some(self), ..Extensions::default() }
+        Extensions {
+            errors: Some(self),
+            modes: Some(self),
+            local_causes: Some(self),
+            ..Extensions::default()
+        }
     }
 }
 

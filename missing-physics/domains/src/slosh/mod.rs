@@ -2,6 +2,7 @@
 
 mod envelope;
 mod experiments;
+mod local;
 mod model;
 mod setup;
 mod spec;

@@ -89,13 +89,21 @@ impl SloshModel {
         self.cylinders.get(run.kind as usize).unwrap_or(&self.cylinders[0])
     }
 
+    /// Angular frequency (rad/s) and damping ratio of a run's first mode.
+    pub(super) fn first_mode(&self, run: &Run, shared: &[f64]) -> [f64; 2] {
+        let (p, cylinder) = (&self.layout, self.cylinder(run));
+        let omega =
+            cylinder.angular_frequency_rad_s(0, shared[p.tension.slot] / self.setup.density_kg_m3);
+        [omega, cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999)]
+    }
+
     /// The first mode.
     fn wave_at(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        let (p, cylinder) = (&self.layout, self.cylinder(run));
+        let p = &self.layout;
+        let [omega_rad_s, damping_ratio] = self.first_mode(run, shared);
         let mode = Decay {
-            omega_rad_s: cylinder
-                .angular_frequency_rad_s(0, shared[p.tension.slot] / self.setup.density_kg_m3),
-            damping_ratio: cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999),
+            omega_rad_s,
+            damping_ratio,
             effects: Effects {
                 friction: shared[p.friction.slot],
                 quadratic_per_reading: shared[p.quadratic.slot],
@@ -212,7 +220,7 @@ impl Model for SloshModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { modes: Some(self), limits: Some(self), ..Extensions::default() }
+        Extensions { modes: Some(self), limits: Some(self), local_causes: Some(self), ..Extensions::default() }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The domain `trajectory`: an object in flight, filmed, or with an accelerometer on board.
 
 mod experiments;
+mod local;
 mod model;
 mod setup;
 mod spec;

@@ -2,7 +2,7 @@
 
 use bounce_audio::flight::{Flight, State};
 use missing_physics::data::Run;
-use missing_physics::model::{Model, PredictError, Scope, Spec};
+use missing_physics::model::{Extensions, Model, PredictError, Scope, Spec};
 use num_dual::DualNum;
 
 use super::setup::{Axes, ROD, Setup};
@@ -57,17 +57,7 @@ impl DualModel for TrajectoryModel {
         }
         let times = &run.inputs[0];
         let n = times.len();
-        let zero = T::from(0.0);
-        let start = match self.setup.axes {
-            Axes::Height => {
-                State { position: [zero, zero, nuisance[0]], velocity: [zero, zero, nuisance[1]] }
-            }
-            Axes::Space => State {
-                position: [nuisance[0], nuisance[1], nuisance[2]],
-                velocity: [nuisance[3], nuisance[4], nuisance[5]],
-            },
-            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, nuisance[1]] },
-        };
+        let start = self.start(nuisance);
         let begin = times.first().copied().unwrap_or(0.0);
         let elapsed: Vec<f64> = times.iter().map(|t| t - begin).collect();
         // A stated time is (1 + rate) times the true one. Rather than integrate to times that are dual numbers, go to the
@@ -106,19 +96,34 @@ impl DualModel for TrajectoryModel {
 }
 
 /// What the camera does to places, and its clock to times.
-struct Camera<T> {
+pub(super) struct Camera<T> {
     /// Measured over true lengths.
-    scale: T,
+    pub(super) scale: T,
     /// Its tilt about x and y, rad.
-    tilt: [T; 2],
+    pub(super) tilt: [T; 2],
     /// By how much its clock runs fast, relative to 1.
-    clock_rate: T,
+    pub(super) clock_rate: T,
 }
 
 impl TrajectoryModel {
+    /// Where a run begins, by its nuisance parameters.
+    pub(super) fn start<T: DualNum<Primitive = f64, Real = f64> + Copy>(&self, nuisance: &[T]) -> State<T> {
+        let zero = T::from(0.0);
+        match self.setup.axes {
+            Axes::Height => {
+                State { position: [zero, zero, nuisance[0]], velocity: [zero, zero, nuisance[1]] }
+            }
+            Axes::Space => State {
+                position: [nuisance[0], nuisance[1], nuisance[2]],
+                velocity: [nuisance[3], nuisance[4], nuisance[5]],
+            },
+            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, nuisance[1]] },
+        }
+    }
+
     /// The flight and the camera at some shared parameters, and whether the flight's closed form will do: where nothing else is on,
     /// nor asked for its derivative.
-    fn effects<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+    pub(super) fn effects<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,
         run: &Run,
         shared: &[T],
@@ -184,7 +189,10 @@ impl TrajectoryModel {
 }
 
 /// Turns positions by the camera's tilt: about x, then about y, both right-handed.
-fn tilted<T: DualNum<Primitive = f64, Real = f64> + Copy>(p: [T; 3], [about_x, about_y]: [T; 2]) -> [T; 3] {
+pub(super) fn tilted<T: DualNum<Primitive = f64, Real = f64> + Copy>(
+    p: [T; 3],
+    [about_x, about_y]: [T; 2],
+) -> [T; 3] {
     let (sx, cx, sy, cy) = (about_x.sin(), about_x.cos(), about_y.sin(), about_y.cos());
     let (x, y, z) = (p[0], cx * p[1] - sx * p[2], sx * p[1] + cx * p[2]);
     [cy * x + sy * z, y, cy * z - sy * x]
@@ -248,6 +256,10 @@ impl Model for TrajectoryModel {
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
         JacobianRequest { run, shared, nuisance, shared_free, nuisance_free }.fill(self, out, jacobian)
+    }
+
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { local_causes: Some(self), ..Extensions::default() }
     }
 }
 

@@ -1,19 +1,23 @@
-//! Where the baseline misses: for each channel the interval of a variable without which the baseline would hold.
+//! Where the cause acts: one unknown more within an interval, or at single rows; and where no such thing is known, for each channel the
+//! interval of a variable without which the baseline would hold.
 
-use crate::diagnosis::Location;
+use crate::diagnosis::{AsIf, Estimate, Location};
 use crate::fit::columns::whitened_columns;
 use crate::fit::optimum::Fit;
-use crate::locate::bins::{bin, value, variable_name, variables};
-use crate::locate::departure::{self, Departure, Left};
+use crate::locate::bins::{Along, Bins, variables};
+use crate::locate::cause::{Cause, Scene};
+use crate::locate::projection::Projection;
 use crate::locate::scan::{Interval, Scan};
-use crate::model::PredictError;
+use crate::locate::single::{Event, Events, events};
+use crate::locate::unknowns::{Unknown, unknowns};
+use crate::model::{PredictError, Quantity};
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
-/// A later variable has to hold so much more of the misfit than an earlier one.
-const EARLIER: f64 = 1.2;
+/// Each channel by itself, with a smooth departure or noise of its own, has to be worth so much more than a single cause.
+const SIMPLER: f64 = 1.2;
 
-/// Finds the places where the baseline misses, largest share first.
+/// Finds where the cause acts, largest share first.
 pub(crate) fn locate(
     problem: &Problem<'_>,
     selection: &Selection,
@@ -25,45 +29,67 @@ pub(crate) fn locate(
         .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.nuisance[r]))
         .collect::<Result<_, _>>()?;
     let sizes = (selection.nuisance.len(), selection.shared.len());
-    let mut found: Vec<(f64, Location)> = Vec::new();
-    let mut worth = 0.0;
-    for channel in 0..problem.channels() {
-        let best = best_interval(problem, &columns, sizes, channel);
-        if let Some((scan, Interval { gain, bins, worth: here })) = best.filter(|(_, b)| b.gain > 0.0) {
-            let (Scan { variable, edges, .. }, (_, coefficients)) = (&scan, scan.outside(bins));
-            let scanned = Scanned { variable: *variable, edges, bins, coefficients: &coefficients };
-            found.push((gain, place(problem, &columns, sigma, channel, &scanned, gain)));
-            worth += here;
+    let variables = variables(problem, baseline)?;
+    let of_readings: Vec<(usize, &Along, Scan, Interval)> = (0..problem.channels())
+        .filter_map(|channel| {
+            let (along, scan, best) = best_interval(problem, &columns, sizes, channel, &variables)?;
+            (best.gain > 0.0).then_some((channel, along, scan, best))
+        })
+        .collect();
+    let worth = of_readings.iter().map(|(.., interval)| interval.worth).sum::<f64>();
+    let projection = Projection::new(&columns, sizes);
+    let unknowns = unknowns(problem);
+    let scene = Scene {
+        problem,
+        fit: baseline,
+        sigma,
+        projection: &projection,
+        variables: &variables,
+        unknowns: &unknowns,
+    };
+    let cause = scene.best()?.filter(|cause| worth <= SIMPLER * cause.worth);
+    let events = events(problem, baseline, sigma, &projection, &unknowns)?;
+    let places = Places { problem, columns: &columns, sigma };
+    let found = match (cause, events) {
+        (cause, Some(events))
+            if events.worth > cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth) =>
+        {
+            places.of_events(&unknowns[events.unknown], &variables[0], &events)
         }
-    }
-    let left = Left { columns: &columns, sizes, shared: &baseline.shared, sigma };
-    // One departure of the law is more natural than one of each channel by itself.
-    if let Some(departure) = departure::best(problem, &left, EARLIER)?
-        && worth <= EARLIER * departure.worth
-    {
-        let Departure { variable, edges, bins, gains, baseline, .. } = departure;
-        let scanned = Scanned { variable, edges: &edges, bins, coefficients: &baseline };
-        let gaining = gains.into_iter().enumerate().filter(|(_, gain)| *gain > 0.0);
-        found = gaining.map(|(c, gain)| (gain, place(problem, &columns, sigma, c, &scanned, gain))).collect();
-    }
+        (Some(cause), _) => places.of_cause(&unknowns[cause.unknown], &variables[cause.along], &cause),
+        (None, _) => {
+            let of_channel = |(channel, along, scan, Interval { gain, bins, .. }): &(
+                usize,
+                &Along,
+                Scan,
+                Interval,
+            )| {
+                let coefficients = scan.outside(*bins).1;
+                let within = Within { along, bins: &scan.bins, interval: *bins };
+                let runs = places.runs_that_miss(*channel, &within, &coefficients);
+                (*gain, places.of_rows(*channel, &within, runs, *gain))
+            };
+            of_readings.iter().map(of_channel).collect()
+        }
+    };
     Ok(leading(found))
 }
 
 /// The interval of a channel that is worth most, over all variables.
-fn best_interval(
+fn best_interval<'a>(
     problem: &Problem<'_>,
     columns: &[Vec<Vec<f64>>],
     sizes: (usize, usize),
     channel: usize,
-) -> Option<(Scan, Interval)> {
-    let mut best: Option<(Scan, Interval)> = None;
-    for variable in variables(problem) {
-        let Some(scan) = Scan::new(problem, columns, sizes, channel, variable) else { continue };
-        // An earlier variable is the more natural one to name.
+    variables: &'a [Along],
+) -> Option<(&'a Along, Scan, Interval)> {
+    let mut best: Option<(&Along, Scan, Interval)> = None;
+    for along in variables {
+        let Some(scan) = Scan::new(problem, columns, sizes, channel, along) else { continue };
         if let Some(here) = scan.best()
-            && best.as_ref().is_none_or(|(_, b)| here.worth > EARLIER * b.worth + 1e-9)
+            && best.as_ref().is_none_or(|(.., b)| here.worth > b.worth + 1e-9)
         {
-            best = Some((scan, here));
+            best = Some((along, scan, here));
         }
     }
     best
@@ -85,63 +111,137 @@ fn leading(mut found: Vec<(f64, Location)>) -> Vec<Location> {
         .collect()
 }
 
-/// Bins along a variable, and the coefficients of each run's columns at which the baseline is right outside.
-struct Scanned<'a> {
-    variable: Option<usize>,
-    edges: &'a [f64],
-    bins: (usize, usize),
-    coefficients: &'a [Vec<f64>],
+/// An interval of bins along a variable.
+struct Within<'a> {
+    along: &'a Along,
+    bins: &'a Bins,
+    interval: (usize, usize),
 }
 
-/// An interval as a place: what the fitted baseline misses in its rows. The runs in which it shows are those whose rows there miss a
-/// baseline that is fitted to the others.
-fn place(
-    problem: &Problem<'_>,
-    columns: &[Vec<Vec<f64>>],
-    sigma: &[f64],
-    channel: usize,
-    scanned: &Scanned<'_>,
-    gain: f64,
-) -> Location {
-    let &Scanned { variable, edges, bins: (from, to), coefficients } = scanned;
-    let (mut residuals, mut fitted_out): (Vec<f64>, Vec<(usize, f64)>) = (Vec::new(), Vec::new());
-    for (r, x) in coefficients.iter().enumerate() {
-        let start: usize = (0..channel).map(|c| problem.rows[r].valid[c].len()).sum();
-        for (k, &i) in problem.rows[r].valid[channel].iter().enumerate() {
-            let b = bin(value(problem, variable, r, i), edges);
-            if b >= from && b < to {
-                let fitted: f64 = x.iter().zip(&columns[r]).map(|(x, c)| x * c[start + k]).sum();
-                let measured = columns[r].last().map_or(0.0, |c| c[start + k]);
-                residuals.push(measured * sigma[channel]);
-                fitted_out.push((r, measured - fitted));
-            }
+impl Within<'_> {
+    fn holds(&self, run: usize, row: usize) -> bool {
+        let bin = self.bins.of(self.along.values[run][row]);
+        bin >= self.interval.0 && bin < self.interval.1
+    }
+}
+
+/// Makes places of intervals and rows.
+struct Places<'a> {
+    problem: &'a Problem<'a>,
+    /// What the fitted baseline leaves is the last of each run's columns.
+    columns: &'a [Vec<Vec<f64>>],
+    sigma: &'a [f64],
+}
+
+impl Places<'_> {
+    /// Rows of a channel with their numbers among all of the run's readings.
+    fn rows(&self, run: usize, channel: usize) -> impl Iterator<Item = (usize, usize)> {
+        let valid = &self.problem.rows[run].valid;
+        let start: usize = valid[..channel].iter().map(Vec::len).sum();
+        valid[channel].iter().enumerate().map(move |(k, &row)| (start + k, row))
+    }
+
+    /// The runs whose rows there miss a baseline that is fitted to the others, by each run's coefficients of its columns.
+    fn runs_that_miss(&self, channel: usize, within: &Within<'_>, coefficients: &[Vec<f64>]) -> Vec<bool> {
+        let misses = |(run, x): (usize, &Vec<f64>)| {
+            let columns = &self.columns[run];
+            let missed = |at: usize| {
+                let fitted: f64 = x.iter().zip(columns).map(|(x, c)| x * c[at]).sum();
+                columns.last().map_or(0.0, |c| c[at]) - fitted
+            };
+            let rows = self.rows(run, channel).filter(|&(_, row)| within.holds(run, row));
+            let (sum, n) = rows.fold((0.0_f64, 0.0_f64), |(s, n), (at, _)| (s + missed(at).powi(2), n + 1.0));
+            // A run shows the misfit where its rows exceed the noise at 1 in 1,000.
+            n > 0.0 && sum > n + 3.1 * (2.0 * n).sqrt() + 3.0
+        };
+        coefficients.iter().enumerate().map(misses).collect()
+    }
+
+    /// What the fitted baseline misses in an interval of some runs (of all, where it shows in none alone).
+    fn of_rows(&self, channel: usize, within: &Within<'_>, runs: Vec<bool>, gain: f64) -> Location {
+        let none = !runs.contains(&true);
+        let mut residuals: Vec<f64> = Vec::new();
+        for run in (0..runs.len()).filter(|&r| runs[r] || none) {
+            let rows = self.rows(run, channel).filter(|&(_, row)| within.holds(run, row));
+            let left = self.columns[run].last();
+            residuals.extend(rows.map(|(at, _)| left.map_or(0.0, |c| c[at]) * self.sigma[channel]));
+        }
+        let label = |r: usize| self.problem.recording.runs[r].label.clone();
+        let mean = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
+        let square = residuals.iter().map(|v| v * v).sum::<f64>() / residuals.len().max(1) as f64;
+        let larger = |a: f64, v: f64| if v.abs() > a.abs() { v } else { a };
+        let (from, to) = within.interval;
+        Location {
+            channel: self.problem.recording.channels[channel].name.clone(),
+            variable: Some(within.along.quantity.name.clone()),
+            variable_unit: within.along.quantity.unit.clone(),
+            from: within.bins.spans.get(from).map(|span| span[0]),
+            to: to.checked_sub(1).and_then(|last| within.bins.spans.get(last)).map(|span| span[1]),
+            runs: (0..runs.len()).filter(|&r| runs[r]).map(label).collect(),
+            share: 0.0,
+            mean_residual: mean,
+            rms: square.sqrt(),
+            largest_residual: residuals.into_iter().fold(0.0, larger),
+            sigma: self.sigma[channel],
+            z: gain.max(0.0).sqrt(),
+            as_if: None,
         }
     }
-    let squares = |r: usize| -> (f64, f64) {
-        let of_run = fitted_out.iter().filter(|(run, _)| r == *run);
-        of_run.fold((0.0, 0.0), |(s, n), (_, v)| (s + v * v, n + 1.0))
-    };
-    // A run shows the misfit where its rows exceed the noise at 1 in 1,000.
-    let runs = (0..problem.rows.len())
-        .filter(|&r| {
-            let (sum, n) = squares(r);
-            n > 0.0 && sum > n + 3.1 * (2.0 * n).sqrt() + 3.0
-        })
-        .map(|r| problem.recording.runs[r].label.clone())
-        .collect();
-    let mean = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
-    let largest = residuals.iter().copied().fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a });
-    Location {
-        channel: problem.recording.channels[channel].name.clone(),
-        variable: Some(variable_name(problem, variable)),
-        from: edges.get(from).copied(),
-        to: edges.get(to).copied(),
-        runs,
-        share: 0.0,
-        mean_residual: mean,
-        rms: (residuals.iter().map(|v| v * v).sum::<f64>() / residuals.len().max(1) as f64).sqrt(),
-        largest_residual: largest,
-        sigma: sigma[channel],
-        z: gain.sqrt(),
+
+    /// A place for each channel that a cause makes better.
+    fn of_cause(&self, unknown: &Unknown<'_>, along: &Along, cause: &Cause) -> Vec<(f64, Location)> {
+        let within = Within { along, bins: &cause.bins, interval: cause.interval };
+        let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
+        let runs: Vec<bool> = cause.runs.iter().enumerate().map(|(r, acts)| *acts && touched(r)).collect();
+        let as_if = unknown.is_model_s().then(|| AsIf {
+            what: unknown.told.name.clone(),
+            sizes: cause.sizes.iter().map(|(c, size)| estimate(unknown, *c, *size)).collect(),
+        });
+        let gaining = cause.gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
+        gaining
+            .map(|(channel, &gain)| {
+                let place = self.of_rows(channel, &within, runs.clone(), gain);
+                (gain, Location { as_if: as_if.clone(), ..place })
+            })
+            .collect()
     }
+
+    /// A place for each row at which something acts, in the channel that shows it best.
+    fn of_events(&self, unknown: &Unknown<'_>, along: &Along, events: &Events) -> Vec<(f64, Location)> {
+        let place = |event: &Event| {
+            let best = (0..event.gains.len()).max_by(|&a, &b| event.gains[a].total_cmp(&event.gains[b]))?;
+            let at = along.values[event.run][event.row];
+            let residual = self.rows(event.run, best).find(|&(_, row)| row == event.row).and_then(|(k, _)| {
+                Some(self.columns[event.run].last()?[k] * self.sigma[best])
+            })?;
+            let gain: f64 = event.gains.iter().sum();
+            let location = Location {
+                channel: self.problem.recording.channels[best].name.clone(),
+                variable: Some(along.quantity.name.clone()),
+                variable_unit: along.quantity.unit.clone(),
+                from: Some(at),
+                to: Some(at),
+                runs: vec![self.problem.recording.runs[event.run].label.clone()],
+                share: 0.0,
+                mean_residual: residual,
+                rms: residual.abs(),
+                largest_residual: residual,
+                sigma: self.sigma[best],
+                z: gain.max(0.0).sqrt(),
+                as_if: Some(AsIf {
+                    what: unknown.told.name.clone(),
+                    sizes: vec![estimate(unknown, event.component, event.size)],
+                }),
+            };
+            Some((gain, location))
+        };
+        events.rows.iter().filter_map(place).collect()
+    }
+}
+
+/// A size with its interval, from white noise.
+fn estimate(unknown: &Unknown<'_>, component: usize, [value, error]: [f64; 2]) -> Estimate {
+    const CI95: f64 = 1.96;
+    let Quantity { name, unit } = unknown.told.components[component].clone();
+    Estimate { name, unit, value, ci95: [value - CI95 * error, value + CI95 * error] }
 }

@@ -1,7 +1,11 @@
-//! Where the baseline misses the data.
+//! Where the cause of a misfit acts.
 
 mod bins;
-mod departure;
+mod cause;
 mod least_squares;
 pub(crate) mod locations;
+mod projection;
+mod responses;
 mod scan;
+mod single;
+mod unknowns;

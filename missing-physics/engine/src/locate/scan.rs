@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::locate::bins::{bin, edges, value};
+use crate::locate::bins::{Along, Bins};
 use crate::locate::least_squares::least_squares;
 use crate::problem::Problem;
 
@@ -27,8 +27,7 @@ struct Normals {
 
 /// A channel along one variable.
 pub(crate) struct Scan {
-    pub(crate) variable: Option<usize>,
-    pub(crate) edges: Vec<f64>,
+    pub(crate) bins: Bins,
     /// By run.
     normals: Vec<Normals>,
     /// Rows in each bin.
@@ -53,20 +52,17 @@ impl Scan {
         columns: &[Vec<Vec<f64>>],
         (n_nuisance, n_shared): (usize, usize),
         channel: usize,
-        variable: Option<usize>,
+        along: &Along,
     ) -> Option<Self> {
-        let edges = edges(problem, channel, variable);
-        if edges.len() < 3 {
-            return None;
-        }
-        let normals = normals(problem, columns, channel, variable, &edges);
-        let mut rows = vec![0.0; edges.len() - 1];
+        let bins = Bins::new(problem, channel..channel + 1, along)?;
+        let normals = normals(problem, columns, channel, along, &bins);
+        let mut rows = vec![0.0; bins.len()];
         for (r, run) in problem.rows.iter().enumerate() {
             for &i in &run.valid[channel] {
-                rows[bin(value(problem, variable, r, i), &edges)] += 1.0;
+                rows[bins.of(along.values[r][i])] += 1.0;
             }
         }
-        let mut scan = Self { variable, edges, normals, rows, n_nuisance, n_shared, whole: 0.0 };
+        let mut scan = Self { bins, normals, rows, n_nuisance, n_shared, whole: 0.0 };
         scan.whole = scan.outside((0, 0)).0;
         Some(scan)
     }
@@ -94,10 +90,13 @@ impl Scan {
             return None;
         }
         let price = self.rows.iter().sum::<f64>().ln();
+        let bins_in_all = self.rows.len() as f64;
+        // Any of the intervals could have been it.
+        let scanned = 2.0 * (0.5 * bins_in_all * (bins_in_all + 1.0)).ln();
         let missed = self.whole - self.outside(bins).0;
-        let freed = Interval { worth: variance_gain(dropped, missed) - price, gain: missed - dropped, bins };
+        let freed = Interval { worth: variance_gain(dropped, missed) - price - scanned, gain: missed - dropped, bins };
         let gain = self.whole - self.departing(bins);
-        let smooth = Interval { worth: gain - SMOOTH as f64 * price, gain: gain - SMOOTH as f64, bins };
+        let smooth = Interval { worth: gain - SMOOTH as f64 * price - scanned, gain: gain - SMOOTH as f64, bins };
         Some(if smooth.worth > freed.worth { smooth } else { freed })
     }
 
@@ -135,20 +134,19 @@ fn normals(
     problem: &Problem<'_>,
     columns: &[Vec<Vec<f64>>],
     channel: usize,
-    variable: Option<usize>,
-    edges: &[f64],
+    along: &Along,
+    bins: &Bins,
 ) -> Vec<Normals> {
-    let (low, high) = (edges[0], edges[edges.len() - 1]);
     let of_run = |(r, columns): (usize, &Vec<Vec<f64>>)| {
         let width = columns.len() + SMOOTH;
-        let mut binned = vec![DMatrix::zeros(width, width); edges.len() - 1];
+        let mut binned = vec![DMatrix::zeros(width, width); bins.len()];
         let mut others = DMatrix::zeros(width, width);
         let mut row = vec![0.0; width];
         let mut k = 0;
         for c in 0..problem.channels() {
             for &i in &problem.rows[r].valid[c] {
-                let x = value(problem, variable, r, i);
-                let u = 2.0 * (x - low) / (high - low) - 1.0;
+                let x = along.values[r][i];
+                let u = bins.along(x);
                 let known = columns.len() - 1;
                 for (a, column) in row.iter_mut().zip(&columns[..known]) {
                     *a = column[k];
@@ -157,7 +155,7 @@ fn normals(
                     *a = if c == channel { u.powi(power as i32) } else { 0.0 };
                 }
                 row[width - 1] = columns[known][k];
-                let target = if c == channel { &mut binned[bin(x, edges)] } else { &mut others };
+                let target = if c == channel { &mut binned[bins.of(x)] } else { &mut others };
                 for a in 0..width {
                     for b in 0..=a {
                         target[(a, b)] += row[a] * row[b];

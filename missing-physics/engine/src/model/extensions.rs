@@ -2,6 +2,7 @@
 
 use crate::data::Run;
 use crate::model::error::PredictError;
+use crate::quantity::Quantity;
 
 /// The knowledge that a model has beyond its predictions ([`Model::extensions`](super::Model::extensions)); none by default.
 ///
@@ -14,8 +15,8 @@ pub struct Extensions<'a> {
     pub modes: Option<&'a dyn MultimodalModel>,
     /// What parameters may not be together.
     pub limits: Option<&'a dyn JointLimits>,
-    /// How an effect in one row shows in others.
-    pub coupled_rows: Option<&'a dyn CoupledRows>,
+    /// What a cause does that acts at some rows only.
+    pub local_causes: Option<&'a dyn LocalCauses>,
     /// A program that makes the predictions.
     pub program: Option<&'a dyn ExternalProgram>,
 }
@@ -26,7 +27,7 @@ impl std::fmt::Debug for Extensions<'_> {
             .field("errors", &self.errors.is_some())
             .field("modes", &self.modes.is_some())
             .field("limits", &self.limits.is_some())
-            .field("coupled_rows", &self.coupled_rows.is_some())
+            .field("local_causes", &self.local_causes.is_some())
             .field("program", &self.program.is_some())
             .finish()
     }
@@ -89,19 +90,53 @@ pub trait JointLimits: Sync {
     fn implausible(&self, mechanism: usize, shared: &[f64]) -> Option<String>;
 }
 
-/// A model whose rows are not alone: an effect in one shows in others.
-pub trait CoupledRows: Sync {
-    /// How the predictions of all runs change (each as [`Model::predict`](super::Model::predict) fills it) by a unit of a perturbation
-    /// that is small and has the size `amounts[run][row]` in the law of each row.
+/// One unknown more that may act at some rows only: a force on the equations of motion, the restitution of an impact, a stiffness.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LocalUnknown {
+    /// What it is, for a person, with its article (`a force`).
+    pub name: String,
+    /// Its components, with their unit; one at least, and all are sought together as well.
+    pub components: Vec<Quantity>,
+}
+
+/// A model that knows what a cause does to its predictions which acts at some rows only. Without it a cause is sought in the readings: an
+/// offset of them.
+pub trait LocalCauses: Sync {
+    /// The unknowns, in the order of [`LocalCauses::response`].
+    fn unknowns(&self) -> Vec<LocalUnknown>;
+
+    /// How the predictions of all runs change (each as [`Model::predict`](super::Model::predict) fills it) by a component of an unknown
+    /// that is small and has the size `amounts[run][row]` at each row. Where the unknown acts between rows too (a force), the size is
+    /// that of the nearest row.
     ///
     /// # Errors
     /// As [`Model::predict`](super::Model::predict).
-    fn perturbation_response(
+    fn response(
         &self,
+        of: (usize, usize),
         runs: &[Run],
         shared: &[f64],
+        nuisance: &[Vec<f64>],
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError>;
+
+    /// Whether what acts in a run shows in that run alone (the default).
+    fn runs_are_alone(&self) -> bool {
+        true
+    }
+
+    /// What the model follows beside the recording's variables (a height, a speed), along which a cause may act as well; none by default.
+    fn states(&self) -> Vec<Quantity> {
+        Vec::new()
+    }
+
+    /// Those of a run, `[state][row]`.
+    ///
+    /// # Errors
+    /// As [`Model::predict`](super::Model::predict).
+    fn state(&self, _run: &Run, _shared: &[f64], _nuisance: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {
+        Ok(Vec::new())
+    }
 }
 
 /// A model whose predictions come from a program that may end.

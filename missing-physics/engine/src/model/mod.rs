@@ -11,6 +11,8 @@ pub use crate::quantity::Quantity;
 pub use builder::{ParameterRef, SpecBuilder, UNBOUNDED};
 pub use check::SpecError;
 pub use error::{LARGEST_PREDICTION, PredictError};
-pub use extensions::{CoupledRows, ErrorModel, Extensions, ExternalProgram, JointLimits, MultimodalModel};
+pub use extensions::{
+    ErrorModel, Extensions, ExternalProgram, JointLimits, LocalCauses, LocalUnknown, MultimodalModel,
+};
 pub use simulation::{Experiment, Model, finite_differences};
 pub use spec::{Derived, DerivedPerRun, Mechanism, OfParameters, OfRun, Over, Parameter, Scope, Spec, Term};

@@ -12,7 +12,7 @@ use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, significant};
 use super::svg::{CHART_STYLE, escape};
 use super::text::{
-    closest, headline, law_kind, leftover_sentence, limits, noise_sentence, runs, where_sentence,
+    as_if, closest, headline, law_kind, leftover_sentence, limits, noise_sentence, runs, where_sentence,
 };
 use super::{corner, explore, plots};
 
@@ -54,7 +54,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     }
     section(&mut page, "What comes closest", &list(&closest(d)));
     section(&mut page, "The law in the residual", &d.law.as_ref().map(law).unwrap_or_default());
-    let misses: Vec<String> = d.location.iter().map(|l| where_sentence(d, l)).collect();
+    let misses: Vec<String> = d.location.iter().map(|l| where_sentence(d, l)).chain(as_if(d)).collect();
     section(&mut page, "Where it misses", &list(&misses));
     section(&mut page, "How much better", &tables::errors(d, context));
     section(&mut page, "Runs that differ", &list(&runs(d)));

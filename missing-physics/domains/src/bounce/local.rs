@@ -1,0 +1,125 @@
+//! An impact that is not like the others: what another restitution, another direction, an impact that went unheard or a time that was
+//! misread does to a drop.
+
+use missing_physics::data::Run;
+use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
+use nalgebra::DVector;
+
+use super::model::{BounceModel, ShownDrop};
+use super::times::TimesModel;
+
+/// The unknowns of an impact, by number.
+const RESTITUTION: usize = 0;
+const FLIGHT: usize = 1;
+const MISREAD: usize = 2;
+
+/// Those that times alone show.
+fn of_times() -> Vec<LocalUnknown> {
+    let one = |name: &str, component: &str, unit: &str| LocalUnknown {
+        name: name.into(),
+        components: vec![Quantity::new(component, unit)],
+    };
+    vec![
+        one("another restitution", "log_restitution", ""),
+        one("a longer flight", "duration_s", "s"),
+        one("a misread time", "late_s", "s"),
+    ]
+}
+
+impl ShownDrop {
+    /// By how much each error changes.
+    fn change(&self, (unknown, component): (usize, usize), amounts: &[f64]) -> DVector<f64> {
+        let linear = &self.weights.linear;
+        let drop = &linear.drop;
+        let mut change = DVector::zeros(drop.errors_len());
+        for (row, amount) in amounts.iter().enumerate().filter(|(_, amount)| **amount != 0.0) {
+            let impact = self.rows.heard.start + row;
+            match (unknown, self.rows.known(row)) {
+                (MISREAD, _) => change.axpy(*amount, &linear.by_time(impact), 1.0),
+                (FLIGHT, _) => {
+                    let later = impact + 1..drop.times_s.len();
+                    later.for_each(|k| change.axpy(*amount, &linear.by_time(k), 1.0));
+                }
+                (RESTITUTION, Some(known)) => change[drop.row(known, 0)] -= amount,
+                (_, Some(known)) => change[drop.row(known, 1 + component)] -= amount,
+                (_, None) => {}
+            }
+        }
+        // A measured time that is late makes the errors what they are; the others are what is expected.
+        if matches!(unknown, FLIGHT | MISREAD) { change } else { -change }
+    }
+}
+
+impl LocalCauses for BounceModel {
+    fn unknowns(&self) -> Vec<LocalUnknown> {
+        let components = ["heading_x_rad", "heading_y_rad"].map(|name| Quantity::new(name, "rad")).into();
+        let mut all = of_times();
+        all.push(LocalUnknown { name: "another direction".into(), components });
+        all
+    }
+
+    fn response(
+        &self,
+        of: (usize, usize),
+        runs: &[Run],
+        _: &[f64],
+        _: &[Vec<f64>],
+        amounts: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>, PredictError> {
+        let of_run = |(run, amounts): (&Run, &Vec<f64>)| {
+            let n = run.len();
+            let mut out = vec![0.0; run.outputs.len() * n];
+            let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
+            let shown = self.shown(&run.label).ok_or_else(|| wrong("no such drop"))?;
+            let white = shown.weights.white_change(shown.change(of, amounts));
+            let white = white.ok_or_else(|| wrong("the covariance of its errors has no root"))?;
+            let drop = &shown.weights.linear.drop;
+            for row in 0..n {
+                if let Some(known) = shown.rows.known(row) {
+                    (0..super::drop::PER_IMPACT)
+                        .for_each(|c| out[c * n + row] = white[drop.row(known, c)]);
+                }
+            }
+            Ok(out)
+        };
+        runs.iter().zip(amounts).map(of_run).collect()
+    }
+}
+
+impl LocalCauses for TimesModel {
+    fn unknowns(&self) -> Vec<LocalUnknown> {
+        // A misread time is an offset of what was measured.
+        of_times().into_iter().take(MISREAD).collect()
+    }
+
+    fn response(
+        &self,
+        (unknown, _): (usize, usize),
+        runs: &[Run],
+        shared: &[f64],
+        nuisance: &[Vec<f64>],
+        amounts: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>, PredictError> {
+        const STEP: f64 = 1e-5;
+        let of_run = |((run, nuisance), amounts): ((&Run, &Vec<f64>), &Vec<f64>)| {
+            if unknown == FLIGHT {
+                let late = amounts.iter().scan(0.0, |late, amount| {
+                    let now = *late;
+                    *late += amount;
+                    Some(now)
+                });
+                return Ok(late.collect());
+            }
+            let moved = |step: f64| {
+                let springier: Vec<f64> = amounts.iter().map(|a| step * a).collect();
+                let mut out = vec![0.0; run.len()];
+                self.fill(run, shared, nuisance, &springier, &mut out)
+                    .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+                Ok(out)
+            };
+            let (high, low) = (moved(STEP)?, moved(-STEP)?);
+            Ok(high.iter().zip(&low).map(|(h, l)| (h - l) / (2.0 * STEP)).collect())
+        };
+        runs.iter().zip(nuisance).zip(amounts).map(of_run).collect()
+    }
+}

@@ -1,0 +1,69 @@
+//! What may act at some rows only: the unknowns that a model tells the effect of, and an offset of each reading.
+
+use crate::fit::optimum::Fit;
+use crate::model::{LocalCauses, LocalUnknown, PredictError};
+use crate::problem::Problem;
+
+/// An unknown, and how to ask for its effect.
+pub(crate) struct Unknown<'a> {
+    pub(crate) told: LocalUnknown,
+    /// The model's number of it; an offset of the readings where there is none.
+    model: Option<(&'a dyn LocalCauses, usize)>,
+}
+
+/// The model's unknowns, and an offset of the readings.
+pub(crate) fn unknowns<'a>(problem: &Problem<'a>) -> Vec<Unknown<'a>> {
+    let of_model = problem.model.extensions().local_causes.into_iter().flat_map(|causes| {
+        let told = causes.unknowns().into_iter().enumerate();
+        told.map(move |(k, told)| Unknown { told, model: Some((causes, k)) })
+    });
+    let offset =
+        LocalUnknown { name: "an offset".into(), components: problem.recording.channels.clone() };
+    of_model.chain([Unknown { told: offset, model: None }]).collect()
+}
+
+impl Unknown<'_> {
+    /// Whether the model tells its effect.
+    pub(crate) fn is_model_s(&self) -> bool {
+        self.model.is_some()
+    }
+
+    /// Whether what acts in a run shows in that run alone.
+    pub(crate) fn runs_are_alone(&self) -> bool {
+        self.model.is_none_or(|(causes, _)| causes.runs_are_alone())
+    }
+
+    /// What a component of the given size at each row does to the measured rows, by run, channel after channel, in sigmas.
+    pub(crate) fn response(
+        &self,
+        problem: &Problem<'_>,
+        fit: &Fit,
+        sigma: &[f64],
+        component: usize,
+        amounts: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>, PredictError> {
+        let runs = &problem.recording.runs;
+        let moved = match self.model {
+            Some((causes, unknown)) => {
+                causes.response((unknown, component), runs, &fit.shared, &fit.nuisance, amounts)?
+            }
+            None => {
+                let of_run = |amounts: &Vec<f64>| {
+                    let n = amounts.len();
+                    let mut moved = vec![0.0; problem.channels() * n];
+                    moved[component * n..(component + 1) * n].copy_from_slice(amounts);
+                    moved
+                };
+                amounts.iter().map(of_run).collect()
+            }
+        };
+        let white = |(run, moved): (usize, &Vec<f64>)| -> Vec<f64> {
+            let channel = |channel: usize| {
+                let picked = problem.pick(run, channel, moved);
+                picked.into_iter().map(move |v| v / sigma[channel])
+            };
+            (0..problem.channels()).flat_map(channel).collect()
+        };
+        Ok(moved.iter().enumerate().map(white).collect())
+    }
+}
