@@ -19,7 +19,9 @@ pub(super) fn word(hidden: Hidden) -> &'static str {
 /// The kind of world of a word.
 pub(super) fn hidden(wanted: &str) -> Option<Hidden> {
     use Hidden::{Imitated, Leftover, Local, Nothing, One, Two, Unlisted};
-    [Nothing, One, Two, Unlisted, Leftover, Imitated, Local].into_iter().find(|hidden| word(*hidden) == wanted)
+    [Nothing, One, Two, Unlisted, Leftover, Imitated, Local]
+        .into_iter()
+        .find(|hidden| word(*hidden) == wanted)
 }
 
 /// An answer as a line of JSON.

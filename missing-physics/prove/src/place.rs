@@ -52,7 +52,9 @@ fn overlaps(place: &Place, found: &Located) -> bool {
 /// Whether single events are found: each at its row or the next one.
 pub(super) fn found_events(events: &[(String, f64)], named: &[Located]) -> bool {
     let same = |(run, row): &(String, f64), place: &Located| {
-        place.runs == [run.clone()] && place.from == place.to && place.from.is_some_and(|at| at == *row || at == row + 1.0)
+        place.runs == [run.clone()]
+            && place.from == place.to
+            && place.from.is_some_and(|at| at == *row || at == row + 1.0)
     };
     let hits = events.iter().filter(|event| named.iter().any(|place| same(event, place))).count();
     let right = named.iter().filter(|place| events.iter().any(|event| same(event, place))).count();
@@ -65,7 +67,13 @@ mod tests {
 
     fn located(variable: &str, from: f64, to: f64, runs: &[&str]) -> Located {
         let runs = runs.iter().map(|run| (*run).to_owned()).collect();
-        Located { variable: Some(variable.into()), from: Some(from), to: Some(to), extent: Some([0.0, 1.0]), runs }
+        Located {
+            variable: Some(variable.into()),
+            from: Some(from),
+            to: Some(to),
+            extent: Some([0.0, 1.0]),
+            runs,
+        }
     }
 
     #[test]
@@ -75,13 +83,21 @@ mod tests {
         let push = Place::new("t_s", 0.2, 0.4);
         let judged = |place: &Place, named: Located| found(place, &[named], &runs);
         assert!(judged(&push, located("t_s", 0.22, 0.38, &all)));
-        assert!(!judged(&push, located("t_s", 0.0, 0.8, &all)) && !judged(&push, located("z_m", 0.2, 0.4, &all)));
+        assert!(
+            !judged(&push, located("t_s", 0.0, 0.8, &all)) && !judged(&push, located("z_m", 0.2, 0.4, &all))
+        );
         assert!(!judged(&push, located("t_s", 0.2, 0.4, &["1", "2"])));
         let later = Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(runs[3..].to_vec());
         assert!(judged(&later, located("x_m", 0.0, 1.0, &all[3..])));
-        assert!(judged(&later, located("x_m", 0.0, 1.0, &all[..3])) && !judged(&later, located("x_m", 0.0, 1.0, &all)));
+        assert!(
+            judged(&later, located("x_m", 0.0, 1.0, &all[..3]))
+                && !judged(&later, located("x_m", 0.0, 1.0, &all))
+        );
         let beyond = Place::new("x_m", 0.7, f64::INFINITY);
-        assert!(judged(&beyond, located("x_m", 0.0, 0.68, &all)) && !judged(&push, located("t_s", 0.0, 0.2, &all)));
+        assert!(
+            judged(&beyond, located("x_m", 0.0, 0.68, &all))
+                && !judged(&push, located("t_s", 0.0, 0.2, &all))
+        );
         assert!(!found(&push, &[], &runs));
     }
 

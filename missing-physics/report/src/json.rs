@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use missing_physics::diagnosis::{
-    AsIf, ChannelFit, ChannelNoise, Closest, Confusion, Contradiction, Diagnosis, Estimate, Law, Limit, Location,
-    MechanismReport, NextExperiment, Outlier, RunSpread, SetReport, TestOutcome,
+    AsIf, ChannelFit, ChannelNoise, Closest, Confusion, Contradiction, Diagnosis, Estimate, Law, Limit,
+    Location, MechanismReport, NextExperiment, Outlier, RunSpread, SetReport, TestOutcome,
 };
 use serde::Serialize;
 use serde_json::{Value, json as value};

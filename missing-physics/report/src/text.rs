@@ -259,7 +259,8 @@ fn place_words(d: &Diagnosis, l: &Location) -> String {
         (Some(v), Some(from), Some(to)) => {
             let unit = &l.variable_unit;
             let (from, to) = (significant(from, 3), significant(to, 3));
-            let ends = if from == to { format!("at {v} = {from}") } else { format!("{v} from {from} to {to}") };
+            let ends =
+                if from == to { format!("at {v} = {from}") } else { format!("{v} from {from} to {to}") };
             format!(", {ends} {unit}").trim_end().to_owned()
         }
         _ => String::new(),

@@ -83,7 +83,11 @@ pub(crate) fn local(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &
             let low = fastest * between(rng, 0.45, 0.6);
             let speed_m_s = [low, low + fastest * between(rng, 0.2, 0.35)];
             let place = Place::new("speed_m_s", low, speed_m_s[1]);
-            ("a restitution that dips at some speeds", Softer { by, speed_m_s, ..Softer::default() }, Some(place))
+            (
+                "a restitution that dips at some speeds",
+                Softer { by, speed_m_s, ..Softer::default() },
+                Some(place),
+            )
         }
         _ => {
             world.effects.unheard = between(rng, 0.06, 0.2);

@@ -9,7 +9,9 @@ use super::key::{Hidden, Key, Place};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::noise::Noise;
-use crate::physics::indentation::{Effects, IndentationWorld, Indenter, Later, Rim, Ripple, Slip, Step, Stratum};
+use crate::physics::indentation::{
+    Effects, IndentationWorld, Indenter, Later, Rim, Ripple, Slip, Step, Stratum,
+};
 
 /// Listed effects; the last three act on spheres only, and viscoelasticity needs times.
 const LISTED: usize = 10;
@@ -319,10 +321,7 @@ impl Press {
         let path = &self.world.runs[0].1;
         let slips =
             path.iter().find(|step| step.delta_m >= self.depth_m).filter(|_| path.iter().any(|s| !s.down));
-        slips.map_or_else(
-            || self.beyond_depth(),
-            |slips| Place::new("t_s", slips.t_s, f64::INFINITY),
-        )
+        slips.map_or_else(|| self.beyond_depth(), |slips| Place::new("t_s", slips.t_s, f64::INFINITY))
     }
 }
 

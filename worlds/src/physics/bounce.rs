@@ -145,7 +145,8 @@ impl BounceWorld {
             let unheard = self.unheard(&mut rng);
             all_unheard.extend(unheard.map(|impact| [run, impact]));
             let impacts = self.impacts + usize::from(unheard.is_some());
-            let heard = self.in_run(run - 1).drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
+            let heard =
+                self.in_run(run - 1).drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
             for (number, (_, [t, x, y])) in kept.enumerate() {
                 let _ = write!(data, "{run},{},{t:.7}", number + 1);

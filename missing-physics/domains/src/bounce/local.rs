@@ -76,8 +76,7 @@ impl LocalCauses for BounceModel {
             let drop = &shown.weights.linear.drop;
             for row in 0..n {
                 if let Some(known) = shown.rows.known(row) {
-                    (0..super::drop::PER_IMPACT)
-                        .for_each(|c| out[c * n + row] = white[drop.row(known, c)]);
+                    (0..super::drop::PER_IMPACT).for_each(|c| out[c * n + row] = white[drop.row(known, c)]);
                 }
             }
             Ok(out)

@@ -14,10 +14,7 @@ impl LocalCauses for IndentationModel {
             name: name.into(),
             components: vec![Quantity::new(component, unit)],
         };
-        vec![
-            one("another modulus", "relative_modulus", ""),
-            one("another stiffness", "stiffness_n_m", "N/m"),
-        ]
+        vec![one("another modulus", "relative_modulus", ""), one("another stiffness", "stiffness_n_m", "N/m")]
     }
 
     fn response(

@@ -111,11 +111,8 @@ impl LiquidTiltModel {
             surface_lag_rad: shared[p.lag.slot],
         };
         let angle = theta[at] + off.angle_rad;
-        let felt = self
-            .setup
-            .grasp
-            .wrench(&*cavity, angle, mass, volume, &departures)
-            .map_err(|e| e.to_string())?;
+        let felt =
+            self.setup.grasp.wrench(&*cavity, angle, mass, volume, &departures).map_err(|e| e.to_string())?;
         Ok([felt.fx_n, felt.fy_n, felt.tau_z_nm])
     }
 }

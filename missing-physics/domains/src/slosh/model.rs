@@ -92,8 +92,7 @@ impl SloshModel {
     /// Angular frequency (rad/s) and damping ratio of a run's first mode.
     pub(super) fn first_mode(&self, run: &Run, shared: &[f64]) -> [f64; 2] {
         let (p, cylinder) = (&self.layout, self.cylinder(run));
-        let omega =
-            cylinder.angular_frequency_rad_s(0, shared[p.tension.slot] / self.setup.density_kg_m3);
+        let omega = cylinder.angular_frequency_rad_s(0, shared[p.tension.slot] / self.setup.density_kg_m3);
         [omega, cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999)]
     }
 
@@ -220,7 +219,12 @@ impl Model for SloshModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { modes: Some(self), limits: Some(self), local_causes: Some(self), ..Extensions::default() }
+        Extensions {
+            modes: Some(self),
+            limits: Some(self),
+            local_causes: Some(self),
+            ..Extensions::default()
+        }
     }
 }
 

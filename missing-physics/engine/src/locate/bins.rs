@@ -54,7 +54,11 @@ pub(crate) struct Bins {
 
 impl Bins {
     /// Of the rows in which one of some channels was measured; `None` where a variable has one value only.
-    pub(crate) fn new(problem: &Problem<'_>, channels: std::ops::Range<usize>, along: &Along) -> Option<Self> {
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        channels: std::ops::Range<usize>,
+        along: &Along,
+    ) -> Option<Self> {
         let of_run = |(rows, values): (&crate::problem::RunRows, &Vec<f64>)| -> Vec<f64> {
             let measured = channels.clone().flat_map(|c| rows.valid[c].iter());
             measured.map(|&i| values[i]).collect()

@@ -19,6 +19,11 @@ const STAYS: f64 = 1.0;
 /// A subset of the runs is sought among so many at most.
 const SUBSETS: usize = 64;
 
+/// Any subset of the runs fits a little better than all of them: one in which alone a cause acts takes away so much more.
+const SUBSET_GAIN: f64 = 1.6;
+/// An offset of the readings has to be worth so much more than an unknown of which the model tells what it does.
+const OFFSET_GAIN: f64 = 1.1;
+
 /// An interval along a variable in which a cause acts.
 pub(crate) struct Cause {
     pub(crate) unknown: usize,
@@ -45,6 +50,13 @@ struct Found {
     worth: f64,
 }
 
+/// The best hypotheses along one variable: in all runs or neighbouring ones, and in a subset of them.
+#[derive(Clone, Default)]
+struct Best {
+    simple: Option<Found>,
+    some_runs: Option<Found>,
+}
+
 /// What is scanned.
 pub(crate) struct Scene<'a> {
     pub(crate) problem: &'a Problem<'a>,
@@ -61,17 +73,26 @@ impl Scene<'_> {
         let pairs: Vec<(usize, usize)> = (0..self.unknowns.len())
             .flat_map(|unknown| (0..self.variables.len()).map(move |along| (unknown, along)))
             .collect();
-        let found: Vec<Option<(usize, usize, Bins, Found)>> = pairs
-            .into_par_iter()
-            .map(|(unknown, along)| self.best_along(unknown, along))
+        let found: Vec<Option<(Bins, Best)>> = pairs
+            .par_iter()
+            .map(|&(unknown, along)| self.best_along(unknown, along))
             .collect::<Result<_, PredictError>>()?;
-        let mut best: Option<(usize, usize, Bins, Found)> = None;
-        for here in found.into_iter().flatten() {
-            if best.as_ref().is_none_or(|b| here.3.worth > b.3.worth + 1e-9) {
-                best = Some(here);
+        let mut best: Option<(f64, usize, usize, Bins, Found)> = None;
+        for kind in [|b: &Best| b.simple.clone(), |b: &Best| b.some_runs.clone()] {
+            let before = best.as_ref().map(|b| b.0);
+            for (&(unknown, along), (bins, here)) in
+                pairs.iter().zip(&found).filter_map(|(pair, found)| Some((pair, found.as_ref()?)))
+            {
+                let Some(here) = kind(here) else { continue };
+                let told = if self.unknowns[unknown].is_model_s() { 1.0 } else { OFFSET_GAIN };
+                let beside = before.map_or(1.0, |_| SUBSET_GAIN);
+                let worth = here.worth / told / beside;
+                if best.as_ref().is_none_or(|b| worth > b.0 + 1e-9) {
+                    best = Some((worth, unknown, along, bins.clone(), here));
+                }
             }
         }
-        best.map(|(unknown, along, bins, found)| self.cause(unknown, along, bins, found)).transpose()
+        best.map(|(_, unknown, along, bins, found)| self.cause(unknown, along, bins, found)).transpose()
     }
 
     fn asked<'a>(&'a self, unknown: usize, along: usize, component: usize, bins: &'a Bins) -> Asked<'a> {
@@ -87,11 +108,7 @@ impl Scene<'_> {
     }
 
     /// The best hypothesis of an unknown along a variable.
-    fn best_along(
-        &self,
-        unknown: usize,
-        along: usize,
-    ) -> Result<Option<(usize, usize, Bins, Found)>, PredictError> {
+    fn best_along(&self, unknown: usize, along: usize) -> Result<Option<(Bins, Best)>, PredictError> {
         let Some(bins) = Bins::new(self.problem, 0..self.problem.channels(), &self.variables[along]) else {
             return Ok(None);
         };
@@ -107,7 +124,7 @@ impl Scene<'_> {
             rows: self.projection.rows,
         };
         let best = scan.best();
-        Ok(best.map(|found| (unknown, along, bins, found)))
+        Ok(Some((bins, best)))
     }
 
     /// A hypothesis with its sizes, and what it is worth to each channel.
@@ -154,8 +171,8 @@ struct Scan<'a> {
 }
 
 impl Scan<'_> {
-    fn best(&self) -> Option<Found> {
-        let mut best: Option<Found> = None;
+    fn best(&self) -> Best {
+        let mut best = Best::default();
         let n = self.bins.len();
         let intervals = (n * (n + 1) / 2) as f64;
         for interval in (0..n).flat_map(|from| (from + 1..=n).map(move |to| (from, to))) {
@@ -164,10 +181,10 @@ impl Scan<'_> {
                     self.responses.iter().map(|r| r.by_run(self.bins, interval, form)).collect();
                 let whole = interval == (0, n) && form == Form::Even;
                 let scanned = if whole { 0.0 } else { 2.0 * (3.0 * intervals).ln() };
-                self.all_runs(&effects, interval, form, scanned, &mut best);
+                self.all_runs(&effects, interval, form, scanned, &mut best.simple);
                 if self.alone && self.runs > 1 && form == Form::Even {
-                    self.neighbouring_runs(&effects, interval, scanned, &mut best);
-                    self.some_runs(&effects, interval, scanned, &mut best);
+                    self.neighbouring_runs(&effects, interval, scanned, &mut best.simple);
+                    self.some_runs(&effects, interval, scanned, &mut best.some_runs);
                 }
             }
         }
@@ -254,7 +271,8 @@ impl Scan<'_> {
             return;
         }
         for (component, effects) in effects.iter().enumerate() {
-            let mut order: Vec<usize> = (0..self.runs).filter(|&r| effects[r].size()[0].is_finite()).collect();
+            let mut order: Vec<usize> =
+                (0..self.runs).filter(|&r| effects[r].size()[0].is_finite()).collect();
             order.sort_by(|&a, &b| effects[b].size()[0].total_cmp(&effects[a].size()[0]));
             for reversed in [false, true] {
                 if reversed {

@@ -52,23 +52,19 @@ pub(crate) fn locate(
     let places = Places { problem, columns: &columns, sigma };
     let found = match (cause, events) {
         (cause, Some(events))
-            if events.worth > cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth) =>
+            if events.worth > SIMPLER * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth) =>
         {
             places.of_events(&unknowns[events.unknown], &variables[0], &events)
         }
         (Some(cause), _) => places.of_cause(&unknowns[cause.unknown], &variables[cause.along], &cause),
         (None, _) => {
-            let of_channel = |(channel, along, scan, Interval { gain, bins, .. }): &(
-                usize,
-                &Along,
-                Scan,
-                Interval,
-            )| {
-                let coefficients = scan.outside(*bins).1;
-                let within = Within { along, bins: &scan.bins, interval: *bins };
-                let runs = places.runs_that_miss(*channel, &within, &coefficients);
-                (*gain, places.of_rows(*channel, &within, runs, *gain))
-            };
+            let of_channel =
+                |(channel, along, scan, Interval { gain, bins, .. }): &(usize, &Along, Scan, Interval)| {
+                    let coefficients = scan.outside(*bins).1;
+                    let within = Within { along, bins: &scan.bins, interval: *bins };
+                    let runs = places.runs_that_miss(*channel, &within, &coefficients);
+                    (*gain, places.of_rows(*channel, &within, &runs, *gain))
+                };
             of_readings.iter().map(of_channel).collect()
         }
     };
@@ -158,7 +154,7 @@ impl Places<'_> {
     }
 
     /// What the fitted baseline misses in an interval of some runs (of all, where it shows in none alone).
-    fn of_rows(&self, channel: usize, within: &Within<'_>, runs: Vec<bool>, gain: f64) -> Location {
+    fn of_rows(&self, channel: usize, within: &Within<'_>, runs: &[bool], gain: f64) -> Location {
         let none = !runs.contains(&true);
         let mut residuals: Vec<f64> = Vec::new();
         for run in (0..runs.len()).filter(|&r| runs[r] || none) {
@@ -200,7 +196,7 @@ impl Places<'_> {
         let gaining = cause.gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
         gaining
             .map(|(channel, &gain)| {
-                let place = self.of_rows(channel, &within, runs.clone(), gain);
+                let place = self.of_rows(channel, &within, &runs, gain);
                 (gain, Location { as_if: as_if.clone(), ..place })
             })
             .collect()
@@ -211,9 +207,10 @@ impl Places<'_> {
         let place = |event: &Event| {
             let best = (0..event.gains.len()).max_by(|&a, &b| event.gains[a].total_cmp(&event.gains[b]))?;
             let at = along.values[event.run][event.row];
-            let residual = self.rows(event.run, best).find(|&(_, row)| row == event.row).and_then(|(k, _)| {
-                Some(self.columns[event.run].last()?[k] * self.sigma[best])
-            })?;
+            let residual = self
+                .rows(event.run, best)
+                .find(|&(_, row)| row == event.row)
+                .and_then(|(k, _)| Some(self.columns[event.run].last()?[k] * self.sigma[best]))?;
             let gain: f64 = event.gains.iter().sum();
             let location = Location {
                 channel: self.problem.recording.channels[best].name.clone(),

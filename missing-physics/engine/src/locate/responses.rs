@@ -123,8 +123,7 @@ impl Asked<'_> {
         }
         let active = all.iter().flatten().filter(|v| **v != 0.0);
         let (sum, n) = active.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-        let moved =
-            self.unknown.response(self.problem, self.fit, self.sigma, self.component, &all)?;
+        let moved = self.unknown.response(self.problem, self.fit, self.sigma, self.component, &all)?;
         Ok((moved, if n > 0.0 { sum / n } else { 0.0 }))
     }
 }
@@ -173,7 +172,9 @@ impl Responses {
         }
         let of_run = |run: &OfRun| {
             let sum = |column: &[f64]| parts.iter().map(|(k, w)| w * column[*k]).sum::<f64>();
-            let square = parts.iter().map(|(k, w)| w * parts.iter().map(|(l, v)| v * run.squares[(*k, *l)]).sum::<f64>());
+            let square = parts
+                .iter()
+                .map(|(k, w)| w * parts.iter().map(|(l, v)| v * run.squares[(*k, *l)]).sum::<f64>());
             Effect {
                 product: sum(&run.products),
                 square: square.sum::<f64>().max(0.0),

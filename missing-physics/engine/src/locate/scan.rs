@@ -94,9 +94,14 @@ impl Scan {
         // Any of the intervals could have been it.
         let scanned = 2.0 * (0.5 * bins_in_all * (bins_in_all + 1.0)).ln();
         let missed = self.whole - self.outside(bins).0;
-        let freed = Interval { worth: variance_gain(dropped, missed) - price - scanned, gain: missed - dropped, bins };
+        let freed = Interval {
+            worth: variance_gain(dropped, missed) - price - scanned,
+            gain: missed - dropped,
+            bins,
+        };
         let gain = self.whole - self.departing(bins);
-        let smooth = Interval { worth: gain - SMOOTH as f64 * price - scanned, gain: gain - SMOOTH as f64, bins };
+        let smooth =
+            Interval { worth: gain - SMOOTH as f64 * price - scanned, gain: gain - SMOOTH as f64, bins };
         Some(if smooth.worth > freed.worth { smooth } else { freed })
     }
 

@@ -64,12 +64,12 @@ impl LocalCauses for Steps {
     }
 }
 
-/// Steps beyond a length are longer by a part.
-fn walks(beyond: f64, longer: f64) -> Recording {
+/// Steps beyond a length are longer by a part, from a run on.
+fn walks(beyond: f64, longer: f64, from_run: usize) -> Recording {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let walk = |run: usize| {
         let x: Vec<f64> = (0..60).map(|_| rng.random_range(0.0..1.0)).collect();
-        let taken = x.iter().map(|&x| if x > beyond { (1.0 + longer) * x } else { x });
+        let taken = x.iter().map(|&x| if run >= from_run && x > beyond { (1.0 + longer) * x } else { x });
         let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
         let y = sums(run as f64, taken).map(|y| y + 0.05 * noise()).collect();
         Run { label: run.to_string(), inputs: vec![x], outputs: vec![y], kind: 0 }
@@ -77,26 +77,39 @@ fn walks(beyond: f64, longer: f64) -> Recording {
     recording("x", (0..5).map(walk).collect(), Some(0.05))
 }
 
-fn place(tells: bool) -> Location {
+fn place(tells: bool, from_run: usize) -> Location {
     let free = parameter("begin", 0.0, [f64::NEG_INFINITY, f64::INFINITY]);
     let parameters = vec![Parameter { scope: Scope::PerRun, ..free }];
     let model = Steps { spec: Spec { parameters, ..Spec::default() }, tells };
     let options = Options { replicates: 199, ..Options::default() };
-    let answer = diagnose(&model, &walks(0.7, 0.1), &[], &options, &Silent).unwrap();
+    let answer = diagnose(&model, &walks(0.7, 0.1, from_run), &[], &options, &Silent).unwrap();
     answer.location[0].clone()
 }
 
 #[test]
 fn a_step_that_departs_is_found_where_it_departs() {
-    let place = place(true);
+    let place = place(true, 0);
     let (from, to) = (place.from.unwrap(), place.to.unwrap());
     assert!((from - 0.7).abs() < 0.06 && to > 0.95, "{place:?}");
+    assert_eq!(place.runs.len(), 5);
+    let as_if = place.as_if.unwrap();
+    // A tenth more, as it was made.
+    assert_eq!(as_if.what, "longer steps");
+    let [low, high] = as_if.sizes[0].ci95;
+    assert!(low < 0.1 && 0.1 < high && high - low < 0.02, "{:?}", as_if.sizes);
+}
+
+#[test]
+fn a_change_between_runs_is_found_with_its_runs() {
+    let place = place(true, 3);
+    assert_eq!(place.runs, ["3", "4"], "{place:?}");
+    assert!((place.from.unwrap() - 0.7).abs() < 0.06, "{place:?}");
 }
 
 /// So is what the model tells of it needed.
 #[test]
 fn readings_that_are_off_do_not_say_which_step_departed() {
-    let place = place(false);
+    let place = place(false, 0);
     let found =
         place.from.is_some_and(|from| (from - 0.7).abs() < 0.06) && place.to.is_some_and(|to| to > 0.95);
     assert!(!found, "{place:?}");
