@@ -41,6 +41,12 @@ const ALL: &[&str] = &["mdn", "mdrff", "autoregressive"];
 /// gaussian_linear (shared/sbibm/c2st_wide.csv).
 #[test]
 fn a_thousand_simulations_do_as_well_as_published() {
+    as_well_as_published(&common::two_moons(), 0.7251, 1, &["mdn"]);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_every_density_does_as_well_as_published() {
     as_well_as_published(&common::two_moons(), 0.7251, 2, ALL);
     as_well_as_published(&common::gaussian_mixture(), 0.7161, 2, ALL);
 }
@@ -54,7 +60,8 @@ fn shared_a_thousand_simulations_do_as_well_as_published_in_ten_dimensions() {
 
 /// Counts of which one never changes, under log-normal priors; ten parameters that are correlated beforehand (0.8151 and 0.8630).
 #[test]
-fn a_thousand_simulations_do_as_well_as_published_under_gaussian_priors() {
+#[ignore = "long: .ci/run --long"]
+fn long_every_density_does_as_well_as_published_under_gaussian_priors() {
     as_well_as_published(&common::simulators::sir(), 0.8151, 2, ALL);
     as_well_as_published(&common::simulators::bernoulli_glm(), 0.8630, 1, &["mdn"]);
 }

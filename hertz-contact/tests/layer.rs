@@ -101,24 +101,35 @@ fn rings_give_hertz_on_a_thick_layer() {
 }
 
 /// 1 % is what is asked; 0.4 % is what the rings themselves reach.
+fn a_sphere_against_rings(nu: f64, base: Base, chis: &[f64]) {
+    let layer = Layer::new(&SPHERE, nu, base).unwrap();
+    for &chi in chis {
+        let depth = chi * chi;
+        let force = force_by_rings(|r| 0.5 * r * r, depth, 1.9 * chi, nu, base, 110);
+        let factor = force / (4.0 / 3.0 * chi * chi * chi);
+        let ratio = layer.factor(chi).0 / factor;
+        assert!((ratio - 1.0).abs() < 4e-3, "{base:?} {nu} {chi}: {factor} {ratio}");
+    }
+}
+
 #[test]
-fn spheres_against_rings() {
+fn a_gel_under_a_sphere_against_rings() {
+    a_sphere_against_rings(0.5, Base::Bonded, &[0.3, 1.0, 2.2]);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_spheres_against_rings() {
     for base in [Base::Bonded, Base::Free] {
         for nu in [0.0, 0.3, 0.45, 0.5] {
-            let layer = Layer::new(&SPHERE, nu, base).unwrap();
-            for chi in [0.1, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2] {
-                let depth = chi * chi;
-                let force = force_by_rings(|r| 0.5 * r * r, depth, 1.9 * chi, nu, base, 110);
-                let factor = force / (4.0 / 3.0 * chi * chi * chi);
-                let ratio = layer.factor(chi).0 / factor;
-                assert!((ratio - 1.0).abs() < 4e-3, "{base:?} {nu} {chi}: {factor} {ratio}");
-            }
+            a_sphere_against_rings(nu, base, &[0.1, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2]);
         }
     }
 }
 
 #[test]
-fn punches_and_cones_against_rings() {
+#[ignore = "long: .ci/run --long"]
+fn long_punches_and_cones_against_rings() {
     for base in [Base::Bonded, Base::Free] {
         for nu in [0.3, 0.5] {
             let layer = Layer::new(&CYLINDER, nu, base).unwrap();

@@ -244,8 +244,7 @@ fn a_slosh_gives_the_viscosity_back() {
     assert!(inside * 100 >= all * 88, "{inside} of {all}");
 }
 
-#[test]
-fn a_drain_gives_the_viscosity_back() {
+fn drained(readings: usize) -> [usize; 3] {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let (mut inside, mut all, mut refused) = (0, 0, 0);
     println!("{:>6} {:>6} {:>9} {:>20}", "Pa s", "share", "error", "interval");
@@ -254,7 +253,7 @@ fn a_drain_gives_the_viscosity_back() {
         for dynamic in [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0] {
             let viscosity = dynamic / 1400.0;
             let signal = table(drain(&bottle, viscosity, turn, 30.0));
-            for _ in 0..3 {
+            for _ in 0..readings {
                 let (t, y) = sensed(&signal, 30.0, &mut rng);
                 // Ends that are 1.5 times apart: some 20 % to either side.
                 let fit = ViscosityFit { widest_factor: 1.5, ..fit(bottle, turn) };
@@ -282,6 +281,19 @@ fn a_drain_gives_the_viscosity_back() {
         }
     }
     println!("{inside} of {all} inside their 95 % intervals, {refused} refused");
+    [inside, all, refused]
+}
+
+#[test]
+fn a_drain_gives_the_viscosity_back() {
+    let [_, all, refused] = drained(1);
+    assert!(refused <= 14 && all >= 28, "{refused} refused, {all} known");
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_a_drain_s_intervals_hold_the_viscosity() {
+    let [inside, all, refused] = drained(3);
     assert!(refused <= 42, "{refused}");
     assert!(inside * 100 >= all * 91, "{inside} of {all}");
 }

@@ -136,7 +136,8 @@ fn practice_dough() {
 }
 
 #[test]
-fn practice_pour() {
+#[ignore = "long: .ci/run --long"]
+fn long_practice_pour() {
     bundled_practice("grain-pour");
 }
 

@@ -47,28 +47,33 @@ fn white_noise() {
 }
 
 #[test]
-fn coloured_noise() {
+#[ignore = "long: .ci/run --long"]
+fn long_coloured_noise() {
     holds(World { phi: 0.7, ..World::NULL });
 }
 
 #[test]
-fn quantised_noise() {
+#[ignore = "long: .ci/run --long"]
+fn long_quantised_noise() {
     holds(World { digit: 0.01, ..World::NULL });
 }
 
 #[test]
-fn faintly_coloured_noise() {
+#[ignore = "long: .ci/run --long"]
+fn long_faintly_coloured_noise() {
     holds(World { phi: 0.3, ..World::NULL });
 }
 
 #[test]
-fn one_reading_in_a_hundred_is_wild() {
+#[ignore = "long: .ci/run --long"]
+fn long_one_reading_in_a_hundred_is_wild() {
     holds(World { wild: 0.01, ..World::NULL });
 }
 
 /// So many rows show a correlation to a hundredth: it must be met that well, and lies between round numbers.
 #[test]
-fn many_rows_of_coloured_noise() {
+#[ignore = "long: .ci/run --long"]
+fn long_many_rows_of_coloured_noise() {
     holds_in(World { rows: 1000, phi: 0.5, ..World::NULL }, 40);
 }
 

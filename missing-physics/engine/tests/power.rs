@@ -40,7 +40,8 @@ fn line_misfit(t: &[f64], z: &[f64]) -> f64 {
 /// The test that is told the truth detects 3.24 standard errors in 90 % of worlds (5 %, two-sided); the engine is allowed 1.5
 /// times that.
 #[test]
-fn an_effect_of_1_5_times_the_told_tests_size_is_detected_in_90_percent() {
+#[ignore = "long: .ci/run --long"]
+fn long_an_effect_of_1_5_times_the_told_tests_size_is_detected_in_90_percent() {
     const WORLDS: u64 = 200;
     let model = Ball::default();
     let unit = noncentrality(World { linear_drag: 0.01, ..World::NULL }, 0..20);
@@ -61,7 +62,8 @@ fn an_effect_of_1_5_times_the_told_tests_size_is_detected_in_90_percent() {
 }
 
 #[test]
-fn intervals_of_the_named_mechanism_cover_the_truth() {
+#[ignore = "long: .ci/run --long"]
+fn long_intervals_of_the_named_mechanism_cover_the_truth() {
     const WORLDS: u64 = 300;
     let model = Ball::default();
     let world = World { linear_drag: 0.25, ..World::NULL };

@@ -9,7 +9,7 @@ mod common;
 
 use common::{mechanism, parameter};
 use missing_physics::data::Run;
-use missing_physics::diagnosis::Verdict;
+use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::likelihood::{Likelihood, Scores};
 use missing_physics::model::{Parameter, PredictError, Quantity, Spec};
@@ -85,7 +85,8 @@ fn observed(slope: f64, seed: u64) -> Vec<(Run, Vec<f64>)> {
 }
 
 #[test]
-fn a_slope_of_the_restitution_is_found_and_none_is_not() {
+#[ignore = "long: .ci/run --long"]
+fn long_no_slope_of_the_restitution_is_found_where_there_is_none() {
     let mut alarms = 0;
     for seed in 0..40 {
         let (model, recording) = Synthetic::new(Bounces::new(), &observed(0.0, seed), 200, 9).unwrap();
@@ -96,6 +97,10 @@ fn a_slope_of_the_restitution_is_found_and_none_is_not() {
     println!("{alarms} alarms in 40 null worlds");
     // More than 7 of 40 happen in 1 of 1,000 at a rate of 5 %.
     assert!(alarms <= 7, "{alarms}");
+}
+
+#[test]
+fn a_slope_of_the_restitution_is_found() {
     let (model, recording) = Synthetic::new(Bounces::new(), &observed(0.03, 5), 200, 9).unwrap();
     let answer = diagnose(&model, &recording, &[], &Options::default(), &Silent).unwrap();
     assert_eq!((answer.verdict, answer.chosen.len()), (Verdict::Explained, 1));
@@ -160,17 +165,23 @@ fn measured(slope: f64, seed: u64) -> Vec<Run> {
         .collect()
 }
 
+fn heavy(slope: f64, seed: u64) -> Diagnosis {
+    let (model, recording) = Scores::put(Heavy(Bounces::new()), &measured(slope, seed), 200, 3).unwrap();
+    let options = Options { replicates: 199, seed, ..Options::default() };
+    diagnose(&model, &recording, &[], &options, &Silent).unwrap()
+}
+
 #[test]
-fn a_model_with_a_likelihood_finds_its_mechanism() {
-    let run = |slope: f64, seed: u64| {
-        let (model, recording) = Scores::put(Heavy(Bounces::new()), &measured(slope, seed), 200, 3).unwrap();
-        let options = Options { replicates: 199, seed, ..Options::default() };
-        diagnose(&model, &recording, &[], &options, &Silent).unwrap()
-    };
-    let alarms = (0..30).filter(|&seed| run(0.0, seed).verdict != Verdict::Adequate).count();
+#[ignore = "long: .ci/run --long"]
+fn long_a_model_with_a_likelihood_finds_nothing_where_there_is_nothing() {
+    let alarms = (0..30).filter(|&seed| heavy(0.0, seed).verdict != Verdict::Adequate).count();
     println!("{alarms} alarms in 30 null worlds");
     assert!(alarms <= 6, "{alarms}");
-    let answer = run(0.03, 2);
+}
+
+#[test]
+fn a_model_with_a_likelihood_finds_its_mechanism() {
+    let answer = heavy(0.03, 2);
     assert_eq!((answer.verdict, answer.chosen.len()), (Verdict::Explained, 1));
     let slope = &answer.mechanisms[0].parameters[0];
     assert!(slope.ci95[0] < 0.03 && 0.03 < slope.ci95[1], "{slope:?}");
