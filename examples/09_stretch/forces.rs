@@ -2,16 +2,25 @@
 
 use examples::plot::{Panel, hue};
 use hertz_contact::indenter::Indenter;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
+use stretch::calibration::{ForceModel, LeftOut, Press};
 use stretch::fake::{Membrane, Shape, Sheet};
 use stretch::force::curve;
-use stretch::modulus::{POISSON_RATIO, Press, Surface, effective_pa};
+use stretch::membrane::MembraneModel;
+use stretch::modulus::{HalfSpace, POISSON_RATIO, effective_pa};
 
 use super::{Outcome, stretches};
 
 const RADII_M: [f64; 5] = [0.008, 0.011, 0.014, 0.018, 0.024];
 /// Radius of figure 6.5's unknown ball, m: none of those that were pressed.
 const ASKED_M: f64 = 0.0125;
+/// One sigma of the force gauge that balls are calibrated with, N, and of the depth that a press is set to, m: the membrane that is calibrated
+/// is not smoother than its law.
+const GAUGE_N: f64 = 5e-3;
+const DEPTH_M: f64 = 5e-5;
 
 fn depths() -> Vec<f64> {
     (1..=5).map(|k| 3e-3 * f64::from(k)).collect()
@@ -28,7 +37,7 @@ fn presses(shape: Shape, stretch_m: f64) -> Vec<(f64, f64)> {
 }
 
 /// Figures 6.3 and 6.5.
-pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Surface> {
+pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<MembraneModel> {
     let stretches = stretches();
     let n = stretches.len();
     let [ball, rod, cone] = [
@@ -64,26 +73,48 @@ pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Surface> {
         let colour = hue(k, 3);
         by_shape.line(moduli.clone(), &colour).dots(moduli, &colour).name(name, &colour);
     }
-    let balls = balls(&stretches);
+    let balls = balls(&stretches)?;
     panels.push(by_diameter(&balls));
-    let surface = Surface::fit(&balls)?;
-    moduli(&surface, &balls, &stretches, panels)?;
+    let half_space = HalfSpace::fit(&balls)?;
+    moduli(&half_space, &balls, &stretches, panels)?;
     panels.push(by_shape);
-    interpolated(&surface, &stretches, panels)?;
-    Ok(surface)
+    let model = MembraneModel::fit(&balls)?;
+    let range = balls.iter().map(|p| p.force_n).fold(0.0, f64::max);
+    println!(
+        "\nForces left out, of {range:.2} N, gauge {GAUGE_N} N and depths {:.2} mm (one sigma); N:",
+        1e3 * DEPTH_M
+    );
+    println!("{:>36}{:>18}{:>18}", "", "a radius", "a stretch");
+    let line = |name: &str, errors: [Option<LeftOut>; 2]| {
+        let of = |e: Option<LeftOut>| {
+            e.map_or("too few".into(), |e| format!("{:.4} +- {:.4}", e.mean_n, e.spread_n))
+        };
+        println!("{name:>36}{:>18}{:>18}", of(errors[0]), of(errors[1]));
+    };
+    line("a membrane's law", [model.radius_left_out(), model.stretch_left_out()]);
+    line("a half-space, as in [Matl 2021]", [half_space.radius_left_out(), half_space.stretch_left_out()]);
+    println!("{:>36}{:>18}", "[Matl 2021], on another hand", "0.023 +- 0.011");
+    interpolated(&model, &half_space, &stretches, panels)?;
+    Ok(model)
 }
 
 /// Presses of all balls at all stretches.
-fn balls(stretches: &[f64]) -> Vec<Press> {
+fn balls(stretches: &[f64]) -> Outcome<Vec<Press>> {
     let states: Vec<(f64, f64)> =
         RADII_M.iter().flat_map(|r| stretches.iter().map(move |x| (*r, *x))).collect();
-    let of = |(radius_m, stretch_m): (f64, f64)| -> Vec<Press> {
-        presses(Shape::Ball { radius_m }, stretch_m)
-            .into_iter()
-            .map(|(indentation_m, force_n)| Press { stretch_m, radius_m, indentation_m, force_n })
-            .collect()
+    let of = |(state, (radius_m, stretch_m)): (usize, (f64, f64))| -> Outcome<Vec<Press>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(state as u64);
+        let (gauge, depth) = (Normal::new(0.0, GAUGE_N)?, Normal::new(0.0, DEPTH_M)?);
+        let press = |set_m: f64| {
+            let mut membrane = Membrane::new(Sheet::matl_2021(), stretch_m);
+            membrane.press(&Shape::Ball { radius_m }, [0.0; 2], set_m + depth.sample(&mut rng));
+            let force_n = membrane.force_n + gauge.sample(&mut rng);
+            Press { stretch_m, radius_m, indentation_m: set_m, force_n }
+        };
+        Ok(depths().into_iter().map(press).collect())
     };
-    states.into_par_iter().flat_map_iter(of).collect()
+    let all: Vec<Vec<Press>> = states.into_par_iter().enumerate().map(of).collect::<Outcome<_>>()?;
+    Ok(all.into_iter().flatten().collect())
 }
 
 /// Figure 6.3 d: balls at a stretch of 30 mm.
@@ -98,8 +129,8 @@ fn by_diameter(balls: &[Press]) -> Panel {
     panel
 }
 
-/// Figures 6.3 e and 6.5 a: the modulus by diameter and stretch, and the error with a radius left out.
-fn moduli(surface: &Surface, balls: &[Press], stretches: &[f64], panels: &mut Vec<Panel>) -> Outcome<()> {
+/// Figures 6.3 e and 6.5 a: the modulus by diameter and stretch.
+fn moduli(surface: &HalfSpace, balls: &[Press], stretches: &[f64], panels: &mut Vec<Panel>) -> Outcome<()> {
     println!(
         "\nEffective modulus E* of balls (kPa); rows: stretch (mm), columns: diameter (mm) (figure 6.3 e)"
     );
@@ -131,21 +162,21 @@ fn moduli(surface: &Surface, balls: &[Press], stretches: &[f64], panels: &mut Ve
             .name(format!("{:.0} mm", 2e3 * r), &colour);
     }
     panels.extend([over_stretch, over_diameter]);
-    let (mean, spread) = surface.left_out_error_n();
-    let range = balls.iter().map(|p| p.force_n).fold(0.0, f64::max);
-    println!(
-        "left out: {mean:.3} +- {spread:.3} N of {range:.2} N ([Matl 2021], on another hand: 0.023 +- 0.011 N)"
-    );
     Ok(())
 }
 
 /// Figure 6.5 b and c: a ball that was not pressed; what the half-space says, and what the membrane does.
-fn interpolated(surface: &Surface, stretches: &[f64], panels: &mut Vec<Panel>) -> Outcome<()> {
+fn interpolated(
+    model: &MembraneModel,
+    half_space: &HalfSpace,
+    stretches: &[f64],
+    panels: &mut Vec<Panel>,
+) -> Outcome<()> {
     let mut rising = Panel::new("6.5 b: E* (kPa) of a 25 mm ball, p + q ln(1 + x/x0)", "stretch (mm)", "");
     let (first, last) = (stretches[0], stretches[stretches.len() - 1]);
     let line = (0..=40).map(|k| first + (last - first) * f64::from(k) / 40.0);
     rising.line(
-        line.filter_map(|x| surface.modulus_pa(ASKED_M, x).ok().map(|e| [1e3 * x, 1e-3 * e])),
+        line.filter_map(|x| half_space.modulus_pa(ASKED_M, x).ok().map(|e| [1e3 * x, 1e-3 * e])),
         "steelblue",
     );
     let mut forces = Panel::new("6.5 c: force (N) of a 25 mm ball: lines foretold", "depth (mm)", "");
@@ -156,10 +187,10 @@ fn interpolated(surface: &Surface, stretches: &[f64], panels: &mut Vec<Panel>) -
         let (e, _) = effective_pa(&Indenter::Sphere { radius_m: ASKED_M }, &pressed)?;
         rising.dots([[1e3 * x, 1e-3 * e]], "crimson");
         let depths: Vec<f64> = pressed.iter().map(|p| p.0).collect();
-        let foretold = curve(surface, ASKED_M, x, &depths)?;
+        let foretold = curve(model, ASKED_M, x, &depths)?;
         worst = pressed.iter().zip(&foretold).map(|(p, f)| (p.1 - f).abs()).fold(worst, f64::max);
         let fine: Vec<f64> = (0..=30).map(|i| 5e-4 * f64::from(i)).collect();
-        let line = curve(surface, ASKED_M, x, &fine)?;
+        let line = curve(model, ASKED_M, x, &fine)?;
         forces.line(fine.iter().zip(line).map(|(d, f)| [1e3 * d, f]), &colour);
         forces
             .dots(pressed.iter().map(|p| [1e3 * p.0, p.1]), &colour)

@@ -26,10 +26,10 @@ type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let mut panels = Vec::new();
     geometry::section(&mut panels)?;
-    let surface = forces::curves(&mut panels)?;
+    let model = forces::curves(&mut panels)?;
     geometry::faces(&mut panels);
     objects::reconstructed(&mut panels)?;
-    palpation::balloons(&surface, &mut panels)?;
+    palpation::balloons(&model, &mut panels)?;
     objects::cookies(&mut panels)?;
     let path = plot::write("stretch.svg", &panels, 4)?;
     println!("\nfigures drawn: {}", path.display());

@@ -4,7 +4,7 @@ use examples::plot::{Panel, hue};
 use rayon::prelude::*;
 use stretch::fake::{Filling, Rig, Shape};
 use stretch::force::curve;
-use stretch::modulus::Surface;
+use stretch::membrane::MembraneModel;
 use stretch::palpate::{Palpation, Programme, palpate};
 
 use super::{Outcome, at};
@@ -12,7 +12,7 @@ use super::{Outcome, at};
 /// Balloons: what is in them, and their stiffness, N/m.
 const FILLINGS: [(&str, f64); 4] = [("air", 80.0), ("water", 150.0), ("pudding", 260.0), ("seeds", 450.0)];
 
-pub(crate) fn balloons(surface: &Surface, panels: &mut Vec<Panel>) -> Outcome<()> {
+pub(crate) fn balloons(model: &MembraneModel, panels: &mut Vec<Panel>) -> Outcome<()> {
     let times: u64 = if examples::small() { 1 } else { 3 };
     println!("\nStiffness by palpation (figure 6.7)");
     println!(
@@ -29,7 +29,7 @@ pub(crate) fn balloons(surface: &Surface, panels: &mut Vec<Panel>) -> Outcome<()
             let stretches_m = vec![0.0, 0.02, 0.04, 0.06];
             let programme =
                 Programme { stretches_m, pictures: 2, ..Programme::matl_2021(at(0.0, 0.03), 0.0) };
-            Ok((k, palpate(&mut rig, &programme, surface).map_err(|e| e.to_string())?))
+            Ok((k, palpate(&mut rig, &programme, model).map_err(|e| e.to_string())?))
         })
         .collect::<Outcome<_>>()?;
     for (k, p) in &felt {
@@ -45,7 +45,7 @@ pub(crate) fn balloons(surface: &Surface, panels: &mut Vec<Panel>) -> Outcome<()
         known.dedup();
         for (l, x) in known.iter().enumerate() {
             let fine: Vec<f64> = (0..=30).map(|i| 5e-4 * f64::from(i)).collect();
-            let line = curve(surface, p.radius.value_m, *x, &fine)?;
+            let line = curve(model, p.radius.value_m, *x, &fine)?;
             panel.line(fine.iter().zip(line).map(|(d, f)| [1e3 * d, f]), &hue(l, 4));
             panel.name(format!("{:.0} mm", 1e3 * x), &hue(l, 4));
         }

@@ -1,14 +1,14 @@
 //! Load from what is seen: radius, stretch, indentation (section 6.5).
 
+use crate::calibration::{CalibrationError, ForceModel};
 use crate::measured::MeasuredLength;
-use crate::modulus::{ModulusError, Surface, per_modulus};
 
 /// Why there is no force.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ForceError {
-    /// The modulus is not known there.
+    /// The calibration has no answer there.
     #[error(transparent)]
-    Modulus(#[from] ModulusError),
+    Calibration(#[from] CalibrationError),
     /// A number out of range.
     #[error("{what} is {got}; expected a finite number, 0 or more")]
     Value {
@@ -40,11 +40,11 @@ pub struct Load {
 }
 
 /// Force of a contact. The interval adds up what radius, indentation and the model (its error with a radius left out) do not know;
-/// it needs a surface of four radii or more, else it is all of the positive numbers.
+/// it needs a calibration of four radii or more, else it is all of the positive numbers.
 ///
 /// # Errors
 /// [`ForceError`].
-pub fn load(surface: &Surface, seen: &Seen) -> Result<Load, ForceError> {
+pub fn load(model: &impl ForceModel, seen: &Seen) -> Result<Load, ForceError> {
     let MeasuredLength { value_m: radius, sigma_m: radius_sigma } = seen.radius;
     let MeasuredLength { value_m: depth, sigma_m: depth_sigma } = seen.indentation;
     for (what, got) in [
@@ -56,9 +56,7 @@ pub fn load(surface: &Surface, seen: &Seen) -> Result<Load, ForceError> {
             return Err(ForceError::Value { what, got });
         }
     }
-    let at = |r: f64, d: f64| -> Result<f64, ModulusError> {
-        Ok(surface.modulus_pa(r, seen.stretch_m)? * per_modulus(r, d))
-    };
+    let at = |r: f64, d: f64| model.force_n(r, seen.stretch_m, d);
     let force_n = at(radius, depth)?;
     // The model is smooth: differences over a hundredth are its slopes.
     let step = 0.01;
@@ -66,12 +64,15 @@ pub fn load(surface: &Surface, seen: &Seen) -> Result<Load, ForceError> {
         Ok(other) => (other - force_n) / (step * radius) * radius_sigma,
         Err(e) => return Err(e.into()),
     };
-    let of_depth = if depth > 0.0 { 1.5 * force_n / depth * depth_sigma } else { 0.0 };
-    let relative = surface.left_out_relative();
-    if relative.is_nan() {
+    let of_depth = if depth > 0.0 {
+        (force_n - at(radius, depth * (1.0 - step))?) / (step * depth) * depth_sigma
+    } else {
+        0.0
+    };
+    let Some(left_out) = model.radius_left_out() else {
         return Ok(Load { force_n, interval_n: (0.0, f64::INFINITY) });
-    }
-    let half = 1.96 * of_radius.hypot(of_depth).hypot(relative * force_n);
+    };
+    let half = 1.96 * of_radius.hypot(of_depth).hypot(left_out.relative * force_n);
     Ok(Load { force_n, interval_n: ((force_n - half).max(0.0), force_n + half) })
 }
 
@@ -80,13 +81,12 @@ pub fn load(surface: &Surface, seen: &Seen) -> Result<Load, ForceError> {
 /// # Errors
 /// [`ForceError`].
 pub fn curve(
-    surface: &Surface,
+    model: &impl ForceModel,
     radius_m: f64,
     stretch_m: f64,
     indentations_m: &[f64],
 ) -> Result<Vec<f64>, ForceError> {
-    let modulus = surface.modulus_pa(radius_m, stretch_m)?;
-    Ok(indentations_m.iter().map(|d| modulus * per_modulus(radius_m, *d)).collect())
+    Ok(indentations_m.iter().map(|d| model.force_n(radius_m, stretch_m, *d)).collect::<Result<_, _>>()?)
 }
 
 /// Indentation in m at which a ball feels a force (N).
@@ -94,7 +94,7 @@ pub fn curve(
 /// # Errors
 /// [`ForceError`].
 pub fn indentation_m(
-    surface: &Surface,
+    model: &impl ForceModel,
     radius_m: f64,
     stretch_m: f64,
     force_n: f64,
@@ -102,6 +102,5 @@ pub fn indentation_m(
     if !(force_n >= 0.0 && force_n.is_finite()) {
         return Err(ForceError::Value { what: "the force", got: force_n });
     }
-    let modulus = surface.modulus_pa(radius_m, stretch_m)?;
-    Ok((force_n / (modulus * per_modulus(radius_m, 1.0))).powf(2.0 / 3.0))
+    Ok(model.indentation_m(radius_m, stretch_m, force_n)?)
 }

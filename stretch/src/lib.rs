@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod calibration;
 pub mod cloud;
 pub mod contact;
 pub mod curvature;
@@ -8,6 +9,7 @@ pub mod fake;
 pub mod force;
 pub mod measured;
 mod median;
+pub mod membrane;
 pub mod modulus;
 pub mod palpate;
 pub mod reconstruct;

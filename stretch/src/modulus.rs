@@ -3,63 +3,14 @@
 //! At each stretch x the modulus falls with the contact's diameter, `E = a + b exp(-D/c)`; for one diameter it grows with the
 //! stretch, `E = p + q ln(1 + x/x_0)`. Forces are eqs 6.2 to 6.4, corrected, nu = 1/2.
 
-use hertz_contact::calibrated::{Beyond, Calibrated, distinct};
+use hertz_contact::calibrated::{Calibrated, distinct};
 use hertz_contact::indenter::Indenter;
 use nalgebra::{Matrix2, Vector2};
 
+use crate::calibration::{CalibrationError, ForceModel, LeftOut, Press, check, left_out};
+
 /// Poisson's ratio of rubber.
 pub const POISSON_RATIO: f64 = 0.5;
-
-/// Why there is no modulus.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ModulusError {
-    /// A number out of range.
-    #[error("press {press}: {what} is {got}; expected a finite number, {least} or more")]
-    Value {
-        /// Index of the press.
-        press: usize,
-        /// Which column.
-        what: &'static str,
-        /// Its value.
-        got: f64,
-        /// Least value.
-        least: f64,
-    },
-    /// Too few different states.
-    #[error("{got} different {what}; expected {expected} or more")]
-    TooFew {
-        /// Of what.
-        what: &'static str,
-        /// Least number.
-        expected: usize,
-        /// Different ones.
-        got: usize,
-    },
-    /// A state in which nothing was pressed in, or nothing was felt.
-    #[error("presses with radius {radius_m} m at stretch {stretch_m} m have no positive modulus")]
-    NoForce {
-        /// Radius, m.
-        radius_m: f64,
-        /// Stretch, m.
-        stretch_m: f64,
-    },
-    /// A question beyond what was calibrated.
-    #[error(transparent)]
-    Beyond(#[from] Beyond),
-}
-
-/// A press of a rigid ball whose force was measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Press {
-    /// Stretch of the membrane, m, 0 or more.
-    pub stretch_m: f64,
-    /// Radius of the ball, m, above 0.
-    pub radius_m: f64,
-    /// Indentation, m, 0 or more.
-    pub indentation_m: f64,
-    /// Force, N.
-    pub force_n: f64,
-}
 
 /// The force over E for a ball: `4/3 sqrt(R) delta^(3/2)/(1 - nu^2)`.
 pub(crate) fn per_modulus(radius_m: f64, indentation_m: f64) -> f64 {
@@ -70,12 +21,12 @@ pub(crate) fn per_modulus(radius_m: f64, indentation_m: f64) -> f64 {
 /// Modulus E in Pa of presses by one indenter at one stretch: least squares through the origin, and its standard error.
 ///
 /// # Errors
-/// [`ModulusError::TooFew`] (two presses), [`ModulusError::Value`].
-pub fn effective_pa(indenter: &Indenter, presses: &[(f64, f64)]) -> Result<(f64, f64), ModulusError> {
+/// [`CalibrationError::TooFew`] (two presses), [`CalibrationError::Value`].
+pub fn effective_pa(indenter: &Indenter, presses: &[(f64, f64)]) -> Result<(f64, f64), CalibrationError> {
     for (press, &(depth, force)) in presses.iter().enumerate() {
         for (what, got, least) in [("the indentation", depth, 0.0), ("the force", force, f64::MIN)] {
             if !(got.is_finite() && got >= least) {
-                return Err(ModulusError::Value { press, what, got, least });
+                return Err(CalibrationError::Value { press, what, got, least });
             }
         }
     }
@@ -83,7 +34,7 @@ pub fn effective_pa(indenter: &Indenter, presses: &[(f64, f64)]) -> Result<(f64,
     let basis = |depth: f64| factor * depth.powf(indenter.exponent());
     let square: f64 = presses.iter().map(|p| basis(p.0).powi(2)).sum();
     if presses.len() < 2 || !(square > 0.0) {
-        return Err(ModulusError::TooFew {
+        return Err(CalibrationError::TooFew {
             what: "presses with an indentation",
             expected: 2,
             got: presses.len(),
@@ -164,68 +115,37 @@ fn best<T: Copy>(fits: impl Iterator<Item = (T, f64)>) -> T {
     fits[0].0
 }
 
-/// Part of the calibrated range that may be asked for beyond it.
-const SLACK: f64 = 0.05;
-
-/// Modulus over radius and stretch.
+/// Modulus over radius and stretch: a half-space that stands for the membrane (sections 6.4 and 6.5 of [Matl 2021]).
+/// [`MembraneModel`](crate::membrane::MembraneModel) has a membrane's own law and errs less.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Surface {
+pub struct HalfSpace {
     stretches_m: Vec<f64>,
     falling: Vec<Falling>,
     radius_m: Calibrated,
     stretch_m: Calibrated,
-    /// Relative error of a force by leaving out each radius in turn: root mean square.
-    relative_error: f64,
-    /// The same, N: mean of the absolute value, and its standard deviation.
-    error_n: (f64, f64),
+    left_out: [Option<LeftOut>; 2],
 }
 
-impl Surface {
-    /// Fits presses with three radii or more at three stretches or more, and leaves out each inner radius in turn (section 6.5). The outer
-    /// ones are not left out: that would be extrapolation, which [`Surface::modulus_pa`] refuses.
+impl HalfSpace {
+    /// Fits presses with three radii or more at three stretches or more.
     ///
     /// # Errors
-    /// [`ModulusError`].
-    pub fn fit(presses: &[Press]) -> Result<Self, ModulusError> {
+    /// [`CalibrationError`].
+    pub fn fit(presses: &[Press]) -> Result<Self, CalibrationError> {
         check(presses)?;
-        let mut surface = Self::without(presses, None)?;
-        let radii = distinct(presses.iter().map(|p| p.radius_m));
-        let (mut errors, mut relative) = (Vec::new(), Vec::new());
-        if radii.len() >= 4 {
-            for &left_out in &radii[1..radii.len() - 1] {
-                let others = Self::without(presses, Some(left_out))?;
-                for p in presses.iter().filter(|p| p.radius_m == left_out && p.indentation_m > 0.0) {
-                    let force =
-                        others.modulus(p.radius_m, p.stretch_m) * per_modulus(p.radius_m, p.indentation_m);
-                    errors.push((force - p.force_n).abs());
-                    relative.push(((force - p.force_n) / force).powi(2));
-                }
-            }
-        }
-        if !errors.is_empty() {
-            let n = errors.len() as f64;
-            let mean = errors.iter().sum::<f64>() / n;
-            let spread = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
-            surface.error_n = (mean, spread);
-            surface.relative_error = (relative.iter().sum::<f64>() / n).sqrt();
-        }
-        Ok(surface)
+        let left_out =
+            [left_out(presses, |p| p.radius_m, Self::of)?, left_out(presses, |p| p.stretch_m, Self::of)?];
+        Ok(Self { left_out, ..Self::of(presses)? })
     }
 
-    fn without(presses: &[Press], left_out: Option<f64>) -> Result<Self, ModulusError> {
-        let used: Vec<&Press> = presses.iter().filter(|p| Some(p.radius_m) != left_out).collect();
-        let stretches_m = distinct(used.iter().map(|p| p.stretch_m));
-        let radii = distinct(used.iter().map(|p| p.radius_m));
-        for (what, got) in [("stretches", stretches_m.len()), ("radii", radii.len())] {
-            if got < 3 {
-                return Err(ModulusError::TooFew { what, expected: 3, got });
-            }
-        }
+    fn of(presses: &[Press]) -> Result<Self, CalibrationError> {
+        let stretches_m = distinct(presses.iter().map(|p| p.stretch_m));
+        let radii = distinct(presses.iter().map(|p| p.radius_m));
         let mut falling = Vec::with_capacity(stretches_m.len());
         for &stretch_m in &stretches_m {
             let mut points = Vec::with_capacity(radii.len());
             for &radius_m in &radii {
-                let here = used.iter().filter(|p| p.stretch_m == stretch_m && p.radius_m == radius_m);
+                let here = presses.iter().filter(|p| p.stretch_m == stretch_m && p.radius_m == radius_m);
                 let (mut up, mut square) = (0.0, 0.0);
                 for p in here {
                     let g = per_modulus(radius_m, p.indentation_m);
@@ -233,25 +153,19 @@ impl Surface {
                 }
                 // A radius need not have been pressed in at every stretch.
                 if square > 0.0 {
-                    if !(up > 0.0) {
-                        return Err(ModulusError::NoForce { radius_m, stretch_m });
-                    }
                     points.push((2.0 * radius_m, up / square));
                 }
             }
             if points.len() < 3 {
-                return Err(ModulusError::TooFew {
-                    what: "radii at one stretch",
-                    expected: 3,
-                    got: points.len(),
-                });
+                let what = "radii at one stretch";
+                return Err(CalibrationError::TooFew { what, expected: 3, got: points.len() });
             }
             falling.push(Falling::fit(&points));
         }
-        let radius_m = Calibrated::over("the radius in m", radii, SLACK);
-        let stretch_m = Calibrated::over("the stretch in m", stretches_m.iter().copied(), SLACK);
-        let (relative_error, error_n) = (f64::NAN, (f64::NAN, f64::NAN));
-        Ok(Self { stretches_m, falling, radius_m, stretch_m, relative_error, error_n })
+        let radius_m = Calibrated::over("the radius in m", radii, crate::calibration::SLACK);
+        let stretch_m =
+            Calibrated::over("the stretch in m", stretches_m.iter().copied(), crate::calibration::SLACK);
+        Ok(Self { stretches_m, falling, radius_m, stretch_m, left_out: [None; 2] })
     }
 
     fn modulus(&self, radius_m: f64, stretch_m: f64) -> f64 {
@@ -263,37 +177,34 @@ impl Surface {
     /// Modulus E in Pa for a ball's radius at a stretch.
     ///
     /// # Errors
-    /// [`ModulusError::Beyond`].
-    pub fn modulus_pa(&self, radius_m: f64, stretch_m: f64) -> Result<f64, ModulusError> {
+    /// [`CalibrationError::Beyond`].
+    pub fn modulus_pa(&self, radius_m: f64, stretch_m: f64) -> Result<f64, CalibrationError> {
         self.radius_m.check(radius_m)?;
         self.stretch_m.check(stretch_m)?;
         Ok(self.modulus(radius_m, stretch_m))
     }
-
-    /// Error of forces with each inner radius left out in turn: mean of the absolute value and its standard deviation, N; NaN with less than
-    /// four radii.
-    pub fn left_out_error_n(&self) -> (f64, f64) {
-        self.error_n
-    }
-
-    /// The same as a part of the force, root mean square; NaN with less than four radii.
-    pub fn left_out_relative(&self) -> f64 {
-        self.relative_error
-    }
 }
 
-fn check(presses: &[Press]) -> Result<(), ModulusError> {
-    for (press, p) in presses.iter().enumerate() {
-        for (what, got, least) in [
-            ("the stretch", p.stretch_m, 0.0),
-            ("the radius", p.radius_m, f64::MIN_POSITIVE),
-            ("the indentation", p.indentation_m, 0.0),
-            ("the force", p.force_n, f64::MIN),
-        ] {
-            if !(got.is_finite() && got >= least) {
-                return Err(ModulusError::Value { press, what, got, least });
-            }
+impl ForceModel for HalfSpace {
+    fn force_n(&self, radius_m: f64, stretch_m: f64, indentation_m: f64) -> Result<f64, CalibrationError> {
+        Ok(self.modulus_pa(radius_m, stretch_m)? * per_modulus(radius_m, indentation_m))
+    }
+
+    fn indentation_m(&self, radius_m: f64, stretch_m: f64, force_n: f64) -> Result<f64, CalibrationError> {
+        let per_unit = self.modulus_pa(radius_m, stretch_m)? * per_modulus(radius_m, 1.0);
+        let indentation_m = (force_n / per_unit).powf(2.0 / 3.0);
+        if indentation_m.is_finite() {
+            Ok(indentation_m)
+        } else {
+            Err(CalibrationError::NotReached { force_n })
         }
     }
-    Ok(())
+
+    fn radius_left_out(&self) -> Option<LeftOut> {
+        self.left_out[0]
+    }
+
+    fn stretch_left_out(&self) -> Option<LeftOut> {
+        self.left_out[1]
+    }
 }

@@ -13,11 +13,11 @@ use hw_traits::camera::DepthCamera;
 use hw_traits::gripper::Gripper;
 
 pub use self::programme::{PalpateError, Programme};
+use crate::calibration::ForceModel;
 use crate::cloud::{Cloud, Rest, Window};
 use crate::contact::{Ball, ContactError, cap};
 use crate::force::{Load, Seen, indentation_m, load};
 use crate::measured::MeasuredLength;
-use crate::modulus::Surface;
 use crate::segment::Segmenter;
 
 /// One step of the palpation.
@@ -66,7 +66,7 @@ struct Look {
 pub fn palpate<R>(
     rig: &mut R,
     programme: &Programme,
-    surface: &Surface,
+    model: &impl ForceModel,
 ) -> Result<Palpation, PalpateError<R::Error>>
 where
     R: DepthCamera + Gripper + Arm,
@@ -95,7 +95,7 @@ where
             radius: shape.radius,
             indentation: MeasuredLength { value_m: look.apex_m.max(0.0), sigma_m: look.apex_sigma_m },
         };
-        load(surface, &seen).map_err(PalpateError::Force)
+        load(model, &seen).map_err(PalpateError::Force)
     };
     let first_n = force_of(stretch_m, &first)?.force_n;
     let mut force = first_n;
@@ -104,7 +104,7 @@ where
         open(rig, programme, stretch_m)?;
         eyes.learn_rest(rig, programme, stretch_m)?;
         let start =
-            indentation_m(surface, shape.radius.value_m, stretch_m, force).map_err(PalpateError::Force)?;
+            indentation_m(model, shape.radius.value_m, stretch_m, force).map_err(PalpateError::Force)?;
         let mut depth = start.max(programme.touch_m) + programme.depth_step_m;
         while depth <= programme.deepest_m {
             let tool_m = top_m - depth;
