@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 
 use missing_physics::data::{Recording, Run};
+use missing_physics::diagnosis::Diagnosis;
+use missing_physics::engine::{DiagnoseError, Options, diagnose};
 use missing_physics::model::{Experiment, Model, Quantity, Spec};
+use missing_physics::observer::Observer;
 
 use crate::recording::{Column, ColumnContents, Header, ReadError};
 
@@ -192,6 +195,19 @@ impl Loaded {
     ) -> Self {
         let (hints, additions) = (Vec::new(), serde_json::Map::new());
         Self { recording, model: Box::new(model), experiments, undetermined, hints, additions }
+    }
+}
+
+impl Loaded {
+    /// Diagnoses the recording: what the engine finds, beside what the domain knows of such data and of this recording's units.
+    ///
+    /// # Errors
+    /// As [`missing_physics::engine::diagnose`].
+    pub fn diagnose(&self, options: &Options, observer: &dyn Observer) -> Result<Diagnosis, DiagnoseError> {
+        let mut found = diagnose(&*self.model, &self.recording, &self.experiments, options, observer)?;
+        found.undetermined.extend(self.undetermined.iter().cloned());
+        found.remarks.extend(self.hints.iter().map(|hint| format!("look at the units: {hint}")));
+        Ok(found)
     }
 }
 

@@ -23,6 +23,12 @@ impl<K: Eq + Hash, V: Clone> Memo<K, V> {
         Self { most, values: Mutex::new(Values { by_key: HashMap::new(), size: 0 }) }
     }
 
+    /// Whether the value of a key is remembered.
+    #[cfg(feature = "custom")]
+    pub(super) fn knows(&self, key: &K) -> bool {
+        self.values.lock().unwrap_or_else(PoisonError::into_inner).by_key.contains_key(key)
+    }
+
     /// The value of a key, of a size, made where it is not remembered; two threads that ask at once may both make it.
     pub(super) fn get_or<E>(&self, key: K, size: usize, make: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
         let lock = || self.values.lock().unwrap_or_else(PoisonError::into_inner);

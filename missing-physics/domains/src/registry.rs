@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::domain::{CheckedRecording, Domain, Loaded};
-use crate::recording::{Header, ReadError, quoted};
+use crate::recording::{Header, ReadError, Source, quoted};
 
 /// All domains of this version that were compiled in.
 pub fn all() -> &'static [&'static dyn Domain] {
@@ -53,7 +53,15 @@ pub fn find(id: &str) -> Result<&'static dyn Domain, UnknownDomain> {
 /// # Errors
 /// [`ReadError`].
 pub fn check(folder: &Path) -> Result<(&'static dyn Domain, CheckedRecording), ReadError> {
-    read(&Header::read(folder)?)
+    check_source(&Source::folder(folder))
+}
+
+/// As [`check`], for a recording in a folder or in memory.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn check_source(source: &Source) -> Result<(&'static dyn Domain, CheckedRecording), ReadError> {
+    read(&Header::read(source)?)
 }
 
 /// Reads the recording in a folder and makes its model.
@@ -61,7 +69,15 @@ pub fn check(folder: &Path) -> Result<(&'static dyn Domain, CheckedRecording), R
 /// # Errors
 /// [`ReadError`].
 pub fn load(folder: &Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
-    let (domain, checked) = check(folder)?;
+    load_source(&Source::folder(folder))
+}
+
+/// As [`load`], for a recording in a folder or in memory.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn load_source(source: &Source) -> Result<(&'static dyn Domain, Loaded), ReadError> {
+    let (domain, checked) = check_source(source)?;
     Ok((domain, checked.prepare()?))
 }
 
@@ -69,8 +85,8 @@ pub fn load(folder: &Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
 ///
 /// # Errors
 /// [`ReadError`].
-pub fn load_with_gaps(folder: &Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
-    let (domain, checked) = read(&Header::read_with_gaps(folder)?)?;
+pub fn load_with_gaps(source: &Source) -> Result<(&'static dyn Domain, Loaded), ReadError> {
+    let (domain, checked) = read(&Header::read_with_gaps(source)?)?;
     Ok((domain, checked.prepare()?))
 }
 

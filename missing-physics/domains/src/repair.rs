@@ -16,8 +16,8 @@ use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::repaired::{PredictedRun, Repaired, RepairedError};
 use serde::{Deserialize, Serialize};
 
-use crate::domain::Domain;
-use crate::recording::{ReadError, one_line, read_text};
+use crate::domain::{Domain, Loaded};
+use crate::recording::{ReadError, Source, one_line, read_text};
 
 /// A repaired model of a domain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -143,8 +143,29 @@ impl Repair {
     /// # Errors
     /// [`RepairError`].
     pub fn predict(&self, folder: &Path) -> Result<Predicted, RepairError> {
-        let (domain, loaded) = crate::registry::load_with_gaps(folder)?;
-        let name = || folder.display().to_string();
+        self.predict_source(&Source::folder(folder))
+    }
+
+    /// As [`Repair::predict`], for a recording in a folder or in memory.
+    ///
+    /// # Errors
+    /// [`RepairError`].
+    pub fn predict_source(&self, source: &Source) -> Result<Predicted, RepairError> {
+        let (domain, loaded) = crate::registry::load_with_gaps(source)?;
+        self.predict_loaded(domain, loaded, &source.name())
+    }
+
+    /// As [`Repair::predict`], for a recording of a domain that was read before; errors begin with its name.
+    ///
+    /// # Errors
+    /// [`RepairError`], but for what can be wrong with files.
+    pub fn predict_loaded(
+        &self,
+        domain: &dyn Domain,
+        loaded: Loaded,
+        name: &str,
+    ) -> Result<Predicted, RepairError> {
+        let name = || name.to_owned();
         if domain.id() != self.domain {
             let (got, expected) = (domain.id(), self.domain.clone());
             return Err(RepairError::OtherDomain { folder: name(), got, expected });

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use missing_physics::diagnosis::Diagnosis;
-use missing_physics::engine::{Options, diagnose as run};
+use missing_physics::engine::Options;
 use missing_physics::observer::Observer;
 
 use super::error::CommandError;
@@ -62,11 +62,7 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
     if arguments.model.is_some() && !domain.predicts() {
         return Err(RepairError::NoChannels { domain: domain.id() }.into());
     }
-    let mut diagnosis = pool.install(|| {
-        run(&*loaded.model, &loaded.recording, &loaded.experiments, &arguments.options, observer)
-    })?;
-    diagnosis.undetermined.extend(loaded.undetermined);
-    diagnosis.remarks.extend(loaded.hints.iter().map(|hint| format!("look at the units: {hint}")));
+    let diagnosis = pool.install(|| loaded.diagnose(&arguments.options, observer))?;
     let context = ReportContext {
         domain: domain.id().to_owned(),
         recording: arguments.folder.display().to_string(),

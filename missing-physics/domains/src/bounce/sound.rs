@@ -1,7 +1,5 @@
 //! Drops that come as sound: one WAV file a run.
 
-use std::path::Path;
-
 use bounce_audio::chain::{Candidate, impacts as impacts_of};
 use bounce_audio::hear::{HearSettings, Impact, hear, hear_times};
 use bounce_audio::wav::Sound;
@@ -11,7 +9,7 @@ use super::drop::{Drop, Relative};
 use super::read::{Heard, Rig};
 use serde_json::{Value, json};
 
-use crate::recording::{Header, ReadError, inside};
+use crate::recording::{Header, NamedFile, ReadError};
 
 /// What was heard, and with which microphones.
 pub(super) struct Listened {
@@ -43,8 +41,8 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
     let Some(files) = audio.texts("files")? else { return Ok(None) };
     let mut all = Vec::new();
     for name in files {
-        let path = inside(&header.folder, &header.file, "audio.files", name)?;
-        all.push(impacts_in(&path, microphones.as_deref(), speed, rig)?);
+        let file = header.named_file(&header.file, "audio.files", name)?;
+        all.push(impacts_in(&file, microphones.as_deref(), speed, rig)?);
     }
     let strays = take_out(&mut all);
     let all: Vec<Vec<Impact>> = all.into_iter().map(|run| run.impacts).collect();
@@ -57,13 +55,13 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
 
 /// The impacts in a file, in the order of time.
 fn impacts_in(
-    path: &Path,
+    file: &NamedFile,
     microphones: Option<&[[f64; 3]]>,
     speed_m_s: f64,
     rig: &Rig,
 ) -> Result<Run, ReadError> {
-    let open = |why: String| ReadError::Open { file: path.display().to_string(), why };
-    let sound = Sound::read(path).map_err(|e| open(e.fault.to_string()))?;
+    let open = |why: String| ReadError::Open { file: file.file.clone(), why };
+    let sound = Sound::from_bytes(&file.bytes).map_err(|e| open(e.to_string()))?;
     let settings = HearSettings::default();
     let found = match microphones {
         Some(places) => hear(&sound, places, speed_m_s, &settings),
@@ -76,7 +74,7 @@ fn impacts_in(
     let fewest = rig.fewest();
     if impacts.len() < fewest {
         return Err(ReadError::TooFewRows {
-            file: path.display().to_string(),
+            file: file.file.clone(),
             what: "the sound".into(),
             got: impacts.len(),
             expected: format!("at least {fewest} impacts"),

@@ -64,27 +64,42 @@ pub fn read_answer(line: &str, id: u64, channels: &[String], out: &mut [f64]) ->
             let got = if names.is_empty() { "none".into() } else { names.join(", ") };
             return fatal(format!("the simulator answered the channels {}, expected {name}", brief(&got)));
         };
-        if values.len() != rows {
-            return fatal(format!(
-                "the simulator answered {} values of {name}, expected {rows}, one for each row",
-                values.len()
-            ));
-        }
-        for (row, (out, value)) in out.iter_mut().zip(values).enumerate() {
-            *out = match value {
-                Some(value) if value.abs() <= LARGEST_PREDICTION => *value,
-                Some(value) if value.is_finite() => {
-                    return Err(Failure::NoPrediction(format!(
-                        "the simulator answered {value:e} for {name} at row {row}, expected at most {LARGEST_PREDICTION:e}"
-                    )));
-                }
-                _ => {
-                    return Err(Failure::NoPrediction(format!(
-                        "the simulator answered no finite number for {name} at row {row}"
-                    )));
-                }
-            };
-        }
+        fill(name, values.iter().copied(), out)?;
+    }
+    Ok(())
+}
+
+/// Takes over what a simulator answered for a channel; `None` is no number.
+///
+/// # Errors
+/// [`Failure::NoPrediction`] where a number is not finite or above [`LARGEST_PREDICTION`]; [`Failure::Fatal`] where they are not as many
+/// as there are rows.
+pub fn fill(
+    name: &str,
+    values: impl ExactSizeIterator<Item = Option<f64>>,
+    out: &mut [f64],
+) -> Result<(), Failure> {
+    if values.len() != out.len() {
+        return Err(Failure::Fatal(format!(
+            "the simulator answered {} values of {name}, expected {}, one for each row",
+            values.len(),
+            out.len()
+        )));
+    }
+    for (row, (out, value)) in out.iter_mut().zip(values).enumerate() {
+        *out = match value {
+            Some(value) if value.abs() <= LARGEST_PREDICTION => value,
+            Some(value) if value.is_finite() => {
+                return Err(Failure::NoPrediction(format!(
+                    "the simulator answered {value:e} for {name} at row {row}, expected at most {LARGEST_PREDICTION:e}"
+                )));
+            }
+            _ => {
+                return Err(Failure::NoPrediction(format!(
+                    "the simulator answered no finite number for {name} at row {row}"
+                )));
+            }
+        };
     }
     Ok(())
 }

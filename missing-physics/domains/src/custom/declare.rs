@@ -20,7 +20,7 @@ pub(super) fn program(header: &Header) -> Result<(Option<Start>, f64), ReadError
     }
     let start = command.map(|command| Start {
         command: command.into_iter().map(str::to_owned).collect(),
-        folder: header.folder.clone(),
+        folder: header.source.working_folder().into(),
         limit: Duration::from_secs_f64(limit),
         processes: processes as usize,
     });

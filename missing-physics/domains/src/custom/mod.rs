@@ -4,9 +4,11 @@ mod answer;
 mod declare;
 mod model;
 mod process;
+mod simulator;
 mod terms;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Experiment, Quantity, Scope, Spec, SpecBuilder};
@@ -14,11 +16,12 @@ use missing_physics::model::{Experiment, Quantity, Scope, Spec, SpecBuilder};
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
 use crate::plausible;
 use crate::reading::{calibration, check_runs, number, resolution};
-use crate::recording::{Column, Header, ReadError, Table, quoted};
-pub use answer::{Failure, read_answer};
+use crate::recording::{Column, Header, ReadError, Source, Table, quoted};
+pub use answer::{Failure, fill, read_answer};
 use model::{CustomModel, Program, Simulation};
 use process::Pool;
 pub use process::end_all;
+pub use simulator::{Questions, Simulator};
 use terms::Sizes;
 
 /// A run with fewer rows says nothing of a curve.
@@ -77,77 +80,90 @@ impl Domain for Custom {
     }
 
     fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
-        let inputs = quantities(header, "input")?;
-        let channels = quantities(header, "channel")?;
-        let (program, relative_step) = declare::program(header)?;
-        let mut b = SpecBuilder::default();
-        let parameters = declare::declare(header, &mut b)?;
-        b.baseline(header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE));
-        let channel_names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
-        let calibration = calibration(header, &channel_names)?;
-
-        let simulated: Vec<String> = channels.iter().map(|c| format!("sim_{}", c.name)).collect();
-        let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
-        known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
-        known.extend(channels.iter().map(|q| number(&q.name, "a measured channel")));
-        if program.is_none() {
-            known.extend(simulated.iter().map(|n| number(n, "the simulation's prediction of a channel")));
-        }
-        let table = header.table("data", &known)?;
-        let runs = runs(&table, &inputs, &channels)?;
-        let rises = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
-        let along = runs.iter().all(rises);
-        let sizes = |quantities: &[Quantity], column: fn(&Run, usize) -> &[f64]| -> Vec<(Quantity, f64)> {
-            let size = |k| root_mean_square(runs.iter().flat_map(|r| column(r, k).iter().copied()));
-            quantities.iter().enumerate().map(|(k, q)| (q.clone(), size(k))).collect()
-        };
-        let extent = || {
-            let spans = runs.iter().map(|r| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0][0]);
-            spans.fold(0.0, f64::max)
-        };
-        let terms = terms::add(
-            &mut b,
-            &Sizes {
-                inputs: &sizes(&inputs, |run, k| &run.inputs[k]),
-                channels: &sizes(&channels, |run, k| &run.outputs[k]),
-                extent: along.then(extent),
-            },
-        );
-        let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
-        let simulation = match program {
-            Some(start) => {
-                let pool = Pool::new(start);
-                Simulation::Program(Box::new(Program::new(
-                    pool,
-                    &inputs,
-                    &channels,
-                    parameters,
-                    relative_step,
-                )))
-            }
-            None if !parameters.is_empty() => {
-                let expected = "a program, for the parameters and mechanisms that are declared";
-                return Err(header.section("simulator")?.unfit("command", "absent", expected));
-            }
-            None => Simulation::Precomputed(precomputed(&table, &simulated)?),
-        };
-        let resolution = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution)).collect();
-        let columns = channels.iter().chain(&inputs);
-        let largest =
-            |name: &str| table.numbers(name).unwrap_or_default().iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        let hints = plausible::angles(columns.map(|q| (q.name.as_str(), largest(&q.name))));
-        let recording = Recording {
-            channels,
-            variables: inputs,
-            runs,
-            noise_along: along.then_some(0),
-            calibration,
-            resolution,
-        };
-        let model = CustomModel { spec: b.build_unchecked(), simulation, terms, relative_step };
-        let loaded = Loaded::new(recording, model, experiments, Vec::new());
-        Ok(CheckedRecording::from(loaded).with_hints(hints))
+        read(header, None)
     }
+}
+
+/// Reads a recording whose header names no program, and which `simulator` predicts: what a `command` does, done within the program.
+///
+/// With `gaps`, cells of the table may be empty where nothing was measured: what is to be predicted.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn load_with(source: &Source, simulator: Arc<dyn Simulator>, gaps: bool) -> Result<Loaded, ReadError> {
+    let header = if gaps { Header::read_with_gaps(source) } else { Header::read(source) }?;
+    let checked = read(&header, Some(simulator))?;
+    header.finish()?;
+    checked.prepare()
+}
+
+/// Reads the recording of a header; `within` predicts it in place of a program that the header names.
+fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRecording, ReadError> {
+    let inputs = quantities(header, "input")?;
+    let channels = quantities(header, "channel")?;
+    let (start, relative_step) = declare::program(header)?;
+    let program = within.or_else(|| start.map(|start| -> Arc<dyn Simulator> { Arc::new(Pool::new(start)) }));
+    let mut b = SpecBuilder::default();
+    let parameters = declare::declare(header, &mut b)?;
+    b.baseline(header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE));
+    let channel_names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
+    let calibration = calibration(header, &channel_names)?;
+
+    let simulated: Vec<String> = channels.iter().map(|c| format!("sim_{}", c.name)).collect();
+    let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
+    known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
+    known.extend(channels.iter().map(|q| number(&q.name, "a measured channel")));
+    if program.is_none() {
+        known.extend(simulated.iter().map(|n| number(n, "the simulation's prediction of a channel")));
+    }
+    let table = header.table("data", &known)?;
+    let runs = runs(&table, &inputs, &channels)?;
+    let rises = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
+    let along = runs.iter().all(rises);
+    let sizes = |quantities: &[Quantity], column: fn(&Run, usize) -> &[f64]| -> Vec<(Quantity, f64)> {
+        let size = |k| root_mean_square(runs.iter().flat_map(|r| column(r, k).iter().copied()));
+        quantities.iter().enumerate().map(|(k, q)| (q.clone(), size(k))).collect()
+    };
+    let extent = || {
+        let spans = runs.iter().map(|r| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0][0]);
+        spans.fold(0.0, f64::max)
+    };
+    let terms = terms::add(
+        &mut b,
+        &Sizes {
+            inputs: &sizes(&inputs, |run, k| &run.inputs[k]),
+            channels: &sizes(&channels, |run, k| &run.outputs[k]),
+            extent: along.then(extent),
+        },
+    );
+    let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
+    let simulation = match program {
+        Some(simulator) => {
+            let program = Program::new(simulator, &inputs, &channels, parameters, relative_step);
+            Simulation::Program(Box::new(program))
+        }
+        None if !parameters.is_empty() => {
+            let expected = "a program, for the parameters and mechanisms that are declared";
+            return Err(header.section("simulator")?.unfit("command", "absent", expected));
+        }
+        None => Simulation::Precomputed(precomputed(&table, &simulated)?),
+    };
+    let resolution = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution)).collect();
+    let columns = channels.iter().chain(&inputs);
+    let largest =
+        |name: &str| table.numbers(name).unwrap_or_default().iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let hints = plausible::angles(columns.map(|q| (q.name.as_str(), largest(&q.name))));
+    let recording = Recording {
+        channels,
+        variables: inputs,
+        runs,
+        noise_along: along.then_some(0),
+        calibration,
+        resolution,
+    };
+    let model = CustomModel { spec: b.build_unchecked(), simulation, terms, relative_step };
+    let loaded = Loaded::new(recording, model, experiments, Vec::new());
+    Ok(CheckedRecording::from(loaded).with_hints(hints))
 }
 
 /// The declared inputs or channels.

@@ -6,10 +6,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use missing_physics::data::Run;
-use missing_physics::model::{Extensions, ExternalProgram, Model, PredictError, Quantity, Scope, Spec};
+use missing_physics::model::{
+    Extensions, ExternalProgram, Model, PredictError, Quantity, Scope, Spec, difference_points,
+    finite_differences,
+};
 
 use super::answer::Failure;
-use super::process::Pool;
+use super::simulator::{Questions, Simulator};
 use super::terms::Candidate;
 use crate::memo::{Memo, bits};
 
@@ -24,7 +27,7 @@ const BEYOND_STEP: f64 = 1e-3;
 pub(super) enum Simulation {
     /// They were made before: all channels of each run.
     Precomputed(HashMap<String, Vec<f64>>),
-    /// A program is asked.
+    /// A simulator is asked.
     Program(Box<Program>),
 }
 
@@ -34,10 +37,10 @@ pub(super) type Names = Vec<(String, Scope, usize)>;
 /// A question: label and fingerprint of the run, its rows, and the bits of the parameters.
 type Asked = (String, u64, usize, Vec<u64>);
 
-/// A program that predicts.
+/// A simulator that predicts.
 #[derive(Debug)]
 pub(super) struct Program {
-    pool: Pool,
+    simulator: Arc<dyn Simulator>,
     /// Names of the inputs, as the program gets them.
     inputs: Vec<String>,
     /// Names of the channels, as the program answers them.
@@ -61,9 +64,9 @@ pub(super) struct CustomModel {
 }
 
 impl Program {
-    /// A program that is started when it is first asked.
+    /// A simulator that was not asked yet.
     pub(super) fn new(
-        pool: Pool,
+        simulator: Arc<dyn Simulator>,
         inputs: &[Quantity],
         channels: &[Quantity],
         parameters: Names,
@@ -72,7 +75,7 @@ impl Program {
         let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.clone()).collect();
         let (inputs, channels) = (names(inputs), names(channels));
         Self {
-            pool,
+            simulator,
             inputs,
             channels,
             parameters,
@@ -89,27 +92,61 @@ impl Program {
         nuisance: &[f64],
         rows: usize,
     ) -> Result<Arc<Vec<f64>>, Failure> {
+        let values = self.values(shared, nuisance);
+        self.predictions.get_or(asked(run, hash(&run.inputs), rows, &values), rows, || {
+            let set = [values];
+            let mut first = self.ask(run, rows, &set)?;
+            if !self.asked_twice.swap(true, Ordering::SeqCst) {
+                let second = self.ask(run, rows, &set)?;
+                self.same(&first[0], &second[0]).map_err(|why| self.simulator.give_up(why))?;
+            }
+            Ok(Arc::new(first.swap_remove(0)))
+        })
+    }
+
+    /// Asks at once for what is not remembered of some sets of parameters.
+    fn foresee(&self, run: &Run, rows: usize, points: &[(&[f64], &[f64])]) -> Result<(), Failure> {
+        let key = hash(&run.inputs);
+        let sets = points.iter().map(|(shared, nuisance)| self.values(shared, nuisance));
+        let unknown = |set: &Vec<f64>| !self.predictions.knows(&asked(run, key, rows, set));
+        let sets: Vec<Vec<f64>> = sets.filter(unknown).collect();
+        if sets.len() < 2 {
+            return Ok(());
+        }
+        for (set, out) in sets.iter().zip(self.ask(run, rows, &sets)?) {
+            self.predictions.get_or(asked(run, key, rows, set), rows, || Ok::<_, Failure>(Arc::new(out)))?;
+        }
+        Ok(())
+    }
+
+    /// The parameters' values in the order of their names.
+    fn values(&self, shared: &[f64], nuisance: &[f64]) -> Vec<f64> {
         let value = |(_, scope, slot): &(String, Scope, usize)| match scope {
             Scope::Shared => shared[*slot],
             Scope::PerRun => nuisance[*slot],
         };
-        let values: Vec<f64> = self.parameters.iter().map(value).collect();
-        let asked = (run.label.clone(), hash(&run.inputs), rows, bits(&values));
-        self.predictions.get_or(asked, rows, || {
-            let ask = || {
-                let names = self.parameters.iter().map(|(name, ..)| name.as_str());
-                let parameters = names.zip(values.iter().copied()).collect();
-                let columns = run.inputs.iter().map(Vec::as_slice);
-                let inputs = self.inputs.iter().map(String::as_str).zip(columns).collect();
-                let mut out = vec![0.0; rows];
-                self.pool.predict(&run.label, parameters, inputs, &self.channels, &mut out).map(|()| out)
-            };
-            let out = ask()?;
-            if !self.asked_twice.swap(true, Ordering::SeqCst) {
-                self.same(&out, &ask()?).map_err(|why| self.pool.give_up(why))?;
-            }
-            Ok(Arc::new(out))
-        })
+        self.parameters.iter().map(value).collect()
+    }
+
+    /// As many answers as there are sets, each with all rows of all channels.
+    fn ask(&self, run: &Run, rows: usize, sets: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Failure> {
+        let names: Vec<&str> = self.parameters.iter().map(|(name, ..)| name.as_str()).collect();
+        let columns = run.inputs.iter().map(Vec::as_slice);
+        let inputs: Vec<(&str, &[f64])> = self.inputs.iter().map(String::as_str).zip(columns).collect();
+        let answers = self.simulator.predict(&Questions {
+            run: &run.label,
+            parameters: &names,
+            sets,
+            inputs: &inputs,
+            channels: &self.channels,
+            rows: rows / self.channels.len().max(1),
+        })?;
+        if answers.len() == sets.len() && answers.iter().all(|answer| answer.len() == rows) {
+            return Ok(answers);
+        }
+        let (got, expected) = (answers.len(), sets.len());
+        let why = format!("the simulator gave {got} answers, expected {expected} of {rows} numbers each");
+        Err(self.simulator.give_up(why))
     }
 
     /// Two answers to one question are one; or how they differ.
@@ -129,6 +166,10 @@ impl Program {
         }
         Ok(())
     }
+}
+
+fn asked(run: &Run, inputs: u64, rows: usize, values: &[f64]) -> Asked {
+    (run.label.clone(), inputs, rows, bits(values))
 }
 
 /// Tells a run's inputs from another's that has its label.
@@ -174,6 +215,30 @@ impl Model for CustomModel {
         self.relative_step
     }
 
+    fn jacobian(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        shared_free: &[usize],
+        nuisance_free: &[usize],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), PredictError> {
+        if let Simulation::Program(program) = &self.simulation
+            && program.simulator.batches()
+        {
+            let pairs = difference_points(self, shared, nuisance, shared_free, nuisance_free);
+            let mut points = vec![(shared, nuisance)];
+            points.extend(
+                pairs.iter().flat_map(|p| [&p.high, &p.low]).map(|(s, n)| (s.as_slice(), n.as_slice())),
+            );
+            // What cannot be foreseen is asked for one by one, and fails there.
+            let _ = program.foresee(run, out.len(), &points);
+        }
+        finite_differences(self, run, shared, nuisance, shared_free, nuisance_free, out, jacobian)
+    }
+
     fn extensions(&self) -> Extensions<'_> {
         Extensions { program: Some(self), ..Extensions::default() }
     }
@@ -184,7 +249,7 @@ impl ExternalProgram for CustomModel {
         match &self.simulation {
             Simulation::Precomputed(_) => None,
             Simulation::Program(program) => {
-                program.pool.fault().map(|reason| PredictError { run: "(any)".into(), reason })
+                program.simulator.fault().map(|reason| PredictError { run: "(any)".into(), reason })
             }
         }
     }

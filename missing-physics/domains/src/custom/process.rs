@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::answer::{Failure, read_answer};
+use super::simulator::{Questions, Simulator};
 use crate::recording::quoted;
 
 /// The longest line that a simulator may answer, bytes.
@@ -66,13 +67,8 @@ impl Pool {
         Self { start, state: Mutex::default(), freed: Condvar::new() }
     }
 
-    /// Why no simulator answers any more.
-    pub(super) fn fault(&self) -> Option<String> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).fault.clone()
-    }
-
     /// Predicts `channels` of a run, one after the other into `out`.
-    pub(super) fn predict(
+    fn ask(
         &self,
         run: &str,
         parameters: BTreeMap<&str, f64>,
@@ -112,15 +108,6 @@ impl Pool {
         answer
     }
 
-    /// No simulator is asked any more, for this reason.
-    pub(super) fn give_up(&self, why: String) -> Failure {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let why = state.fault.get_or_insert(why).clone();
-        drop(state);
-        self.freed.notify_all();
-        Failure::Fatal(why)
-    }
-
     /// A simulator that is idle, or a new one, or the first to be free; with the number of the question.
     fn take(&self) -> Result<(Process, u64), Failure> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -148,6 +135,30 @@ impl Pool {
             }
             state = self.freed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
+    }
+}
+
+impl Simulator for Pool {
+    fn predict(&self, questions: &Questions<'_>) -> Result<Vec<Vec<f64>>, Failure> {
+        let Questions { run, parameters, sets, inputs, channels, rows } = *questions;
+        let answer = |values: &Vec<f64>| {
+            let parameters = parameters.iter().copied().zip(values.iter().copied()).collect();
+            let mut out = vec![0.0; rows * channels.len()];
+            self.ask(run, parameters, inputs.iter().copied().collect(), channels, &mut out).map(|()| out)
+        };
+        sets.iter().map(answer).collect()
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).fault.clone()
+    }
+
+    fn give_up(&self, why: String) -> Failure {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let why = state.fault.get_or_insert(why).clone();
+        drop(state);
+        self.freed.notify_all();
+        Failure::Fatal(why)
     }
 }
 
@@ -351,7 +362,7 @@ mod tests {
         for _ in 0..16 {
             let (pool, done) = (Arc::clone(&pool), done.clone());
             std::thread::spawn(move || {
-                let asked = pool.predict("a", BTreeMap::new(), BTreeMap::new(), &[], &mut []);
+                let asked = pool.ask("a", BTreeMap::new(), BTreeMap::new(), &[], &mut []);
                 let _ = done.send(asked);
             });
         }

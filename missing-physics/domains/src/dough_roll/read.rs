@@ -5,7 +5,7 @@ use dough_mbrl::roll::Roll;
 
 use super::rolls::{CHANNELS, RunOfRolls, Step};
 use crate::reading::{check_runs, number};
-use crate::recording::{Column, Header, ReadError, Table, inside};
+use crate::recording::{Column, Header, ReadError, Table};
 
 pub(super) const COLUMNS: [Column; 11] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -64,8 +64,7 @@ pub(super) fn read(header: &Header) -> Result<Read, ReadError> {
     let (mut runs, timed) = rolls(&table)?;
     let (training, training_file) = match rig.optional_text("training", "the name of a CSV file")? {
         Some(name) => {
-            let table =
-                Table::read(&inside(&header.folder, &header.file, "rig.training", name)?, &COLUMNS, false)?;
+            let table = header.named_table("rig.training", name, &COLUMNS, false)?;
             (rolls(&table)?.0, table.file)
         }
         None => {

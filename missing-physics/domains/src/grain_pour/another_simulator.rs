@@ -16,7 +16,7 @@ use super::campaign::{BUNDLED_RIG, Campaign};
 use super::law::statistics_of;
 use super::model::PourModel;
 use super::read::{Picture, Read, read};
-use crate::recording::Header;
+use crate::recording::{Header, Source};
 
 /// A recording's statistics less the emulator's, in sigmas, picture by picture: at the truth, and at the likeliest baseline.
 struct Distance {
@@ -69,7 +69,7 @@ fn truth(key: &serde_json::Value, campaign: &Campaign, aside: [f64; 2]) -> Optio
 
 fn distance(folder: &Path) -> Result<Distance, Box<dyn std::error::Error>> {
     let key: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("key.json"))?)?;
-    let read = read(&Header::read(folder)?)?;
+    let read = read(&Header::read(&Source::folder(folder))?)?;
     let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m).collect();
     let campaign = Campaign::of(&read.rig, read.heights_m())?;
     let model = PourModel::new(&campaign, &read)?;

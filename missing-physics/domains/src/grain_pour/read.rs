@@ -1,14 +1,13 @@
 //! What the files of a recording say: the rig, the camera, the pictures.
 
 use std::f64::consts::PI;
-use std::path::Path;
 
 use granular_infer::camera::Camera;
 use granular_infer::campaign::Rig;
 use granular_infer::seeing::HeightMap;
 
 use crate::reading::{check_runs, number};
-use crate::recording::{Column, Header, ReadError, Table, inside, one_line, quoted, read_bytes};
+use crate::recording::{Column, Header, NamedFile, ReadError, Table, one_line, quoted};
 
 pub(super) const COLUMNS: [Column; 3] = [
     Column { name: "run", what: "label of the run", label: true },
@@ -71,12 +70,12 @@ pub(super) fn read(header: &Header) -> Result<Read, ReadError> {
         if !(heights[row] > 0.0 && heights[row] < 10.0) {
             return Err(table.cell(row, "funnel_height_m", heights[row], "above 0 and below 10"));
         }
-        let path = inside(&header.folder, &table.file, "depth_image", &images[row])?;
-        let (size, counts) = depth_image(&path)?;
+        let image = header.named_file(&table.file, "depth_image", &images[row])?;
+        let (size, counts) = depth_image(&image)?;
         if camera.size_px == [0, 0] {
             camera.size_px = size;
         }
-        let unfit = |why: String| ReadError::Open { file: path.display().to_string(), why };
+        let unfit = |why: String| ReadError::Open { file: image.file.clone(), why };
         if size != camera.size_px {
             let [w, h] = camera.size_px;
             let why = format!("{} x {} pixels, expected {w} x {h} as in the first picture", size[0], size[1]);
@@ -138,13 +137,12 @@ fn rig(header: &Header) -> Result<Rig, ReadError> {
 ///
 /// # Errors
 /// [`ReadError::Open`] for what is not one.
-fn depth_image(path: &Path) -> Result<([usize; 2], Vec<u16>), ReadError> {
+fn depth_image(image: &NamedFile) -> Result<([usize; 2], Vec<u16>), ReadError> {
     /// The largest picture in pixels.
     const MOST_PIXELS: usize = 1 << 24;
-    let bytes = read_bytes(path)?;
-    let unfit = |why: String| ReadError::Open { file: path.display().to_string(), why };
+    let unfit = |why: String| ReadError::Open { file: image.file.clone(), why };
     let broken = |e: png::DecodingError| unfit(format!("not a sound PNG: {}", one_line(&e.to_string())));
-    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().map_err(broken)?;
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&image.bytes)).read_info().map_err(broken)?;
     let info = reader.info();
     if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Grayscale) {
         let why = format!("{:?} bits, {:?}, expected 16-bit greyscale", info.bit_depth, info.color_type);

@@ -14,7 +14,7 @@ use missing_physics::model::{Model, Quantity, Spec};
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
 use crate::plausible;
 use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
-use crate::recording::{Column, Header, ReadError, Section, Table, inside, quoted, read_bytes};
+use crate::recording::{Column, Header, ReadError, Section, Table, quoted};
 pub use model::LiquidTiltModel;
 pub use setup::{Setup, Vessel};
 
@@ -161,8 +161,7 @@ fn vessel(header: &Header, rig: &Section<'_>) -> Result<Vessel, ReadError> {
         }
         "mesh" => {
             let name = container.text("file", "the name of an STL or OBJ file")?;
-            let path = inside(&header.folder, &header.file, "rig.container.file", name)?;
-            let bytes = read_bytes(&path)?;
+            let bytes = header.named_file(&header.file, "rig.container.file", name)?.bytes;
             let place = nalgebra::Isometry3::identity();
             let mesh = if name.to_ascii_lowercase().ends_with(".obj") {
                 MeshContainer::from_obj(&bytes, 1.0, &place)

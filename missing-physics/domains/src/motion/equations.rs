@@ -1,13 +1,11 @@
 //! The equations of motion as a recording states them.
 
-use std::path::Path;
-
 use joint_laws::signal::Between;
 
 use super::expression::Expression;
 use super::tape::Tape;
 use super::units;
-use crate::recording::{Header, ReadError, Section, quoted};
+use crate::recording::{Header, Memory, ReadError, Section, Source, quoted};
 
 /// A state and its derivative.
 #[derive(Debug, Clone)]
@@ -172,7 +170,8 @@ impl Equations {
 
     /// A machine with one of everything, to list what the domain knows.
     pub(super) fn example() -> Self {
-        let header = Header::parse(Path::new(""), "an example".into(), include_str!("example.toml"), false);
+        let header =
+            Header::parse(Source::Memory(Memory::new("an example")), include_str!("example.toml"), false);
         // The text is the crate's own; a test reads it.
         header.and_then(|h| Self::read(&h)).unwrap_or(Self {
             states: Vec::new(),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::{LARGEST_FILE, ReadError};
+use super::source::HEADER;
 use super::words::{one_line, quoted};
 
 /// Reads a file of limited size.
@@ -27,9 +28,13 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 /// # Errors
 /// [`ReadError::Open`], [`ReadError::TooLarge`], [`ReadError::NotText`].
 pub fn read_text(path: &Path) -> Result<String, ReadError> {
-    let file = one_line(&path.display().to_string());
-    let text = String::from_utf8(read_bytes(path)?)
-        .map_err(|e| ReadError::NotText { file: file.clone(), at: e.utf8_error().valid_up_to() })?;
+    text_of(one_line(&path.display().to_string()), read_bytes(path)?)
+}
+
+/// The bytes of a file as text, without the mark that it is UTF-8.
+pub(super) fn text_of(file: String, bytes: Vec<u8>) -> Result<String, ReadError> {
+    let text = String::from_utf8(bytes)
+        .map_err(|e| ReadError::NotText { file, at: e.utf8_error().valid_up_to() })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
@@ -42,29 +47,27 @@ fn plain(error: &std::io::Error) -> String {
     }
 }
 
-/// The file that a recording names: it must lie in the recording's own folder.
+/// Checks the name of a file that a recording names: it must lie in the recording's own folder.
 ///
 /// # Errors
 /// [`ReadError::Value`] for a path that is absolute or leads out of the folder.
-pub fn inside(folder: &Path, file: &str, key: &str, name: &str) -> Result<PathBuf, ReadError> {
+pub(super) fn within(file: &str, key: &str, name: &str) -> Result<(), ReadError> {
     use std::path::Component;
-    let path = Path::new(name);
-    let within =
-        !name.is_empty() && path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if !within {
-        return Err(ReadError::Value {
-            file: file.into(),
-            key: key.into(),
-            got: quoted(name),
-            expected: "a file in the recording's folder".into(),
-        });
+    let mut components = Path::new(name).components();
+    if !name.is_empty() && components.all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
+        return Ok(());
     }
-    Ok(folder.join(path))
+    Err(ReadError::Value {
+        file: file.into(),
+        key: key.into(),
+        got: quoted(name),
+        expected: "a file in the recording's folder".into(),
+    })
 }
 
 /// The program that a recording starts, with its arguments, where it names one.
 pub fn program_of(folder: &Path) -> Option<Vec<String>> {
-    let table = read_text(&folder.join("recording.toml")).ok()?.parse::<toml::Table>().ok()?;
+    let table = read_text(&folder.join(HEADER)).ok()?.parse::<toml::Table>().ok()?;
     let command = table.get("simulator")?.get("command")?.as_array()?;
     Some(command.iter().filter_map(|word| word.as_str().map(str::to_owned)).collect())
 }
@@ -81,7 +84,7 @@ pub fn files_of(folder: &Path) -> Vec<PathBuf> {
             _ => {}
         }
     }
-    let header = folder.join("recording.toml");
+    let header = folder.join(HEADER);
     let mut names = Vec::new();
     if let Some(table) = read_text(&header).ok().and_then(|text| text.parse::<toml::Table>().ok()) {
         table.values().for_each(|value| texts(value, &mut names));

@@ -2,12 +2,12 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
 use super::error::ReadError;
-use super::files::{inside, read_text};
+use super::files::within;
+use super::source::{HEADER, NamedFile, Source};
 use super::table::{self, Column, ColumnContents};
 use super::words::{one_line, quoted};
 
@@ -17,8 +17,8 @@ pub const PLACEHOLDER: &str = "placeholder";
 /// A parsed `recording.toml`.
 #[derive(Debug)]
 pub struct Header {
-    /// The folder.
-    pub folder: PathBuf,
+    /// Where the recording's files are.
+    pub source: Source,
     /// The file, as errors name it.
     pub file: String,
     /// Whether a cell of a number may be empty: a row that was not measured.
@@ -40,32 +40,32 @@ pub struct Section<'a> {
 }
 
 impl Header {
-    /// Reads the header of a recording's folder and checks `format`.
+    /// Reads a recording's header and checks `format`.
     ///
     /// # Errors
     /// [`ReadError`] where the file is missing, is not TOML, or is of another format.
-    pub fn read(folder: &Path) -> Result<Self, ReadError> {
-        Self::read_with(folder, false)
+    pub fn read(source: &Source) -> Result<Self, ReadError> {
+        Self::read_with(source, false)
     }
 
     /// Reads the header of a recording in whose tables cells may be empty, where nothing was measured.
     ///
     /// # Errors
     /// As [`Header::read`].
-    pub fn read_with_gaps(folder: &Path) -> Result<Self, ReadError> {
-        Self::read_with(folder, true)
+    pub fn read_with_gaps(source: &Source) -> Result<Self, ReadError> {
+        Self::read_with(source, true)
     }
 
-    fn read_with(folder: &Path, gaps: bool) -> Result<Self, ReadError> {
-        let path = folder.join("recording.toml");
-        Self::parse(folder, path.display().to_string(), &read_text(&path)?, gaps)
+    fn read_with(source: &Source, gaps: bool) -> Result<Self, ReadError> {
+        Self::parse(source.clone(), &source.text(HEADER)?, gaps)
     }
 
-    /// Parses the text of a header of a folder; errors name it `file`.
+    /// Parses the text of a source's header.
     ///
     /// # Errors
     /// As [`Header::read`].
-    pub(crate) fn parse(folder: &Path, file: String, text: &str, gaps: bool) -> Result<Self, ReadError> {
+    pub(crate) fn parse(source: Source, text: &str, gaps: bool) -> Result<Self, ReadError> {
+        let file = source.shown(HEADER);
         let root: Table = text.parse().map_err(|e: toml::de::Error| {
             let at = e.span().map_or(0, |s| s.start.min(text.len()));
             let row = text.as_bytes()[..at].iter().filter(|b| **b == b'\n').count() + 1;
@@ -73,7 +73,7 @@ impl Header {
         })?;
         let placeholders = placeholders(text);
         let (asked, columns) = (RefCell::default(), RefCell::default());
-        let header = Self { folder: folder.into(), file, gaps, root, asked, placeholders, columns };
+        let header = Self { source, file, gaps, root, asked, placeholders, columns };
         match header.root().value("format") {
             Some(Value::Integer(1)) => Ok(header),
             Some(other) => Err(header.wrong("format", other, "1")),
@@ -106,11 +106,34 @@ impl Header {
         known: &[Column<'c>],
         gaps: bool,
     ) -> Result<table::Table<'c>, ReadError> {
-        let table = table::Table::read(&inside(&self.folder, &self.file, key, name)?, known, gaps)?;
+        let table = self.named_table(key, name, known, gaps)?;
         if key == "data" {
             *self.columns.borrow_mut() = table.contents();
         }
         Ok(table)
+    }
+
+    /// The table of a name that a key holds.
+    ///
+    /// # Errors
+    /// As [`Header::table`].
+    pub fn named_table<'c>(
+        &self,
+        key: &str,
+        name: &str,
+        known: &[Column<'c>],
+        gaps: bool,
+    ) -> Result<super::Table<'c>, ReadError> {
+        within(&self.file, key, name)?;
+        table::Table::read(self.source.shown(name), self.source.sheet(name)?, known, gaps)
+    }
+
+    /// The file of a name that a key holds, or a cell of the table `asked_by`.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`] where it is not in the recording's folder; [`ReadError::Open`], [`ReadError::TooLarge`].
+    pub fn named_file(&self, asked_by: &str, key: &str, name: &str) -> Result<NamedFile, ReadError> {
+        self.source.named(asked_by, key, name)
     }
 
     /// What the columns of numbers of the recording's table hold, once it was read.

@@ -1,9 +1,7 @@
 //! CSV tables with named columns, read strictly.
 
-use std::path::Path;
-
-use super::error::{LARGEST_FILE, ReadError};
-use super::files::read_text;
+use super::error::ReadError;
+use super::source::Sheet;
 use super::words::{one_line, quoted, unit_of};
 
 /// Numbers beyond this are mistakes of unit or format.
@@ -53,14 +51,82 @@ pub struct Table<'a> {
     pub lines: Vec<u64>,
 }
 
+impl Values {
+    /// Number of cells.
+    fn len(&self) -> usize {
+        match self {
+            Self::Labels(labels) => labels.len(),
+            Self::Numbers(numbers) => numbers.len(),
+        }
+    }
+}
+
 impl<'a> Table<'a> {
     /// Reads a table whose columns are all among `known`; with `gaps` a cell of a number may be empty.
     ///
     /// # Errors
     /// [`ReadError`]: the first thing that is wrong, from the top.
-    pub fn read(path: &Path, known: &[Column<'a>], gaps: bool) -> Result<Self, ReadError> {
-        let file = path.display().to_string();
-        let text = read_text(path)?;
+    pub(super) fn read(
+        file: String,
+        sheet: Sheet,
+        known: &[Column<'a>],
+        gaps: bool,
+    ) -> Result<Self, ReadError> {
+        match sheet {
+            Sheet::Text(text) => Self::read_text(file, &text, known, gaps),
+            Sheet::Columns(columns) => Self::read_columns(file, &columns, known, gaps),
+        }
+    }
+
+    /// A table of columns that were never text: rows are counted from 1, and NaN is an empty cell.
+    fn read_columns(
+        file: String,
+        columns: &[(String, Values)],
+        known: &[Column<'a>],
+        gaps: bool,
+    ) -> Result<Self, ReadError> {
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        let chosen = choose(&file, names.into_iter(), known)?;
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        for ((_, values), column) in columns.iter().zip(&chosen) {
+            let wrong = |row: usize, got: String, expected: String| {
+                let (file, column) = (file.clone(), column.name.to_owned());
+                Err(ReadError::Cell { file, row: row as u64 + 1, column, got, expected })
+            };
+            if values.len() != rows {
+                let (got, expected) = (format!("{} cells in all", values.len()), rows.to_string());
+                return wrong(values.len().min(rows), got, expected);
+            }
+            match values {
+                Values::Labels(_) if !column.label => {
+                    return wrong(0, "a label".into(), format!("a number: {}", column.what));
+                }
+                Values::Numbers(_) if column.label => {
+                    return wrong(0, "a number".into(), "a label".into());
+                }
+                Values::Labels(labels) => {
+                    if let Some(row) = labels.iter().position(String::is_empty) {
+                        return wrong(row, "an empty cell".into(), "a label".into());
+                    }
+                }
+                Values::Numbers(numbers) => {
+                    let sound = |v: &f64| v.abs() <= LARGEST_NUMBER || (gaps && v.is_nan());
+                    if let Some(row) = numbers.iter().position(|v| !sound(v)) {
+                        let v = numbers[row];
+                        let bound = format!("{} of at most 1e12", column.what);
+                        let expected =
+                            if v.is_finite() { bound } else { format!("a number: {}", column.what) };
+                        return wrong(row, quoted(&v.to_string()), expected);
+                    }
+                }
+            }
+        }
+        let (names, lines) = (chosen.iter().map(|c| c.name).collect(), (1..=rows as u64).collect());
+        let columns = columns.iter().map(|(_, values)| values.clone()).collect();
+        Ok(Self { file, names, columns, lines })
+    }
+
+    fn read_text(file: String, text: &str, known: &[Column<'a>], gaps: bool) -> Result<Self, ReadError> {
         let mut reader =
             csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
         let mut record = csv::StringRecord::new();
@@ -73,21 +139,7 @@ impl<'a> Table<'a> {
         if !read(&mut reader, &mut record)? {
             return Err(ReadError::TooFewRows { file, what: "the file".into(), got: 0, expected: row });
         }
-        let mut chosen: Vec<Column<'a>> = Vec::with_capacity(record.len());
-        for name in &record {
-            let name = name.trim();
-            let Some(column) = known.iter().find(|c| c.name == name) else {
-                return Err(ReadError::UnknownColumn {
-                    file,
-                    column: quoted(name),
-                    expected: meant(name, known),
-                });
-            };
-            if chosen.iter().any(|c| c.name == name) {
-                return Err(ReadError::DuplicateColumn { file, column: name.into() });
-            }
-            chosen.push(*column);
-        }
+        let chosen = choose(&file, record.iter(), known)?;
         let mut columns: Vec<Values> = chosen
             .iter()
             .map(|c| if c.label { Values::Labels(Vec::new()) } else { Values::Numbers(Vec::new()) })
@@ -122,7 +174,6 @@ impl<'a> Table<'a> {
             }
             lines.push(line);
         }
-        debug_assert!(text.len() as u64 <= LARGEST_FILE);
         Ok(Self { file, names: chosen.iter().map(|c| c.name).collect(), columns, lines })
     }
 
@@ -189,6 +240,30 @@ impl<'a> Table<'a> {
         }
         runs
     }
+}
+
+/// The known columns that a table's names stand for.
+fn choose<'a, 'n>(
+    file: &str,
+    names: impl Iterator<Item = &'n str>,
+    known: &[Column<'a>],
+) -> Result<Vec<Column<'a>>, ReadError> {
+    let mut chosen: Vec<Column<'a>> = Vec::new();
+    for name in names {
+        let (file, name) = (file.to_owned(), name.trim());
+        let Some(column) = known.iter().find(|c| c.name == name) else {
+            return Err(ReadError::UnknownColumn {
+                file,
+                column: quoted(name),
+                expected: meant(name, known),
+            });
+        };
+        if chosen.iter().any(|c| c.name == name) {
+            return Err(ReadError::DuplicateColumn { file, column: name.into() });
+        }
+        chosen.push(*column);
+    }
+    Ok(chosen)
 }
 
 fn list(known: &[Column<'_>]) -> String {

@@ -14,5 +14,5 @@ pub use error::{LARGEST_PREDICTION, PredictError};
 pub use extensions::{
     ErrorModel, Extensions, ExternalProgram, JointLimits, LocalCauses, LocalUnknown, MultimodalModel,
 };
-pub use simulation::{Experiment, Model, finite_differences};
+pub use simulation::{Experiment, Model, Pair, difference_points, finite_differences};
 pub use spec::{Derived, DerivedPerRun, Mechanism, OfParameters, OfRun, Over, Parameter, Scope, Spec, Term};

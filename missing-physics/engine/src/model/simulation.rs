@@ -83,28 +83,56 @@ pub fn finite_differences<M: Model + ?Sized>(
     jacobian: &mut [f64],
 ) -> Result<(), PredictError> {
     model.predict(run, shared, nuisance, out)?;
-    let rows = out.len();
-    let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
-    let (mut above, mut below) = (vec![0.0; rows], vec![0.0; rows]);
+    let rows = out.len().max(1);
+    let (mut above, mut below) = (vec![0.0; out.len()], vec![0.0; out.len()]);
+    let pairs = difference_points(model, shared, nuisance, shared_free, nuisance_free);
+    for (Pair { high, low, step }, column) in pairs.iter().zip(jacobian.chunks_exact_mut(rows)) {
+        model.predict(run, &high.0, &high.1, &mut above)?;
+        model.predict(run, &low.0, &low.1, &mut below)?;
+        for ((d, a), b) in column.iter_mut().zip(&above).zip(&below) {
+            *d = (a - b) / step;
+        }
+    }
+    Ok(())
+}
+
+/// Two points whose difference stands for a derivative.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// Shared and nuisance parameters with one of them above its value.
+    pub high: (Vec<f64>, Vec<f64>),
+    /// The same with it below its value.
+    pub low: (Vec<f64>, Vec<f64>),
+    /// By how much it differs between the two.
+    pub step: f64,
+}
+
+/// The points at which [`finite_differences`] asks for predictions beside the parameters themselves, one pair a derivative: a simulator
+/// that answers many questions at once can be asked for all of them before.
+pub fn difference_points<M: Model + ?Sized>(
+    model: &M,
+    shared: &[f64],
+    nuisance: &[f64],
+    shared_free: &[usize],
+    nuisance_free: &[usize],
+) -> Vec<Pair> {
     let parameters = |scope| model.spec().parameters.iter().filter(move |p| p.scope == scope);
     let shared_info: Vec<_> = parameters(Scope::Shared).collect();
     let nuisance_info: Vec<_> = parameters(Scope::PerRun).collect();
     let free = shared_free.iter().map(|&s| (true, s)).chain(nuisance_free.iter().map(|&s| (false, s)));
-    for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(rows.max(1))) {
+    let pair = |(is_shared, slot): (bool, usize)| {
         let info = if is_shared { shared_info[slot] } else { nuisance_info[slot] };
         let value = if is_shared { shared[slot] } else { nuisance[slot] };
         let step = model.relative_step() * info.scale.max(1e-3 * value.abs());
         let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
-        for (x, out) in [(high, &mut above), (low, &mut below)] {
+        let at = |x: f64| {
+            let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
             *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = x;
-            model.predict(run, &shared, &nuisance, out)?;
-        }
-        *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = value;
-        for ((d, a), b) in column.iter_mut().zip(&above).zip(&below) {
-            *d = (a - b) / (high - low);
-        }
-    }
-    Ok(())
+            (shared, nuisance)
+        };
+        Pair { high: at(high), low: at(low), step: high - low }
+    };
+    free.map(pair).collect()
 }
 
 /// Something that the rig could do next, as the runs that it would record.
