@@ -5,7 +5,7 @@
 //! Woinowsky-Krieger 1959, section 97). How both depend on radius and stretch is empirical, so that the model interpolates and says nothing beyond
 //! its calibration.
 
-use hertz_contact::calibrated::{Calibrated, distinct};
+use hertz_contact::calibrated::Calibrated;
 use hertz_contact::law::{Law, Membrane};
 use nalgebra::{DMatrix, DVector};
 

@@ -105,7 +105,9 @@ mod tests {
     fn single_events_are_found_one_by_one() {
         let events = [("2".to_owned(), 3.0), ("5".to_owned(), 1.0)];
         let [one, other] = [located("bounce", 3.0, 3.0, &["2"]), located("bounce", 2.0, 2.0, &["5"])];
-        assert!(found_events(&events, &[one.clone(), other]) && found_events(&events, &[one.clone()]));
+        assert!(
+            found_events(&events, &[one.clone(), other]) && found_events(&events, std::slice::from_ref(&one))
+        );
         let wide = located("bounce", 1.0, 4.0, &["2"]);
         assert!(!found_events(&events, &[wide]) && !found_events(&events, &[]));
     }

@@ -10,14 +10,12 @@ use super::setup::{Axes, ROD};
 /// A step in speed (m/s) or place (m) at which the change of the acceleration is asked for.
 const STEP: f64 = 1e-3;
 
+/// A flight, the camera that sees it, and its states at the rows.
+type Followed = (Flight<f64>, Camera<f64>, Vec<State<f64>>);
+
 impl TrajectoryModel {
     /// The flight as it is without the force, and the camera.
-    fn followed(
-        &self,
-        run: &Run,
-        shared: &[f64],
-        nuisance: &[f64],
-    ) -> Result<(Flight<f64>, Camera<f64>, Vec<State<f64>>), PredictError> {
+    fn followed(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Followed, PredictError> {
         let (flight, camera, _) = self.effects(run, shared, &[]);
         let start = self.start(nuisance);
         let times = &run.inputs[0];

@@ -250,8 +250,7 @@ impl Kind {
             K::EndStop(j) => {
                 let [position, stiffness] = e.joints[j].stop.unwrap_or_default();
                 if let Some((name, _)) = outputs.iter().find(|o| o.1 == joints[j].position) {
-                    let variable = (*name).into();
-                    key.place = Some(Place { variable, from: position, to: f64::INFINITY });
+                    key.place = Some(Place::new(name, position, f64::INFINITY));
                 }
                 (of_joint("end-stop", j), vec![("position", position), ("stiffness", stiffness)])
             }
@@ -279,7 +278,7 @@ impl Kind {
             }
             K::Overflow => {
                 let height = e.level.overflow.unwrap_or_default();
-                key.place = Some(Place { variable: outputs[0].0.into(), from: height, to: f64::INFINITY });
+                key.place = Some(Place::new(outputs[0].0, height, f64::INFINITY));
                 ("overflow".into(), vec![("height", height)])
             }
             K::Leak => ("leak".into(), vec![("rate_per_s", e.level.leak_per_s)]),

@@ -127,15 +127,14 @@ impl Rig for Machine {
         };
         key.unlisted = Some(text);
         key.place = match what {
-            What::Push => Some(Place { variable: "t_s".into(), from: at - width, to: f64::INFINITY }),
+            What::Push => {
+                let label = (run + 1).to_string();
+                Some(Place::new("t_s", at - width, f64::INFINITY).in_runs([label]))
+            }
             What::Patch => {
                 let position = self.world.plant.joints().first().map_or(0, |joint| joint.position);
                 let output = self.world.plant.outputs().iter().find(|o| o.1 == position);
-                output.map(|(name, _)| Place {
-                    variable: (*name).into(),
-                    from: at - 2.0 * width,
-                    to: at + 2.0 * width,
-                })
+                output.map(|(name, _)| Place::new(name, at - 2.0 * width, at + 2.0 * width))
             }
             What::Hum | What::Change => None,
         };
