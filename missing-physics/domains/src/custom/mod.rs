@@ -92,6 +92,10 @@ impl Domain for Custom {
 /// [`ReadError`].
 pub fn load_with(source: &Source, simulator: Arc<dyn Simulator>, gaps: bool) -> Result<Loaded, ReadError> {
     let header = if gaps { Header::read_with_gaps(source) } else { Header::read(source) }?;
+    match header.root().text("domain", "\"custom\"")? {
+        "custom" => {}
+        other => return Err(header.root().unfit("domain", quoted(other), "\"custom\"")),
+    }
     let checked = read(&header, Some(simulator))?;
     header.finish()?;
     checked.prepare()
@@ -121,7 +125,11 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
     let rises = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
     let along = runs.iter().all(rises);
     let sizes = |quantities: &[Quantity], column: fn(&Run, usize) -> &[f64]| -> Vec<(Quantity, f64)> {
-        let size = |k| root_mean_square(runs.iter().flat_map(|r| column(r, k).iter().copied()));
+        let size = |k| match root_mean_square(runs.iter().flat_map(|r| column(r, k).iter().copied())) {
+            // What is to be predicted has the terms of what was diagnosed, whatever was measured of it.
+            size if header.gaps() && !(size > 0.0) => 1.0,
+            size => size,
+        };
         quantities.iter().enumerate().map(|(k, q)| (q.clone(), size(k))).collect()
     };
     let extent = || {
@@ -257,6 +265,90 @@ fn experiments(
 }
 
 fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0usize), |(sum, n), v| (sum + v * v, n + 1));
+    let measured = values.filter(|v| !v.is_nan());
+    let (sum, n) = measured.fold((0.0, 0usize), |(sum, n), v| (sum + v * v, n + 1));
     (sum / n.max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::recording::Memory;
+
+    /// A line through zero, which notes how many sets it was asked for at once.
+    #[derive(Debug, Default)]
+    struct Line(Mutex<Vec<usize>>);
+
+    impl Simulator for Line {
+        fn predict(&self, questions: &Questions<'_>) -> Result<Vec<Vec<f64>>, Failure> {
+            self.0.lock().unwrap().push(questions.sets.len());
+            let (_, x) = questions.inputs[0];
+            Ok(questions.sets.iter().map(|set| x.iter().map(|x| set[0] * x).collect()).collect())
+        }
+
+        fn batches(&self) -> bool {
+            true
+        }
+
+        fn fault(&self) -> Option<String> {
+            None
+        }
+
+        fn give_up(&self, why: String) -> Failure {
+            Failure::Fatal(why)
+        }
+    }
+
+    fn source(domain: &str) -> Source {
+        let header = format!(
+            "format = 1\ndomain = \"{domain}\"\ndata = \"data.csv\"\n[[input]]\nname = \"x_m\"\n[[channel]]\nname = \"y_m\"\n\
+             [[parameter]]\nname = \"slope\"\nstart = 1.0\nscale = 0.1\n"
+        );
+        let rows: String = (0..9).map(|i| format!("a,{i},{}\n", 2 * i)).collect();
+        Source::Memory(
+            Memory::new("m")
+                .with_file("recording.toml", header)
+                .with_file("data.csv", "run,x_m,y_m\n".to_owned() + &rows),
+        )
+    }
+
+    /// What derivatives need is asked for at once: the parameters, and two sets a derivative; it is one answer whatever is asked first.
+    #[test]
+    fn a_function_stands_in_for_a_command_and_is_asked_for_many_sets_at_once() {
+        let line = Arc::new(Line::default());
+        let loaded = load_with(&source("custom"), line.clone(), false).unwrap();
+        let (model, run) = (&loaded.model, &loaded.recording.runs[0]);
+        // The coefficients of terms, which are off, beside the slope.
+        let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
+        shared[0] = 1.5;
+        let (mut out, mut slope) = (vec![0.0; 9], vec![0.0; 9]);
+        model.jacobian(run, &shared, &[], &[0], &[], &mut out, &mut slope).unwrap();
+        assert_eq!(line.0.lock().unwrap().as_slice(), [3]);
+        assert!(slope.iter().zip(&run.inputs[0]).all(|(d, x)| (d - x).abs() < 1e-9), "{slope:?}");
+        assert_eq!(out[8], 12.0);
+    }
+
+    /// Terms are among the parameters of a repaired model, so they may not depend on what was measured of what it is to predict.
+    #[test]
+    fn what_is_to_be_predicted_has_the_terms_of_what_was_diagnosed() {
+        let names = |loaded: Loaded| -> Vec<String> {
+            loaded.model.spec().parameters.iter().map(|p| p.name.clone()).collect()
+        };
+        let diagnosed = names(load_with(&source("custom"), Arc::new(Line::default()), false).unwrap());
+        let Source::Memory(memory) = source("custom") else { unreachable!() };
+        for rows in ["a,0,\na,1,\na,2,\n", "a,0,0\na,1,\na,2,4\n"] {
+            let open = memory.clone().with_file("data.csv", "run,x_m,y_m\n".to_owned() + rows);
+            let open = load_with(&Source::Memory(open), Arc::new(Line::default()), true).unwrap();
+            assert_eq!(names(open), diagnosed, "{rows}");
+        }
+    }
+
+    #[test]
+    fn a_function_predicts_recordings_of_this_domain_alone() {
+        let said = load_with(&source("slosh"), Arc::new(Line::default()), false).unwrap_err().to_string();
+        assert_eq!(said, "m/recording.toml: key domain is \"slosh\", expected \"custom\"");
+    }
 }
