@@ -131,6 +131,11 @@ fn practice_sound() {
 }
 
 #[test]
+fn practice_machine() {
+    bundled_practice("motion");
+}
+
+#[test]
 fn practice_dough() {
     bundled_practice("dough-roll");
 }
@@ -175,6 +180,12 @@ fn shared_practice_bounces() {
 #[ignore = "needs ../shared"]
 fn shared_practice_sounds() {
     shared_practice("bounce-audio");
+}
+
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_practice_machines() {
+    shared_practice("motion");
 }
 
 /// Where the response is half the learned one (c05), the right mechanism is closest, its factor is right, and it is not said to

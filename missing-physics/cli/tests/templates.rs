@@ -44,4 +44,5 @@ fn every_template_is_a_sound_recording() {
 #[test]
 fn what_templates_hide_is_named() {
     assert_eq!(answer("grain-pour")["chosen"], json!(["depth-offset"]));
+    assert_eq!(answer("motion")["chosen"], json!(["coulomb-friction"]));
 }

@@ -39,6 +39,9 @@ pub(crate) struct ParameterTable {
     pub(crate) index: Vec<usize>,
 }
 
+/// Models with more mechanisms than this know many.
+const MANY: usize = 20;
+
 /// Whiteners of neighbouring shapes.
 type Page = Box<[OnceLock<Whitener>]>;
 
@@ -155,6 +158,11 @@ impl<'a> Problem<'a> {
 
     pub(crate) fn spec(&self) -> &Spec {
         self.model.spec()
+    }
+
+    /// Whether the model knows so many mechanisms that what is tried for them has to be cheap.
+    pub(crate) fn knows_many(&self) -> bool {
+        self.spec().mechanisms.len() > MANY
     }
 
     pub(crate) fn channels(&self) -> usize {
@@ -312,7 +320,7 @@ pub(crate) fn noise_positions(recording: &Recording, run: &Run) -> Vec<f64> {
 }
 
 /// Which parameters a fit may move.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Selection {
     /// Slots among the shared parameters.
     pub(crate) shared: Vec<usize>,

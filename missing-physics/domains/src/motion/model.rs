@@ -4,9 +4,9 @@ use joint_laws::integrate::{Contact, Integrator, Machine as _, Method, Reading};
 use joint_laws::signal::Signal;
 use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
-use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Scope, Spec};
+use missing_physics::model::{Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec};
 
-use super::effects::{Effects, Role};
+use super::effects::{Effects, OfJoint, Role};
 use super::equations::{Equations, Start};
 use super::machine::Driven;
 use super::scales::Scales;
@@ -17,6 +17,10 @@ use super::windows;
 const STEPS_IN_SHORTEST: f64 = 2.0;
 /// Steps are cut at the most to this part of the time between rows for a law's sake.
 const FINEST_FOR_LAWS: f64 = 0.125;
+
+/// An end stop is stiffer by this factor than what it takes to bring the joint to its largest position with its typical acceleration: what
+/// yields more is a spring.
+const STIFFER: f64 = 3.0;
 
 /// How the motion is followed: by which method, in which steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -425,7 +429,7 @@ impl Model for MotionModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { modes: Some(self), ..Extensions::default() }
+        Extensions { modes: Some(self), limits: Some(self), ..Extensions::default() }
     }
 
     fn jacobian(
@@ -462,5 +466,19 @@ impl Model for MotionModel {
 impl MultimodalModel for MotionModel {
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         super::start::mechanism(&self.spec.mechanisms[mechanism], &self.spec, &self.roles, &self.scales)
+    }
+}
+
+impl JointLimits for MotionModel {
+    fn implausible(&self, mechanism: usize, shared: &[f64]) -> Option<String> {
+        let first = *self.spec.mechanisms[mechanism].parameters.first()?;
+        let slot =
+            |index: usize| self.spec.parameters[..index].iter().filter(|p| p.scope == Scope::Shared).count();
+        let Role::Joint(joint, OfJoint::StopPosition) = *self.roles.get(slot(first))? else { return None };
+        let at = self.roles.iter().position(|r| *r == Role::Joint(joint, OfJoint::StopStiffness))?;
+        let sizes = &self.scales.joints[joint];
+        let least = STIFFER * sizes.acceleration / sizes.reach;
+        (shared[at] < least)
+            .then(|| format!("a stop of {:.3} 1/s^2 gives way like the joint's own spring", shared[at]))
     }
 }

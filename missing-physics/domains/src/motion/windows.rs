@@ -9,7 +9,7 @@ use missing_physics::data::{Recording, Run};
 use super::equations::Equations;
 
 /// Measured values that count at the most.
-const MOST_VALUES: usize = 24_000;
+const MOST_VALUES: usize = 12_000;
 /// Rows of inputs that are followed at the most.
 const MOST_ROWS: usize = 200_000;
 

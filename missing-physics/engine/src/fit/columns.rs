@@ -71,6 +71,20 @@ pub(crate) fn whitened_columns(
     Ok(columns)
 }
 
+/// What the prior of a run's nuisance parameters adds to the sum of squares.
+pub(crate) fn nuisance_departure(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    run: usize,
+    nuisance: &[f64],
+) -> f64 {
+    let square = |(i, &slot): (usize, &usize)| {
+        let departure = problem.nuisance_start[run][slot] - nuisance[slot];
+        (departure / nuisance_prior_width(problem, selection, i)).powi(2)
+    };
+    selection.nuisance.iter().enumerate().map(square).sum()
+}
+
 /// Normal equations of one run with the prior of its nuisance parameters, which come first, then the shared ones, then the residual.
 pub(crate) fn normal_of_run(
     problem: &Problem<'_>,

@@ -1,13 +1,24 @@
 //! Bounded Gauss-Newton for a given noise.
 
-use crate::fit::columns::normal_of_run;
+use crate::fit::columns::{normal_of_run, nuisance_departure, whitened_columns};
 use crate::fit::optimum::Fit;
 use crate::fit::step::{NormalEquations, Step};
+use crate::linalg::dot;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
 const MAX_ITERATIONS: usize = 60;
+/// The same of a model that knows many mechanisms: most of what is tried explains nothing, and is not worth more.
+const ITERATIONS_OF_MANY: usize = 24;
+/// What a step may promise at most, in parts of the sum of squares, where a fit that does not go down any more is at its end.
+const STALLED: f64 = 1e-4;
+/// Gain in the sum of squares, in units of what is left of a value, below which a step that does not go down is not shortened further.
+const NO_GAIN: f64 = 1e-6;
+/// Gain of a shortened step, in the same units, that is next to none.
+const HARDLY: f64 = 1e-3;
+/// Shortened steps in a row that gain next to nothing, after which a fit is at its end: dry friction and jumps leave kinks.
+const PATIENCE: usize = 3;
 
 pub(crate) fn linearise(
     problem: &Problem<'_>,
@@ -27,6 +38,24 @@ pub(crate) fn linearise(
     Ok(NormalEquations { normals, chi2 })
 }
 
+/// The sum of squares alone, without derivatives.
+fn sum_of_squares(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    shared: &[f64],
+    nuisance: &[Vec<f64>],
+) -> Result<f64, PredictError> {
+    let nothing = Selection::default();
+    let mut chi2 = 0.0;
+    for (run, values) in nuisance.iter().enumerate() {
+        let mut residual = whitened_columns(problem, &nothing, noise, run, shared, values)?;
+        let residual = residual.pop().unwrap_or_default();
+        chi2 += dot(&residual, &residual) + nuisance_departure(problem, selection, run, values);
+    }
+    Ok(chi2)
+}
+
 /// Fits the free parameters for a given noise, from a given start.
 pub(crate) fn solve(
     problem: &Problem<'_>,
@@ -35,7 +64,8 @@ pub(crate) fn solve(
     shared: &[f64],
     nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
-    solve_within(MAX_ITERATIONS, problem, selection, noise, (shared, nuisance))
+    let most = if problem.knows_many() { ITERATIONS_OF_MANY } else { MAX_ITERATIONS };
+    solve_within(most, problem, selection, noise, (shared, nuisance))
 }
 
 /// The same in at most so many iterations.
@@ -52,32 +82,50 @@ pub(crate) fn solve_within(
     let mut damping = 0.0;
     let mut converged = false;
     let mut held = vec![false; n_shared];
+    let many = problem.knows_many();
+    let (mut hardly, mut promised) = (0, f64::INFINITY);
+    let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
     for _ in 0..iterations {
+        // Where a fit leaves many times the noise, what a step gains counts in units of that.
+        let left = if many { (linear.chi2 / values.max(1) as f64).max(1.0) } else { 1.0 };
         let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping);
         let predicted = step.predicted;
+        promised = predicted;
         held = step.held;
         if !(predicted > 1e-9 * (1.0 + 1e-6 * linear.chi2)) {
             converged = true;
             break;
         }
-        match linearise(problem, selection, noise, &step.shared, &step.nuisance) {
-            Ok(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
+        // A shortened step often fails as well: it is not worth its derivatives before it goes down.
+        let at = (&step.shared[..], &step.nuisance[..]);
+        let promises = !many
+            || damping == 0.0
+            || sum_of_squares(problem, selection, noise, at.0, at.1).is_ok_and(|next| next <= linear.chi2);
+        let next = promises.then(|| linearise(problem, selection, noise, at.0, at.1));
+        match next.transpose().ok().flatten() {
+            Some(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
                 let gained = linear.chi2 - next.chi2;
                 (shared, nuisance, linear) = (step.shared, step.nuisance, next);
+                hardly = if many && damping > 0.0 && gained < HARDLY * left { hardly + 1 } else { 0 };
+                if hardly == PATIENCE {
+                    converged = predicted < STALLED * (1.0 + linear.chi2);
+                    break;
+                }
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
-                if gained < 1e-7 && predicted < 1e-5 {
+                if gained < 1e-7 * left && predicted < 1e-5 * left {
                     converged = true;
                     break;
                 }
             }
-            _ if damping > 1e8 => {
+            _ if damping > 1e8 || many && predicted < NO_GAIN * left => {
                 // No step goes down any more: rounding, a bound of a nuisance parameter, or a kink.
-                converged = predicted < 1e-4 * (1.0 + linear.chi2);
+                converged = predicted < STALLED * (1.0 + linear.chi2);
                 break;
             }
             _ => damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 },
         }
     }
+    converged |= many && promised < 10.0 * STALLED * (1.0 + linear.chi2);
     let bordered = linear.bordered(n_shared);
     let mut log_likelihood = -0.5 * linear.chi2;
     for run in bordered.runs() {

@@ -1,5 +1,7 @@
 //! The mechanisms that take away nearly all of the misfit where something else is left over.
 
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -34,8 +36,11 @@ const RIVAL_MISFIT: f64 = 3.5;
 const DIRECTIONS: f64 = 6.0;
 /// Rivals that are said.
 const MOST_RIVALS: usize = 6;
+/// Sets that leave least of the data they are fitted to, of which that is the closest which leaves least of unseen data.
+const CLOSE: usize = 3;
 
 /// A set of mechanisms, fitted with a leftover in the model.
+#[derive(Clone)]
 pub(crate) struct Judged {
     pub(crate) candidate: Candidate,
     /// The same set fitted by plain least squares.
@@ -57,10 +62,21 @@ pub(crate) struct Judge<'a> {
     problem: &'a Problem<'a>,
     rule: NoiseRule,
     all: &'a [Candidate],
-    /// By candidate: the plain least-squares fit, and the misfit that it leaves of unseen data.
-    plain: Vec<Option<(Fit, f64)>>,
+    /// By candidate.
+    plain: Vec<Option<Plain>>,
+    /// By candidate, once it was asked for: with a leftover in the model.
+    judged: Vec<OnceLock<Option<Judged>>>,
     /// What the baseline leaves.
     base: f64,
+}
+
+/// A candidate's plain least-squares fit.
+struct Plain {
+    fit: Fit,
+    /// The misfit that it leaves of the data it is fitted to.
+    seen: f64,
+    /// The misfit that it leaves of unseen data, once it was asked for: it costs many fits.
+    unseen: OnceLock<Option<f64>>,
 }
 
 /// A set without one of its members.
@@ -78,16 +94,18 @@ impl<'a> Judge<'a> {
         wanted: impl Fn(&Candidate) -> bool + Sync,
     ) -> Self {
         let white = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
-        let plain = |c: &Candidate| -> Option<(Fit, f64)> {
+        let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+        let plain = |c: &Candidate| -> Option<Plain> {
             (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
             let fit = solve(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
-            let misfit = unseen_misfit(problem, &c.selection, &fit, &white).ok()?;
-            Some((fit, misfit))
+            let seen = (fit.chi2 - values as f64).max(0.0);
+            Some(Plain { fit, seen, unseen: OnceLock::new() })
         };
-        let plain: Vec<Option<(Fit, f64)>> = all.par_iter().map(plain).collect();
-        let at = all.iter().position(|c| c.set.is_empty());
-        let base = at.and_then(|i| plain[i].as_ref()).map_or(0.0, |p| p.1);
-        Self { problem, rule: rule.beside_a_leftover(), all, plain, base }
+        let plain: Vec<Option<Plain>> = all.par_iter().map(plain).collect();
+        let judged = all.iter().map(|_| OnceLock::new()).collect();
+        let mut judge = Self { problem, rule: rule.beside_a_leftover(), all, plain, judged, base: 0.0 };
+        judge.base = judge.misfit(&[]).unwrap_or(0.0);
+        judge
     }
 
     /// The part of the squared misfit beyond the noise that a set takes away on unseen data.
@@ -97,7 +115,28 @@ impl<'a> Judge<'a> {
     }
 
     fn misfit(&self, set: &[usize]) -> Option<f64> {
-        self.plain[self.at(set)?].as_ref().map(|p| p.1)
+        self.unseen(self.at(set)?)
+    }
+
+    /// The misfit that a candidate leaves of unseen data.
+    fn unseen(&self, at: usize) -> Option<f64> {
+        let plain = self.plain[at].as_ref()?;
+        let misfit =
+            || unseen_misfit(self.problem, &self.all[at].selection, &plain.fit, &plain.fit.noise).ok();
+        *plain.unseen.get_or_init(misfit)
+    }
+
+    /// Whether a candidate leaves at most so much of unseen data; what leaves more of the data it was fitted to does not.
+    fn leaves_at_most(&self, at: usize, limit: f64) -> bool {
+        self.plain[at].as_ref().is_some_and(|p| p.seen <= limit)
+            && self.unseen(at).is_some_and(|misfit| misfit <= limit)
+    }
+
+    /// Whether a set leaves at least so much of unseen data, or is not known.
+    fn leaves_at_least(&self, set: &[usize], limit: f64) -> bool {
+        let Some(at) = self.at(set) else { return true };
+        let Some(plain) = &self.plain[at] else { return true };
+        plain.seen >= limit || self.unseen(at).is_none_or(|misfit| misfit >= limit)
     }
 
     /// Where a set stands among the candidates.
@@ -121,8 +160,9 @@ impl<'a> Judge<'a> {
                 found.as_ref().is_none_or(|f| f.candidate.set.iter().all(|m| c.set.contains(m)))
             };
             let wanted: Vec<usize> = (0..self.all.len())
+                .into_par_iter()
                 .filter(|&i| self.all[i].set.len() == size && beyond(&self.all[i]))
-                .filter(|&i| self.plain[i].as_ref().is_some_and(|p| p.1 <= limit) && self.each_helps(i))
+                .filter(|&i| self.leaves_at_most(i, limit) && self.each_helps(i))
                 .collect();
             let needed = |i: usize| self.judged(i).filter(|j| self.needed(i, j) && self.beats_its_parts(j));
             let mut judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
@@ -140,12 +180,17 @@ impl<'a> Judge<'a> {
     /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them.
     pub(crate) fn closest(&self) -> Option<Judged> {
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
-            .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none() && self.each_helps(i))
-            .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.1, i)))
-            .filter(|(misfit, _)| *misfit < self.base)
+            .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
+            .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.seen, i)))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        order.into_iter().find_map(|(_, i)| self.judged(i))
+        let helps = |&(_, i): &(f64, usize)| {
+            let misfit = self.unseen(i).filter(|misfit| *misfit < self.base)?;
+            self.each_helps(i).then_some((misfit, i))
+        };
+        let mut close: Vec<(f64, usize)> = order.iter().filter_map(helps).take(CLOSE).collect();
+        close.sort_by(|a, b| a.0.total_cmp(&b.0));
+        close.into_iter().find_map(|(_, i)| self.judged(i))
     }
 
     /// The misfit that noise alone may leave.
@@ -157,22 +202,23 @@ impl<'a> Judge<'a> {
     /// Whether a set leaves nothing but noise, or predicts unseen data no worse than it does without any one member.
     pub(crate) fn holds(&self, set: &[usize]) -> bool {
         let Some(left) = self.misfit(set).filter(|left| *left > self.by_chance()) else { return true };
-        set.iter().all(|m| self.misfit(&without(set, *m)).is_none_or(|misfit| misfit >= left))
+        set.iter().all(|m| self.leaves_at_least(&without(set, *m), left))
     }
 
     /// Whether each member of a set takes away most of what is left without it.
     fn each_helps(&self, at: usize) -> bool {
         let set = &self.all[at].set;
-        let Some((_, left)) = &self.plain[at] else { return false };
-        set.len() == 1
-            || set
-                .iter()
-                .all(|m| self.misfit(&without(set, *m)).is_none_or(|misfit| misfit >= SMALLER * left))
+        let Some(left) = self.unseen(at) else { return false };
+        set.len() == 1 || set.iter().all(|m| self.leaves_at_least(&without(set, *m), SMALLER * left))
     }
 
     /// A candidate fitted with a leftover; none where it is no explanation then.
     fn judged(&self, at: usize) -> Option<Judged> {
-        let (plain, misfit) = self.plain[at].as_ref()?;
+        self.judged[at].get_or_init(|| self.beside_a_leftover(at)).clone()
+    }
+
+    fn beside_a_leftover(&self, at: usize) -> Option<Judged> {
+        let (plain, misfit) = (&self.plain[at].as_ref()?.fit, self.unseen(at)?);
         let of = &self.all[at];
         let (fit, process) = with_leftover(self.problem, &self.rule, &of.selection, plain).ok()?;
         let (mut worth, ruled_out) = evidence(self.problem, &of.set, &[], &of.selection, &fit);
@@ -182,7 +228,7 @@ impl<'a> Judge<'a> {
         let candidate =
             Candidate { fit, alternative_modes: Vec::new(), evidence: worth, ruled_out, ..of.clone() };
         let plain = Candidate { fit: plain.clone(), alternative_modes: Vec::new(), ..of.clone() };
-        sound.then(|| Judged { candidate, plain, process, share: 1.0 - misfit / self.base, misfit: *misfit })
+        sound.then(|| Judged { candidate, plain, process, share: 1.0 - misfit / self.base, misfit })
     }
 
     /// The plain fit with errors that allow for a leftover: those beside the leftover that the residual shows, or, along the parameters' own
@@ -218,7 +264,7 @@ impl<'a> Judge<'a> {
         whole.set.iter().all(|m| {
             let set = without(&whole.set, *m);
             let near = self.at(&set).and_then(|i| self.plain[i].as_ref());
-            let Some((near, _)) = near else { return true };
+            let Some(Plain { fit: near, .. }) = near else { return true };
             let selection = self.problem.select(&set, &[]);
             let refitted = || -> Result<f64, PredictError> {
                 let fit = given(self.problem, &selection, &curves, &judged.process, near)?;
@@ -247,10 +293,10 @@ impl<'a> Judge<'a> {
             rival.len() <= set.len()
                 && !rival.is_empty()
                 && !rival.iter().all(|m| set.contains(m))
-                && self.plain[i].as_ref().is_some_and(|p| p.1 <= enough)
+                && self.leaves_at_most(i, enough)
                 && self.each_helps(i)
         };
-        let others: Vec<usize> = (0..self.all.len()).filter(other).collect();
+        let others: Vec<usize> = (0..self.all.len()).into_par_iter().filter(other).collect();
         let mut rivals: Vec<Judged> = others
             .into_par_iter()
             .filter_map(|i| self.judged(i))

@@ -9,8 +9,6 @@ use crate::model::Scope;
 use crate::problem::Problem;
 use crate::selection::candidate::{Candidate, Guess};
 
-/// Models with more mechanisms than this are screened.
-pub(crate) const MANY: usize = 20;
 /// Mechanisms that are fitted beside one set.
 const KEPT: usize = 6;
 /// Mechanisms that are followed some steps on, of those whose first step promises most: one step may promise what no fit keeps.

@@ -9,7 +9,7 @@ use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
 use crate::selection::candidate::{Candidate, Guess, candidate};
-use crate::selection::screening::{MANY, Screening};
+use crate::selection::screening::Screening;
 use crate::statistics::median;
 
 /// How many sets of one size are tried with one more mechanism.
@@ -40,7 +40,8 @@ pub(crate) fn search(
     let mut all = vec![baseline];
     let mut unfitted = Vec::new();
     // Where there are many, most would be fitted for nothing.
-    let mut screening = (allowed.len() > MANY)
+    let mut screening = problem
+        .knows_many()
         .then(|| Screening::new(allowed.iter().map(|&m| (m, guesses(problem, &all[0], &[m])))));
     let mut layer: Vec<usize> = vec![0];
     for size in 1..=MOST {
@@ -76,7 +77,11 @@ pub(crate) fn search(
         }
         layer = order;
     }
-    polish(problem, rule, &mut all);
+    // Beside a leftover no difference between neighbouring tops decides anything.
+    let likeliest = all.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence));
+    if screening.is_none() || likeliest.is_some_and(|best| down_to_noise(problem, rule, best)) {
+        polish(problem, rule, &mut all);
+    }
     Some(Searched { all, unfitted })
 }
 
