@@ -57,7 +57,12 @@ fn what_is_wrong_with_a_machine_is_said_in_one_line() {
             vec!["angle_rad is NaN", "run 2", "rate_rad_s = 0"],
         ),
         ("g_per_l*angle_rad^3 + 90*angle_rad", "angle_rad", sound.clone(), vec!["at t = ", "g_per_l = 20"]),
-        (EQUATION, "rate_rad_s", sound.clone(), vec!["encoder_rad", "in rad/s", "expected a quantity in rad"]),
+        (
+            EQUATION,
+            "rate_rad_s",
+            sound.clone(),
+            vec!["encoder_rad", "in rad/s", "expected a quantity in rad"],
+        ),
         ("angle_rad", "angle_rad", sound, vec!["rate_rad_s", "expected a derivative in rad/s^2"]),
         (EQUATION, "angle_rad", with_cell(3, ""), vec!["row 11", "command_v", "known in every row"]),
         (EQUATION, "angle_rad", with_cell(1, "0.4000"), vec!["row 11", "t_s", "more than 0.4"]),
