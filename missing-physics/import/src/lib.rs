@@ -59,6 +59,31 @@ pub struct Imported {
     pub copies: Vec<(PathBuf, String)>,
     /// What was found, taken, left out and not known, for a person.
     pub text: String,
+    /// What each column of the recording comes from.
+    pub mapped: Vec<Mapped>,
+    /// Keys of `recording.toml` whose values are the template's.
+    pub unknown: Vec<String>,
+}
+
+/// A column of the recording and what it comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mapped {
+    /// Its name in the recording (`z_m`).
+    pub target: String,
+    /// The title of the file's column; `None` for one number in all rows.
+    pub title: Option<String>,
+    /// How it is worked out (`0.001 × "Höhe (mm)"`).
+    pub formula: String,
+}
+
+impl Mapped {
+    fn of(choice: &Choice) -> Self {
+        let title = match &choice.from {
+            choose::From::Column { title, .. } => Some(title.clone()),
+            choose::From::Constant => None,
+        };
+        Self { target: choice.target.clone(), title, formula: choice.formula() }
+    }
 }
 
 /// What the files hold, for a person: columns with units and first values.
@@ -74,6 +99,21 @@ pub fn survey(files: &[PathBuf]) -> Result<String, ImportError> {
 /// # Errors
 /// [`ImportError`]: a file that cannot be read, an option that makes no sense, or a column that is missing.
 pub fn import(request: &Request) -> Result<Imported, ImportError> {
+    import_with(request, || read(&request.files))
+}
+
+/// As [`import`], of tables that were read already ([`file::read_bytes`]); `files` of the request only names where they come from.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_tables(request: &Request, tables: Vec<Table>) -> Result<Imported, ImportError> {
+    import_with(request, || Ok(tables))
+}
+
+fn import_with(
+    request: &Request,
+    tables: impl FnOnce() -> Result<Vec<Table>, ImportError>,
+) -> Result<Imported, ImportError> {
     let wanted = Wanted::of(&request.domain, request.like.as_deref())?;
     let settings: Vec<Setting> =
         request.settings.iter().map(|s| Setting::parse(s)).collect::<Result<_, _>>()?;
@@ -86,9 +126,9 @@ pub fn import(request: &Request) -> Result<Imported, ImportError> {
     let cut = cut(request)?;
     let sound = |file: &PathBuf| matches!(file::ending(file).as_str(), "wav" | "wave");
     if request.domain == "bounce" && !request.files.is_empty() && request.files.iter().all(sound) {
-        return of_sound(request, &wanted, &settings);
+        return Ok(of_sound(request, &wanted, &settings, &tables()?));
     }
-    let tables = read(&request.files)?;
+    let tables = tables()?;
     let choices = choices(request, &wanted, &tables)?;
     let mut names: Vec<&str> = choices.iter().map(|c| c.target.as_str()).collect();
     names.extend(request.rate_hz.map(|_| "t_s"));
@@ -116,7 +156,9 @@ pub fn import(request: &Request) -> Result<Imported, ImportError> {
     };
     let story =
         Story { tables: &tables, choices: &choices, rows: &rows, unknown: &unknown, domain: wanted.domain };
-    Ok(Imported { text: story.tell(), header, table: Some((data, rows.to_csv())), copies })
+    let text = story.tell();
+    let mapped = choices.iter().map(Mapped::of).collect();
+    Ok(Imported { text, header, table: Some((data, rows.to_csv())), copies, mapped, unknown })
 }
 
 fn read(files: &[PathBuf]) -> Result<Vec<Table>, ImportError> {
@@ -188,8 +230,7 @@ fn choices(request: &Request, wanted: &Wanted, tables: &[Table]) -> Result<Vec<C
 }
 
 /// A recording of sound: the files themselves, one a run.
-fn of_sound(request: &Request, wanted: &Wanted, settings: &[Setting]) -> Result<Imported, ImportError> {
-    let tables = read(&request.files)?;
+fn of_sound(request: &Request, wanted: &Wanted, settings: &[Setting], tables: &[Table]) -> Imported {
     let names: Vec<String> = (1..=request.files.len()).map(|k| format!("{k}.wav")).collect();
     let files: Vec<String> = request.files.iter().map(|f| f.display().to_string()).collect();
     let mut origin = header::origin(&files, &[]);
@@ -203,5 +244,6 @@ fn of_sound(request: &Request, wanted: &Wanted, settings: &[Setting]) -> Result<
     let without_table = |line: &&str| !line.starts_with("data = ");
     let header = text.lines().filter(without_table).collect::<Vec<_>>().join("\n") + "\n" + &audio;
     let copies = request.files.iter().cloned().zip(names).collect();
-    Ok(Imported { header, table: None, copies, text: say::columns(&tables, &[]) + &say::sound(&tables) })
+    let text = say::columns(tables, &[]) + &say::sound(tables);
+    Imported { header, table: None, copies, text, mapped: Vec::new(), unknown: Vec::new() }
 }

@@ -50,8 +50,8 @@ impl Values {
         }
     }
 
-    /// A cell as a person reads it.
-    pub(crate) fn show(&self, row: usize) -> String {
+    /// A cell as a person reads it; nothing beyond the last row.
+    pub fn show(&self, row: usize) -> String {
         match self {
             Self::Labels(labels) => labels.get(row).cloned().unwrap_or_default(),
             Self::Numbers(numbers) => {
@@ -77,6 +77,11 @@ impl Column {
             column.name.units = known;
         }
         column
+    }
+
+    /// The unit that its title, or the format, says.
+    pub fn unit(&self) -> Option<&str> {
+        self.name.unit.as_deref()
     }
 
     pub(crate) fn numbers(&self) -> Option<&[f64]> {
@@ -105,7 +110,8 @@ impl Table {
         Self { file: file.into(), part: None, columns, time: None, run: None, remarks: Vec::new() }
     }
 
-    pub(crate) fn rows(&self) -> usize {
+    /// The number of its rows.
+    pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
     }
 }

@@ -4,17 +4,16 @@ use std::path::Path;
 
 use matfile::{MatFile, NumericData};
 
-use super::{Array, bytes, guarded, tables_of};
+use super::{Array, guarded, tables_of};
 use crate::error::ImportError;
 use crate::table::Table;
 
-pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
-    let bytes = bytes(path)?;
+pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     if bytes.windows(4).take(1024).any(|w| w == b"\x89HDF") {
         return Err(ImportError::broken(path, "MATLAB's version 7.3 is HDF5: save it by save(..., '-v7')"));
     }
     let file = guarded(path, || {
-        MatFile::parse(bytes.as_slice())
+        MatFile::parse(bytes)
             .map_err(|e| ImportError::broken(path, format!("no file of MATLAB up to version 7: {e}")))
     })?;
     let arrays: Vec<Array> = file.arrays().iter().filter_map(array).collect();

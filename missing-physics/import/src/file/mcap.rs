@@ -1,8 +1,7 @@
 //! MCAP, and ROS 2's bags in it: a table for each topic whose messages hold numbers.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
-use std::io::Read as _;
+use std::io::Read;
 use std::path::Path;
 
 use mcap::records::{ChunkHeader, MessageHeader, Record};
@@ -20,9 +19,9 @@ const MOST_CELLS: usize = 40_000_000;
 /// Stamps further from the time of logging than this (ns) are of another clock.
 const SAME_CLOCK: i128 = 3_600_000_000_000;
 
-pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
+/// Reads a bag of any size, piece by piece.
+pub(super) fn read(path: &Path, mut file: impl Read) -> Result<Vec<Table>, ImportError> {
     let broken = |why: String| ImportError::broken(path, why);
-    let mut file = File::open(path).map_err(|e| opened(path, &e))?;
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default().with_record_length_limit(LARGEST_RECORD).with_emit_chunks(true),
     );

@@ -30,10 +30,7 @@ use crate::table::{Column, Values};
 pub fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
     let tables: Vec<Table> =
         files(path)?.iter().map(|file| one(file)).collect::<Result<Vec<_>, _>>()?.concat();
-    if tables.iter().all(|t| t.rows() == 0) {
-        return Err(ImportError::broken(path, "no numbers were found in it"));
-    }
-    Ok(tables)
+    numbers(path, tables)
 }
 
 /// The files of a folder that is a bag (`*.mcap`) or a data set (`data/**/*.parquet`); else the file itself.
@@ -75,61 +72,113 @@ pub(crate) fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-fn one(path: &Path) -> Result<Vec<Table>, ImportError> {
-    let (kind, read): (&'static str, Option<Reader>) = match ending(path).as_str() {
-        "csv" | "tsv" | "txt" | "dat" | "asc" | "prn" | "tab" => ("text", Some(text::read)),
+/// Reads all tables of a file of this name that is in memory.
+///
+/// # Errors
+/// [`ImportError`]; of the formats, Parquet is read from files only.
+pub fn read_bytes(name: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
+    let tables = match format(name)? {
+        Format::Whole(read) => {
+            within(name, bytes.len() as u64)?;
+            read(name, bytes)?
+        }
         #[cfg(feature = "mcap")]
-        "mcap" => ("mcap", Some(mcap::read)),
+        Format::Bag => mcap::read(name, bytes)?,
         #[cfg(feature = "parquet")]
-        "parquet" | "pq" => ("parquet", Some(parquet::read)),
-        #[cfg(feature = "numpy")]
-        "npy" => ("numpy", Some(numpy::read_npy)),
-        #[cfg(feature = "numpy")]
-        "npz" => ("numpy", Some(numpy::read_npz)),
-        #[cfg(feature = "mat")]
-        "mat" => ("mat", Some(matlab::read)),
-        #[cfg(feature = "wav")]
-        "wav" | "wave" => ("wav", Some(wav::read)),
-        #[cfg(not(feature = "mcap"))]
-        "mcap" => ("mcap", None),
-        #[cfg(not(feature = "parquet"))]
-        "parquet" | "pq" => ("parquet", None),
-        #[cfg(not(feature = "numpy"))]
-        "npy" | "npz" => ("numpy", None),
-        #[cfg(not(feature = "mat"))]
-        "mat" => ("mat", None),
-        #[cfg(not(feature = "wav"))]
-        "wav" | "wave" => ("wav", None),
-        "db3" => {
-            let why = "a bag in SQLite: make it MCAP by \"ros2 bag convert\" with storage_id: mcap";
-            return Err(ImportError::Broken { file: path.into(), why: why.into() });
+        Format::Seekable(_) => {
+            return Err(ImportError::broken(name, "Parquet is read from a file on disk, not from memory"));
         }
-        "bag" => {
-            let why = "a bag of ROS 1: make it MCAP by \"mcap convert in.bag out.mcap\"";
-            return Err(ImportError::Broken { file: path.into(), why: why.into() });
-        }
-        "xls" | "xlsx" | "ods" => {
-            let why = "a spreadsheet: save the sheet as CSV";
-            return Err(ImportError::Broken { file: path.into(), why: why.into() });
-        }
-        "h5" | "hdf5" | "pkl" | "tdms" => {
-            let why = "not read: save its columns as CSV, .npz or Parquet";
-            return Err(ImportError::Broken { file: path.into(), why: why.into() });
-        }
-        _ => return Err(ImportError::UnknownKind { file: path.into() }),
     };
+    numbers(name, tables)
+}
+
+fn one(path: &Path) -> Result<Vec<Table>, ImportError> {
+    let format = format(path)?;
     let metadata = std::fs::metadata(path).map_err(|e| opened(path, &e))?;
     if !metadata.is_file() {
         return Err(ImportError::Open { file: path.into(), why: "not a file".into() });
     }
-    // Bags are read piece by piece.
-    if metadata.len() > LARGEST_FILE && kind != "mcap" {
-        return Err(ImportError::TooLarge { file: path.into(), bytes: metadata.len(), most: LARGEST_FILE });
+    match format {
+        Format::Whole(read) => {
+            within(path, metadata.len())?;
+            read(path, &std::fs::read(path).map_err(|e| opened(path, &e))?)
+        }
+        #[cfg(feature = "mcap")]
+        Format::Bag => mcap::read(path, std::fs::File::open(path).map_err(|e| opened(path, &e))?),
+        #[cfg(feature = "parquet")]
+        Format::Seekable(read) => {
+            within(path, metadata.len())?;
+            read(path)
+        }
     }
-    read.ok_or_else(|| ImportError::LeftOut { file: path.into(), feature: kind })?(path)
 }
 
-type Reader = fn(&Path) -> Result<Vec<Table>, ImportError>;
+/// How a format is read.
+enum Format {
+    /// All of it at once.
+    Whole(fn(&Path, &[u8]) -> Result<Vec<Table>, ImportError>),
+    /// Piece by piece, however large it is.
+    #[cfg(feature = "mcap")]
+    Bag,
+    /// Here and there, with what lies beside it.
+    #[cfg(feature = "parquet")]
+    Seekable(fn(&Path) -> Result<Vec<Table>, ImportError>),
+}
+
+/// The format that a name tells.
+fn format(path: &Path) -> Result<Format, ImportError> {
+    #[cfg(not(all(feature = "mat", feature = "mcap", feature = "numpy", feature = "parquet", feature = "wav")))]
+    let left_out = |feature| Err(ImportError::LeftOut { file: path.into(), feature });
+    let instead = |why: &str| Err(ImportError::Broken { file: path.into(), why: why.into() });
+    match ending(path).as_str() {
+        "csv" | "tsv" | "txt" | "dat" | "asc" | "prn" | "tab" => Ok(Format::Whole(text::read)),
+        #[cfg(feature = "mcap")]
+        "mcap" => Ok(Format::Bag),
+        #[cfg(feature = "parquet")]
+        "parquet" | "pq" => Ok(Format::Seekable(parquet::read)),
+        #[cfg(feature = "numpy")]
+        "npy" => Ok(Format::Whole(numpy::read_npy)),
+        #[cfg(feature = "numpy")]
+        "npz" => Ok(Format::Whole(numpy::read_npz)),
+        #[cfg(feature = "mat")]
+        "mat" => Ok(Format::Whole(matlab::read)),
+        #[cfg(feature = "wav")]
+        "wav" | "wave" => Ok(Format::Whole(wav::read)),
+        #[cfg(not(feature = "mcap"))]
+        "mcap" => left_out("mcap"),
+        #[cfg(not(feature = "parquet"))]
+        "parquet" | "pq" => left_out("parquet"),
+        #[cfg(not(feature = "numpy"))]
+        "npy" | "npz" => left_out("numpy"),
+        #[cfg(not(feature = "mat"))]
+        "mat" => left_out("mat"),
+        #[cfg(not(feature = "wav"))]
+        "wav" | "wave" => left_out("wav"),
+        "db3" => {
+            instead("a bag in SQLite: make it MCAP by \"ros2 bag convert\" with storage_id: mcap")
+        }
+        "bag" => instead("a bag of ROS 1: make it MCAP by \"mcap convert in.bag out.mcap\""),
+        "xls" | "xlsx" | "ods" => instead("a spreadsheet: save the sheet as CSV"),
+        "h5" | "hdf5" | "pkl" | "tdms" => instead("not read: save its columns as CSV, .npz or Parquet"),
+        _ => Err(ImportError::UnknownKind { file: path.into() }),
+    }
+}
+
+/// Refuses what is too large to be read at once.
+fn within(path: &Path, bytes: u64) -> Result<(), ImportError> {
+    if bytes > LARGEST_FILE {
+        return Err(ImportError::TooLarge { file: path.into(), bytes, most: LARGEST_FILE });
+    }
+    Ok(())
+}
+
+/// Tables that hold something.
+fn numbers(path: &Path, tables: Vec<Table>) -> Result<Vec<Table>, ImportError> {
+    if tables.iter().all(|t| t.rows() == 0) {
+        return Err(ImportError::broken(path, "no numbers were found in it"));
+    }
+    Ok(tables)
+}
 
 fn opened(path: &Path, error: &std::io::Error) -> ImportError {
     let why = match error.kind() {
@@ -137,10 +186,6 @@ fn opened(path: &Path, error: &std::io::Error) -> ImportError {
         _ => error.to_string(),
     };
     ImportError::Open { file: path.into(), why }
-}
-
-fn bytes(path: &Path) -> Result<Vec<u8>, ImportError> {
-    std::fs::read(path).map_err(|e| opened(path, &e))
 }
 
 /// What a reader of somebody else's does with broken bytes: a panic there is an error here.

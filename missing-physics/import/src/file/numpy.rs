@@ -5,20 +5,19 @@ use std::path::Path;
 
 use missing_physics_domains::recording::LARGEST_FILE;
 
-use super::{Array, bytes, tables_of};
+use super::{Array, tables_of};
 use crate::error::{ImportError, in_quotes};
 use crate::table::Table;
 
-pub(super) fn read_npy(path: &Path) -> Result<Vec<Table>, ImportError> {
+pub(super) fn read_npy(path: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let arrays = arrays(&name, &bytes(path)?).map_err(|why| ImportError::broken(path, why))?;
+    let arrays = arrays(&name, bytes).map_err(|why| ImportError::broken(path, why))?;
     Ok(tables_of(path, arrays))
 }
 
-pub(super) fn read_npz(path: &Path) -> Result<Vec<Table>, ImportError> {
+pub(super) fn read_npz(path: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     let broken = |why: String| ImportError::broken(path, why);
-    let bytes = bytes(path)?;
-    let mut archive = zip::ZipArchive::new(Cursor::new(&bytes)).map_err(|e| broken(e.to_string()))?;
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| broken(e.to_string()))?;
     let (mut found, mut left) = (Vec::new(), Vec::new());
     let mut room = LARGEST_FILE;
     for at in 0..archive.len() {

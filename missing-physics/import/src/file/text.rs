@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::bytes;
 use crate::clock;
 use crate::error::{ImportError, in_quotes};
 use crate::table::{Column, Table, Values};
@@ -15,10 +14,9 @@ const DELIMITERS: [u8; 5] = [b'\t', b';', b'|', b',', b' '];
 /// More columns than this are no table.
 const MOST_COLUMNS: usize = 4096;
 
-pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
-    let bytes = bytes(path)?;
+pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
     let mut remarks = Vec::new();
-    let text = decode(path, &bytes, &mut remarks)?;
+    let text = decode(path, bytes, &mut remarks)?;
     let (lines, comments) = lines(&text);
     if lines.is_empty() {
         return Err(ImportError::broken(path, "no line with a value: expected a table with a row of names"));

@@ -4,16 +4,13 @@ use std::path::Path;
 
 use hound::{SampleFormat, WavReader};
 
-use super::opened;
 use crate::error::ImportError;
 use crate::table::{Column, Table, Values};
 
-pub(super) fn read(path: &Path) -> Result<Vec<Table>, ImportError> {
-    let broken = |e: hound::Error| match e {
-        hound::Error::IoError(e) if e.kind() == std::io::ErrorKind::NotFound => opened(path, &e),
-        e => ImportError::broken(path, format!("no sound in a form that is read: {e}")),
-    };
-    let mut reader = WavReader::open(path).map_err(broken)?;
+pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
+    let broken =
+        |e: hound::Error| ImportError::broken(path, format!("no sound in a form that is read: {e}"));
+    let mut reader = WavReader::new(bytes).map_err(broken)?;
     let spec = reader.spec();
     let width = usize::from(spec.channels);
     if width == 0 || spec.sample_rate == 0 || !(1..=32).contains(&spec.bits_per_sample) {
