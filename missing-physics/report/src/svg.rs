@@ -48,12 +48,7 @@ pub struct Chart<'a> {
 }
 
 /// Colours, light and dark, and how charts use them.
-pub const CHART_STYLE: &str = "
-:root{--ink:#1c2430;--paper:#fff;--soft:#5b6675;--line:#dde2e8;--data:#8a94a3;--before:#c2410c;--after:#0369a1;--shade:#f59e0b33;--band:#0369a114;--card:#f6f8fa}
-@media screen and (prefers-color-scheme:dark){:root{--ink:#e6eaf0;--paper:#12161c;--soft:#9aa6b5;--line:#2b333d;--data:#8793a3;--before:#fb923c;--after:#38bdf8;--shade:#f59e0b2e;--band:#38bdf81c;--card:#1a2028}}
-svg text{font:11px system-ui,sans-serif;fill:var(--soft)}svg .t{font-weight:600;font-size:12px;fill:var(--ink)}.grid{stroke:var(--line);stroke-width:.7}
-polyline{fill:none;stroke-width:1.6}polyline.before{stroke:var(--before);stroke-dasharray:5 3}polyline.after{stroke:var(--after)}g.data{fill:var(--data)}g.before{fill:var(--before)}g.after{fill:var(--after)}.shade{fill:var(--shade)}.band{fill:var(--band)}
-";
+pub const CHART_STYLE: &str = include_str!("chart.css");
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 250.0;

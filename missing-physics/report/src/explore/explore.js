@@ -3,7 +3,27 @@
 (() => {
   const home = document.getElementById("explore");
   const data = JSON.parse(document.getElementById("curves").textContent);
-  const state = { run: data.first, channel: 0, axis: data.channels[0].axis, log: false };
+  // Of a machine that moves, what its people look at: each output's rate against the output, by central differences.
+  const rate = (time, values) => {
+    const half = Math.max(1, Math.round(values.length / 300));
+    return values.map((v, i) => {
+      const [a, b] = [i - half, i + half];
+      const known = a >= 0 && b < values.length && values[a] != null && values[b] != null && v != null && time[b] > time[a];
+      return known ? (values[b] - values[a]) / (time[b] - time[a]) : null;
+    });
+  };
+  if (data.phase) {
+    data.channels.slice().forEach(({ label, unit }, c) => {
+      const words = label.replace(/ \([^)]*\)$/, "");
+      data.channels.push({ label: `rate of ${words} (${unit ? unit + "/s" : "1/s"})`, unit: unit ? unit + "/s" : "1/s", sigma: null, axis: -1 - c, place: null, words: `phase portrait of ${words}` });
+      for (const run of data.runs) {
+        const { measured, before, after } = run.channels[c];
+        const of = (values) => rate(run.inputs[0], values);
+        run.channels.push({ measured: of(measured), before: of(before), after: after && of(after), aside: [] });
+      }
+    });
+  }
+  const state = { run: data.first, channel: 0, axis: data.channels[0].axis, log: data.log_first };
   let charts = [];
   let printing = false;
 
@@ -64,17 +84,23 @@
     return { stroke: path, fill: null, clip: null, flags: 1 };
   };
 
-  const chart = (place, shown, height, { label, series, log, band, shade, aside, axisLabel, pointed }) => {
+  const chart = (place, shown, height, { label, series, log, band, shade, aside, axisLabel, pointed, equal }) => {
     const { rows, order } = shown;
     const pick = (values) => order.map((i) => values[i] ?? null);
     const at = (colour) => () => colours()[colour];
     const dots = Math.max(3, Math.min(6, 900 / Math.sqrt(order.length + 1) / 8));
     const axis = (text, size) => ({ label: text, labelSize: 22, labelFont: "12px system-ui", font: "12px system-ui", size, stroke: at("soft"), grid: { stroke: at("line"), width: 0.7 }, ticks: { stroke: at("line"), width: 0.7 } });
+    // Seen from above, a metre is as long along as across.
+    const ends = (values) => values.reduce(([l, h], v) => (v == null ? [l, h] : [Math.min(l, v), Math.max(h, v)]), [Infinity, -Infinity]);
+    const [wide, tall] = [ends(pick(rows.x)), ends(series.flatMap((s) => pick(rows[s.key])))];
+    const pixel = equal ? Math.max((wide[1] - wide[0]) / (place.clientWidth - 90), (tall[1] - tall[0]) / (height - 66), 1e-12) * 1.1 : 0;
+    const about = ([low, top], pixels) => [0.5 * (low + top) - 0.5 * pixel * pixels, 0.5 * (low + top) + 0.5 * pixel * pixels];
     const options = {
-      width: place.clientWidth, height, legend: { show: false }, padding: [8, 14, 0, 0],
+      width: place.clientWidth, height, legend: { show: false }, padding: [8, 24, 0, 0],
       cursor: { sync: { key: "run", setSeries: false, scales: ["x", null] }, drag: { x: true, y: false, dist: 4 }, y: false, points: { size: 8 } },
-      scales: { x: { time: false, distr: log ? 3 : 1 }, y: { distr: log && !band ? 3 : 1, range: log && !band ? undefined : (u, low, high) => {
+      scales: { x: { time: false, distr: log ? 3 : 1, range: pixel ? (u, low, top) => (low === wide[0] && top === wide[1] ? about(wide, place.clientWidth - 86) : [low, top]) : undefined }, y: { distr: log && !band ? 3 : 1, range: log && !band ? undefined : (u, low, high) => {
         if (low == null) return [0, 1];
+        if (pixel) return about(tall, height - 66);
         if (band) [low, high] = [Math.min(low, -band), Math.max(high, band)];
         const room = 0.06 * (high - low) || 0.5 * Math.abs(high) || 1e-9;
         return [low - room, high + room];
@@ -164,7 +190,8 @@
     const lefts = [{ key: "left", colour: "before", dots: true }];
     if (data.changed) lefts.push({ key: "now", colour: "after", dots: true });
     const common = { log: state.log, axisLabel, pointed };
-    charts.push(chart(above, shown, 320, { ...common, label: channel.label, aside: "measured", series: [...fits, { key: "measured", colour: "data", dots: true }] }));
+    const equal = data.plan && !state.log && state.channel === data.plan[1] && state.axis === -1 - data.plan[0];
+    charts.push(chart(above, shown, equal ? 420 : 320, { ...common, equal, label: channel.label, aside: "measured", series: [...fits, { key: "measured", colour: "data", dots: true }] }));
     charts.push(chart(below, shown, 210, { ...common, label: "residual" + (channel.unit ? ` (${channel.unit})` : ""), aside: "left", series: lefts, band: channel.sigma ? 2 * channel.sigma : null, shade }));
     pointed(null);
   };
@@ -196,16 +223,22 @@
     controls.append(step(-1, "‹", "run that misses more"), picker, step(1, "›", "run that misses less"));
   }
   if (data.channels.length > 1) {
-    controls.append(choice("channel", data.channels.map((c, i) => [i, c.label]), 0, (v) => {
-      state.channel = v;
-      if (-1 - state.axis === v || state.axis >= 0) { state.axis = data.channels[v].axis; axes.value = state.axis; }
+    const named = data.channels.map((c, i) => [i, c.words ?? c.label]);
+    if (data.plan) named.push([-1, "seen from above"]);
+    controls.append(choice("channel", named, 0, (v) => {
+      const [own, portrait] = [state.axis >= 0, data.channels[state.channel].words];
+      state.channel = v < 0 ? data.plan[1] : v;
+      if (v < 0) state.axis = -1 - data.plan[0];
+      else if (own || portrait || data.channels[v].words || -1 - state.axis === v) state.axis = data.channels[v].axis;
+      axes.value = state.axis;
     }));
   }
-  const along = data.variables.map((v, i) => [i, "against " + v.label]).concat(data.channels.length > 1 ? data.channels.map((c, i) => [-1 - i, "against " + c.label]) : []);
+  const along = data.variables.map((v, i) => [i, "against " + v.label]).concat(data.channels.length > 1 ? data.channels.map((c, i) => [-1 - i, "against " + c.label]).filter((a, i) => !data.channels[i].words) : []);
   const axes = choice("horizontal axis", along, state.axis, (v) => { state.axis = v; });
   if (along.length > 1) controls.append(axes);
   if (data.log) {
     const box = element("input", { type: "checkbox" });
+    box.checked = state.log;
     box.addEventListener("change", () => { state.log = box.checked; draw(); });
     controls.append(element("label", {}, box, " logarithmic"));
   }

@@ -21,8 +21,13 @@ struct Data {
     changed: bool,
     /// The run that is shown first; below zero for all.
     first: i64,
-    /// Whether logarithmic axes make sense.
+    /// Whether logarithmic axes make sense, and whether they are drawn at first.
     log: bool,
+    log_first: bool,
+    /// The channels that are places along and across, seen from above.
+    plan: Option<[usize; 2]>,
+    /// Whether phase portraits are drawn: of machines that move in time.
+    phase: bool,
     /// Which rows are there: every so many-th.
     every: usize,
     variables: Vec<Variable>,
@@ -99,6 +104,10 @@ fn data(d: &Diagnosis, context: &ReportContext) -> Data {
         changed: changed(d),
         first: if together(d) { -1 } else { worst(d, &by_misfit) },
         log: positive(d),
+        // A force against a depth is a power law, to those who measure it.
+        log_first: positive(d) && context.domain == "indentation",
+        plan: plan(d, &order),
+        phase: context.domain == "motion" && d.variables.first().is_some_and(|(name, _)| name == "t_s"),
         every,
         variables,
         channels,
@@ -123,6 +132,12 @@ fn positive(d: &Diagnosis) -> bool {
         }
     }
     4 * above > 3 * all
+}
+
+/// Where the channels `x_m` and `y_m` stand in the order of the page.
+fn plan(d: &Diagnosis, order: &[usize]) -> Option<[usize; 2]> {
+    let at = |name: &str| order.iter().position(|&c| d.channels[c].0 == name);
+    Some([at("x_m")?, at("y_m")?])
 }
 
 fn channel(d: &Diagnosis, context: &ReportContext, c: usize) -> Channel {

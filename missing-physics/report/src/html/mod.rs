@@ -19,17 +19,7 @@ use super::{corner, explore, plots};
 pub use index::{Entry, index};
 
 /// Style of a page.
-pub const STYLE: &str = "
-*{box-sizing:border-box}body{margin:0 auto;max-width:1020px;padding:2rem 1.2rem 4rem;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)}
-h1{font-size:1.6rem;line-height:1.25;margin:.2rem 0 1rem}h2{font-size:1.15rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--line);padding-bottom:.2rem}h3{font-size:1rem;margin:1.2rem 0 .3rem}
-.kicker,.note,figcaption{color:var(--soft);font-size:.88rem}.verdict{display:inline-block;padding:.1rem .6rem;border-radius:1rem;background:var(--after);color:var(--paper);font-weight:600;font-size:.85rem}
-.verdict.unexplained{background:var(--before)}table{border-collapse:collapse;margin:.4rem 0;width:100%;font-size:.93rem}th,td{text-align:left;padding:.3rem .7rem .3rem 0;border-bottom:1px solid var(--line);vertical-align:top}th{font-weight:600}
-.num{font-variant-numeric:tabular-nums}.charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(340px,100%),1fr));gap:.6rem;margin-bottom:.6rem}figure{margin:0;background:var(--card);border-radius:.5rem;padding:.3rem}
-svg{width:100%;height:auto;display:block}.scroll{overflow-x:auto}body{overflow-wrap:anywhere}td,th{overflow-wrap:normal}
-.key span{margin-right:1.2rem;display:inline-block}.key i{display:inline-block;width:1.4rem;height:.22rem;vertical-align:middle;margin-right:.35rem}.bars th{width:14rem;font-weight:400}.track{width:45%}.bar{height:.8rem;border-radius:.2rem;background:var(--data);min-width:2px}.bar.chosen{background:var(--after)}
-ul{margin:.3rem 0;padding-left:1.2rem}code{font-size:.92em;overflow-wrap:anywhere}footer{margin-top:3rem;border-top:1px solid var(--line)}
-@media(max-width:600px){body{padding:1rem .8rem 3rem}h1{font-size:1.3rem}.bars th{width:auto}.track{width:30%}}@media print{body{max-width:none;padding:0}figure,tr{break-inside:avoid}h2{break-after:avoid}}
-";
+pub const STYLE: &str = include_str!("page.css");
 
 /// Style of what a diagnosis has beyond other pages: the explorer and the corner plot.
 const REPORT_STYLE: &str = "
