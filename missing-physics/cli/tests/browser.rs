@@ -83,6 +83,16 @@ fn browser_explores_a_report() {
     browser.value("document.querySelector('input[type=checkbox]').click()");
     browser.picture("logarithmic");
 
+    // Seen from above, the ball's places: along against across.
+    browser.value("document.querySelector('input[type=checkbox]').click()");
+    assert_eq!(browser.choose("channel", 3), "seen from above");
+    let axis = browser.text(
+        "document.querySelector('select[aria-label=\"horizontal axis\"]').selectedOptions[0].textContent",
+    );
+    let label = browser.point(0.5).0;
+    assert!(axis == "against position x (m)" && label.contains("position x (m)"), "{axis}: {label}");
+    browser.picture("above");
+
     // A narrow page scrolls down alone; dark and on paper.
     browser.width(400);
     browser.media("screen", "dark");

@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use missing_physics_import::{Imported, Request, import};
+use missing_physics_import::file::read_bytes;
+use missing_physics_import::{ImportError, Imported, Request, import, import_tables};
 
 fn file(name: &str) -> PathBuf {
     let folder = if name == "throws.csv" { "../../recordings" } else { "tests/files" };
@@ -168,4 +169,31 @@ fn sound_is_taken_as_it_is_for_bounces() {
     let maps = vec!["y=channel 1".into(), "sim_y=channel 1".into()];
     let signal = import(&Request { maps, ..request("drop.wav", "custom") }).unwrap();
     assert_eq!(rows(&signal, &["t_s", "y"]).len(), 5500);
+}
+
+#[test]
+fn files_in_memory_are_imported_like_files_on_disk() {
+    for name in
+        ["throws.csv", "excel.tsv", "labview.txt", "savetxt.dat", "flight.npz", "flight.mat", "bag.mcap"]
+    {
+        let request = request(name, "trajectory");
+        let path = &request.files[0];
+        let tables = read_bytes(path, &std::fs::read(path).unwrap());
+        let found = tables.and_then(|tables| import_tables(&request, tables));
+        assert_eq!(found, import(&request), "{name}");
+        if let Ok(Imported { mapped, .. }) = found {
+            let height = mapped.iter().find(|m| m.target == "z_m").unwrap();
+            assert!(height.title.is_some() && height.formula.contains('"'), "{name}: {height:?}");
+        }
+    }
+    let sound = request("drop.wav", "bounce");
+    let tables = read_bytes(&sound.files[0], &std::fs::read(&sound.files[0]).unwrap()).unwrap();
+    assert_eq!(import_tables(&sound, tables), import(&sound));
+    let parquet = read_bytes(Path::new("a.parquet"), b"PAR1");
+    assert!(
+        matches!(&parquet, Err(ImportError::Broken { why, .. }) if why.contains("from a file on disk")),
+        "{parquet:?}"
+    );
+    let nothing = read_bytes(Path::new("a.csv"), b"t,z\n");
+    assert!(matches!(nothing, Err(ImportError::Broken { .. })), "{nothing:?}");
 }

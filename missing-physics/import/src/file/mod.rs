@@ -127,7 +127,13 @@ enum Format {
 
 /// The format that a name tells.
 fn format(path: &Path) -> Result<Format, ImportError> {
-    #[cfg(not(all(feature = "mat", feature = "mcap", feature = "numpy", feature = "parquet", feature = "wav")))]
+    #[cfg(not(all(
+        feature = "mat",
+        feature = "mcap",
+        feature = "numpy",
+        feature = "parquet",
+        feature = "wav"
+    )))]
     let left_out = |feature| Err(ImportError::LeftOut { file: path.into(), feature });
     let instead = |why: &str| Err(ImportError::Broken { file: path.into(), why: why.into() });
     match ending(path).as_str() {
@@ -154,9 +160,7 @@ fn format(path: &Path) -> Result<Format, ImportError> {
         "mat" => left_out("mat"),
         #[cfg(not(feature = "wav"))]
         "wav" | "wave" => left_out("wav"),
-        "db3" => {
-            instead("a bag in SQLite: make it MCAP by \"ros2 bag convert\" with storage_id: mcap")
-        }
+        "db3" => instead("a bag in SQLite: make it MCAP by \"ros2 bag convert\" with storage_id: mcap"),
         "bag" => instead("a bag of ROS 1: make it MCAP by \"mcap convert in.bag out.mcap\""),
         "xls" | "xlsx" | "ods" => instead("a spreadsheet: save the sheet as CSV"),
         "h5" | "hdf5" | "pkl" | "tdms" => instead("not read: save its columns as CSV, .npz or Parquet"),

@@ -8,8 +8,7 @@ use crate::error::ImportError;
 use crate::table::{Column, Table, Values};
 
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<Table>, ImportError> {
-    let broken =
-        |e: hound::Error| ImportError::broken(path, format!("no sound in a form that is read: {e}"));
+    let broken = |e: hound::Error| ImportError::broken(path, format!("no sound in a form that is read: {e}"));
     let mut reader = WavReader::new(bytes).map_err(broken)?;
     let spec = reader.spec();
     let width = usize::from(spec.channels);

@@ -3,7 +3,7 @@
 (() => {
   const home = document.getElementById("explore");
   const data = JSON.parse(document.getElementById("curves").textContent);
-  // Of a machine that moves, what its people look at: each output's rate against the output, by central differences.
+  // Of what swings, what its people look at: each output's rate against the output, by central differences.
   const rate = (time, values) => {
     const half = Math.max(1, Math.round(values.length / 300));
     return values.map((v, i) => {
@@ -89,17 +89,19 @@
     const pick = (values) => order.map((i) => values[i] ?? null);
     const at = (colour) => () => colours()[colour];
     const dots = Math.max(3, Math.min(6, 900 / Math.sqrt(order.length + 1) / 8));
-    const axis = (text, size) => ({ label: text, labelSize: 22, labelFont: "12px system-ui", font: "12px system-ui", size, stroke: at("soft"), grid: { stroke: at("line"), width: 0.7 }, ticks: { stroke: at("line"), width: 0.7 } });
+    const axis = (text, size) => ({ label: text, labelSize: 22, labelFont: "12px system-ui", font: "12px system-ui", size, stroke: at("soft"), values: (u, splits) => splits.map((v) => (v == null || (log && short(v, 1) !== short(v, 6)) ? "" : short(v, 6))), grid: { stroke: at("line"), width: 0.7 }, ticks: { stroke: at("line"), width: 0.7 } });
     // Seen from above, a metre is as long along as across.
     const ends = (values) => values.reduce(([l, h], v) => (v == null ? [l, h] : [Math.min(l, v), Math.max(h, v)]), [Infinity, -Infinity]);
     const [wide, tall] = [ends(pick(rows.x)), ends(series.flatMap((s) => pick(rows[s.key])))];
-    const pixel = equal ? Math.max((wide[1] - wide[0]) / (place.clientWidth - 90), (tall[1] - tall[0]) / (height - 66), 1e-12) * 1.1 : 0;
+    const pixel = equal ? Math.max((wide[1] - wide[0]) / (place.clientWidth - 108), (tall[1] - tall[0]) / (height - 66), 1e-12) * 1.1 : 0;
+    const roomy = (low, top) => [low * (low / top) ** 0.03, top * (top / low) ** 0.03];
     const about = ([low, top], pixels) => [0.5 * (low + top) - 0.5 * pixel * pixels, 0.5 * (low + top) + 0.5 * pixel * pixels];
     const options = {
       width: place.clientWidth, height, legend: { show: false }, padding: [8, 24, 0, 0],
       cursor: { sync: { key: "run", setSeries: false, scales: ["x", null] }, drag: { x: true, y: false, dist: 4 }, y: false, points: { size: 8 } },
-      scales: { x: { time: false, distr: log ? 3 : 1, range: pixel ? (u, low, top) => (low === wide[0] && top === wide[1] ? about(wide, place.clientWidth - 86) : [low, top]) : undefined }, y: { distr: log && !band ? 3 : 1, range: log && !band ? undefined : (u, low, high) => {
+      scales: { x: { time: false, distr: log ? 3 : 1, range: pixel ? (u, low, top) => (low === wide[0] && top === wide[1] ? about(wide, place.clientWidth - 108) : [low, top]) : log ? (u, low, top) => (low === wide[0] && top === wide[1] ? roomy(low, top) : [low, top]) : undefined }, y: { distr: log && !band ? 3 : 1, range: (u, low, high) => {
         if (low == null) return [0, 1];
+        if (log && !band) return roomy(low, high);
         if (pixel) return about(tall, height - 66);
         if (band) [low, high] = [Math.min(low, -band), Math.max(high, band)];
         const room = 0.06 * (high - low) || 0.5 * Math.abs(high) || 1e-9;
@@ -185,6 +187,7 @@
     const inRun = state.run < 0 || !place || place.runs.length === 0 || place.runs.includes(data.runs[state.run].label);
     const shade = place && place.variable === state.axis && inRun ? [place.from, place.to] : null;
     shadeKey.hidden = !shade;
+    bandKey.hidden = !channel.sigma;
     const fits = [{ key: "before", colour: "before", dash: [6, 4], dots: single, size: 11 }];
     if (data.changed) fits.push({ key: "after", colour: "after", dots: single, size: 11 });
     const lefts = [{ key: "left", colour: "before", dots: true }];

@@ -26,7 +26,7 @@ struct Data {
     log_first: bool,
     /// The channels that are places along and across, seen from above.
     plan: Option<[usize; 2]>,
-    /// Whether phase portraits are drawn: of machines that move in time.
+    /// Whether phase portraits are drawn: of what swings in time.
     phase: bool,
     /// Which rows are there: every so many-th.
     every: usize,
@@ -107,7 +107,8 @@ fn data(d: &Diagnosis, context: &ReportContext) -> Data {
         // A force against a depth is a power law, to those who measure it.
         log_first: positive(d) && context.domain == "indentation",
         plan: plan(d, &order),
-        phase: context.domain == "motion" && d.variables.first().is_some_and(|(name, _)| name == "t_s"),
+        phase: matches!(context.domain.as_str(), "motion" | "slosh")
+            && d.variables.first().is_some_and(|(name, _)| name == "t_s"),
         every,
         variables,
         channels,
