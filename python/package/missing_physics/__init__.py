@@ -1,0 +1,38 @@
+"""Which physics does a simulation leave out? Recordings and a simulator in, a diagnosis out.
+
+    >>> import missing_physics as mp
+    >>> answer = mp.diagnose("recordings/dropped-ball")     # doctest: +SKIP
+    >>> answer.verdict, answer.chosen                       # doctest: +SKIP
+    ('explained', ['quadratic-drag'])
+"""
+
+from __future__ import annotations
+
+from . import bayes_sim, errors, hertz_contact
+from ._diagnose import diagnose, domains
+from ._diagnosis import Diagnosis, Estimate, MechanismReport, Prediction, Repaired, RunCurves
+from ._engine import version as _version
+from ._model import Mechanism, Model, Parameter
+from .errors import MissingPhysicsError, NoPrediction
+
+__version__ = _version()
+
+__all__ = [
+    "Diagnosis",
+    "Estimate",
+    "Mechanism",
+    "MechanismReport",
+    "MissingPhysicsError",
+    "Model",
+    "NoPrediction",
+    "Parameter",
+    "Prediction",
+    "Repaired",
+    "RunCurves",
+    "__version__",
+    "bayes_sim",
+    "diagnose",
+    "domains",
+    "errors",
+    "hertz_contact",
+]

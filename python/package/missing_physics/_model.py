@@ -1,0 +1,144 @@
+"""A simulator of one's own as a model: what it predicts, what is unknown in it, what it may leave out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _engine
+from ._recording import Run, Runs, Table, labelled, memory
+from .errors import DiagnosisError, RecordingError
+
+#: ``predict(parameters, inputs)``: numbers by name and columns by name in, columns of the channels by name out.
+Predict = Callable[[dict[str, Any], dict[str, Any]], Any]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that the simulator needs and nobody knows exactly.
+
+    ``start`` is where a fit begins; in a mechanism, the value at which it makes no difference. ``scale`` is a typical error of
+    ``start`` (a tenth of it, or 1, where nothing is said). ``per_run``: each run has its own (where it began). The unit is the
+    name's ending (``k_per_m``) unless ``unit`` says another.
+    """
+
+    name: str
+    start: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    scale: float | None = None
+    per_run: bool = False
+    unit: str | None = None
+
+    def _header(self, start: str) -> dict[str, Any]:
+        unit = _engine.unit_of(self.name) if self.unit is None else self.unit
+        scale = self.scale if self.scale is not None else abs(self.start) / 10 or 1.0
+        keys = {"name": self.name, "unit": unit, start: float(self.start), "scale": float(scale)}
+        bounds = {"lower": float(self.lower), "upper": float(self.upper)}
+        return {**keys, **bounds, **({"per_run": True} if self.per_run else {})}
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Physics that the simulator can do, and that is off in the baseline: each of its parameters at its ``start``.
+
+    ``id`` is in lower case with hyphens (``dry-friction``).
+    """
+
+    id: str
+    parameters: Sequence[Parameter]
+    name: str = ""
+    explanation: str = ""
+    equation: str = ""
+    reference: str = ""
+    confused_with: Sequence[str] = ()
+
+    def _header(self) -> dict[str, Any]:
+        texts = {key: getattr(self, key) for key in ("name", "explanation", "equation", "reference")}
+        header: dict[str, Any] = {"id": self.id, **{key: text for key, text in texts.items() if text}}
+        if self.confused_with:
+            header["confused_with"] = list(self.confused_with)
+        return {**header, "parameter": [parameter._header("off") for parameter in self.parameters]}
+
+
+@dataclass(frozen=True)
+class Model:
+    """A simulator with its parameters and mechanisms.
+
+    ``predict(parameters, inputs)`` gets a dict of numbers by name and a dict of arrays of shape (rows,) by name, and returns a dict of
+    arrays of shape (rows,), one a channel; with one channel the array alone will do. With ``batched`` the numbers are arrays of shape
+    (sets,) and each channel has the shape (sets, rows). The same question has to have the same answer: seed what is random. It may raise
+    :class:`~missing_physics.errors.NoPrediction` where there is no answer at these parameters; whatever else it raises ends the
+    diagnosis and is raised there.
+
+    Which columns of the runs are ``inputs`` (known exactly; noise may be correlated along the first) and which are ``channels``
+    (measured) is asked of ``predict`` where it is not said. ``step`` is that of derivatives, in scales of a parameter: well above
+    the simulator's own rounding. ``noise`` holds one sigma of a channel where there was a calibration.
+    """
+
+    predict: Predict
+    parameters: Sequence[Parameter] = ()
+    mechanisms: Sequence[Mechanism] = ()
+    inputs: Sequence[str] = ()
+    channels: Sequence[str] = ()
+    baseline: str = ""
+    batched: bool = False
+    step: float = 1e-3
+    noise: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def _starts(self) -> dict[str, float]:
+        freed = [parameter for mechanism in self.mechanisms for parameter in mechanism.parameters]
+        return {parameter.name: float(parameter.start) for parameter in [*self.parameters, *freed]}
+
+    def _columns(self, table: Table, channels: Sequence[str]) -> tuple[list[str], list[str]]:
+        """The inputs and the channels among a table's columns."""
+        given = [name for name, _ in table.columns if name != "run"]
+        channels = list(channels)
+        if not channels:
+            if self.batched:
+                raise DiagnosisError("a batched model says which columns are its channels, and this one has none")
+            answer = self.predict(self._starts(), table.first())
+            if not isinstance(answer, Mapping):
+                raise DiagnosisError("a model that returns an array alone says which column is its channel")
+            channels = [str(name) for name in answer]
+        absent = [name for name in channels if name not in given]
+        if absent:
+            raise RecordingError(f"the channel {absent[0]} is no column of the runs, which have {', '.join(given)}")
+        return list(self.inputs) or [name for name in given if name not in channels], channels
+
+    def _source(self, runs: Runs, name: str, gaps: bool = False, channels: Sequence[str] = ()) -> tuple[_engine.Source, Table]:
+        """Runs as a recording in memory; ``channels`` where they are known already, and may be absent with ``gaps``."""
+        channels = channels or self.channels
+        if self.inputs and channels:
+            runs = _only(runs, [*self.inputs, *channels])
+        table = Table(runs, gaps=gaps, wanted=channels if gaps else ())
+        inputs, channels = self._columns(table, channels)
+        header: dict[str, Any] = {
+            "domain": "custom",
+            "input": [self._quantity(name) for name in inputs],
+            "channel": [self._quantity(name) for name in channels],
+            "simulator": {"step": float(self.step)},
+            "parameter": [parameter._header("start") for parameter in self.parameters],
+            "mechanism": [mechanism._header() for mechanism in self.mechanisms],
+        }
+        if self.noise:
+            header["noise"] = {name: float(sigma) for name, sigma in self.noise.items()}
+        if self.baseline:
+            header["baseline"] = self.baseline
+        return memory(header, table, name, None), table
+
+    def _quantity(self, name: str) -> dict[str, str]:
+        return {"name": name, "unit": self.units.get(name, _engine.unit_of(name))}
+
+    def _simulator(self) -> _engine.Simulator:
+        return _engine.Simulator(self.predict, self.batched)
+
+
+def _only(runs: Runs, wanted: Sequence[str]) -> Runs:
+    """Runs without the columns that a model does not speak of."""
+    labels, given = labelled(runs)
+    kept: list[Run] = [{name: run[name] for name in run if name in wanted} for run in given]
+    return [{"run": label, **run} for label, run in zip(labels, kept)]

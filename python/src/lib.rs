@@ -1,0 +1,30 @@
+//! What the Python package `missing_physics` calls. The package adds names, defaults and what is pleasant; here is what it rests on.
+
+mod answer;
+mod array;
+mod contact;
+mod errors;
+mod function;
+mod posteriors;
+mod predict;
+mod source;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// The module `missing_physics._engine`.
+#[pymodule]
+mod _engine {
+    #[pymodule_export]
+    use crate::answer::diagnose;
+    #[pymodule_export]
+    use crate::contact::fit_contact;
+    #[pymodule_export]
+    use crate::function::Simulator;
+    #[pymodule_export]
+    use crate::posteriors::{Density, Prior};
+    #[pymodule_export]
+    use crate::predict::{domains, predict, unit_of, version};
+    #[pymodule_export]
+    use crate::source::Source;
+}
