@@ -4,29 +4,10 @@ use missing_physics::data::Run;
 use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
 
 use super::model::LiquidTiltModel;
-use super::setup::Vessel;
-
-/// By how much one pose is off.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Off {
-    /// Of the liquid's mass and volume, relative.
-    pub(super) liquid: f64,
-    pub(super) angle_rad: f64,
-    pub(super) grasp_m: f64,
-}
+use super::setup::{Off, Vessel};
 
 /// Steps of the differences: of the liquid, rad, m.
 const STEP: f64 = 1e-5;
-
-impl Off {
-    fn of(unknown: usize, size: f64) -> Self {
-        match unknown {
-            0 => Self { liquid: size, ..Self::default() },
-            1 => Self { grasp_m: size, ..Self::default() },
-            _ => Self { angle_rad: size, ..Self::default() },
-        }
-    }
-}
 
 impl LocalCauses for LiquidTiltModel {
     fn unknowns(&self) -> Vec<LocalUnknown> {

@@ -4,8 +4,7 @@ use liquid_haptics::wrench::Departures;
 use missing_physics::data::Run;
 use missing_physics::model::{ErrorModel, Extensions, Model, MultimodalModel, PredictError, Scope, Spec};
 
-use super::local::Off;
-use super::setup::{Cavity, Setup, Vessel};
+use super::setup::{Cavity, Off, Setup, Vessel};
 use super::spec::{Layout, build};
 use crate::memo::Memo;
 

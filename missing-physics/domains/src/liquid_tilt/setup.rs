@@ -77,3 +77,23 @@ pub struct Setup {
     /// Whether the volume of each run was measured (input 2).
     pub volumes_known: bool,
 }
+
+/// By how much one pose is off.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Off {
+    /// Of the liquid's mass and volume, relative.
+    pub(super) liquid: f64,
+    pub(super) angle_rad: f64,
+    pub(super) grasp_m: f64,
+}
+
+impl Off {
+    /// One of the unknowns of a cause that acts in some poses, and nothing else.
+    pub(super) fn of(unknown: usize, size: f64) -> Self {
+        match unknown {
+            0 => Self { liquid: size, ..Self::default() },
+            1 => Self { grasp_m: size, ..Self::default() },
+            _ => Self { angle_rad: size, ..Self::default() },
+        }
+    }
+}

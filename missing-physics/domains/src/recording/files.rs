@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::error::{LARGEST_FILE, ReadError};
-use super::source::HEADER;
 use super::words::{one_line, quoted};
+
+/// Name of a recording's header.
+pub(super) const HEADER: &str = "recording.toml";
 
 /// Reads a file of limited size.
 ///

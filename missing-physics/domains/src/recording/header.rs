@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use toml::{Table, Value};
 
 use super::error::ReadError;
-use super::files::within;
-use super::source::{HEADER, NamedFile, Source};
+use super::files::{HEADER, within};
+use super::source::{NamedFile, Source};
 use super::table::{self, Column, ColumnContents};
 use super::words::{one_line, quoted};
 

@@ -8,11 +8,8 @@ use std::sync::Arc;
 use sha2::{Digest as _, Sha256};
 
 use super::error::{LARGEST_FILE, ReadError};
-use super::files::{read_bytes, within};
-use super::table::Values;
-
-/// Name of a recording's header.
-pub(super) const HEADER: &str = "recording.toml";
+use super::files::{HEADER, read_bytes, text_of, within};
+use super::table::{Sheet, Values};
 
 /// Where the files of a recording are.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,14 +47,6 @@ pub struct Memory {
 #[derive(Debug, Clone, PartialEq)]
 enum Content {
     Bytes(Arc<[u8]>),
-    Columns(Arc<[(String, Values)]>),
-}
-
-/// A table as it comes from a source.
-pub(super) enum Sheet {
-    /// The text of a CSV file.
-    Text(String),
-    /// Columns that were never text.
     Columns(Arc<[(String, Values)]>),
 }
 
@@ -152,7 +141,7 @@ impl Source {
 
     /// The text of a file.
     pub(super) fn text(&self, name: &str) -> Result<String, ReadError> {
-        super::files::text_of(self.shown(name), self.bytes(name)?)
+        text_of(self.shown(name), self.bytes(name)?)
     }
 
     /// SHA-256 of the header and of every file that the header names, in hexadecimal digits, by the file's name. Of a table that is there as

@@ -1,7 +1,6 @@
 //! CSV tables with named columns, read strictly.
 
 use super::error::ReadError;
-use super::source::Sheet;
 use super::words::{one_line, quoted, unit_of};
 
 /// Numbers beyond this are mistakes of unit or format.
@@ -36,6 +35,14 @@ pub enum Values {
     Labels(Vec<String>),
     /// Finite numbers; NaN for an empty cell, where they may be empty.
     Numbers(Vec<f64>),
+}
+
+/// A table as it comes from a source.
+pub(super) enum Sheet {
+    /// The text of a CSV file.
+    Text(String),
+    /// Columns that were never text.
+    Columns(std::sync::Arc<[(String, Values)]>),
 }
 
 /// A table as it was read.
