@@ -3,6 +3,7 @@
 pub(crate) mod begin;
 mod course;
 mod input;
+pub mod stream;
 
 use crate::data::Recording;
 use crate::diagnosis::{Contradiction, Diagnosis, Verdict};
