@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use missing_physics::engine::Options;
-use missing_physics_cli::commands::{self, CommandError, DiagnoseArguments, Said};
+use missing_physics_cli::commands::{self, CommandError, DiagnoseArguments, Said, WatchArguments};
 use missing_physics_domains::recording::program_of;
 use missing_physics_import::Request;
 use missing_physics_prove::{ProveArguments, prove};
@@ -128,6 +128,29 @@ enum Command {
         #[arg(long, default_value_t = 0)]
         threads: usize,
     },
+    /// Watches a recording that grows: has anything changed since its first runs, from which run on, and what?
+    Watch {
+        /// The recording's folder, whose files grow.
+        folder: PathBuf,
+        /// So many runs at the beginning are those in which all was well.
+        #[arg(long, default_value_t = 5, value_name = "RUNS")]
+        reference: usize,
+        /// Rate of false alarms over all looks together, above 0 and below 0.5.
+        #[arg(long, default_value_t = 0.05)]
+        alpha: f64,
+        /// A last run is whole once the files have not changed for so long.
+        #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
+        settle: f64,
+        /// End once nothing has come for so long.
+        #[arg(long, value_name = "SECONDS")]
+        end_after: Option<f64>,
+        /// Rows of data.csv come on standard input, and are written behind those that are there.
+        #[arg(long)]
+        pipe: bool,
+        /// Start the program that the recording names (`custom`).
+        #[arg(long)]
+        allow_command: bool,
+    },
     /// Lists what the tool knows: domains, baselines, mechanisms, columns.
     Domains,
     /// Reads and validates a recording, no more.
@@ -181,6 +204,22 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
             ));
             let arguments = ProveArguments { domain, worlds, kind, seed, folder: out, threads };
             Ok(prove(&arguments, &Steps::new(loudness))?.into())
+        }
+        Command::Watch { folder, reference, alpha, settle, end_after, pipe, allow_command } => {
+            permit(&folder, allow_command)?;
+            on_interrupt("nothing was written".into());
+            let options = Options::with_alpha(alpha);
+            let arguments =
+                WatchArguments { folder, reference, options, settle_s: settle, end_after_s: end_after, pipe };
+            let quiet = loudness == Loudness::Quiet;
+            commands::watch(&arguments, &mut |line| {
+                if !quiet {
+                    let mut out = std::io::stdout().lock();
+                    // A reader that has gone away misses what is said, no more.
+                    let _ = writeln!(out, "{}", shown(line, std::io::stdout().is_terminal()));
+                }
+            })?;
+            Ok(Said::default())
         }
         Command::Domains => Ok(commands::domains().into()),
         Command::Check { folder } => Ok(commands::check(&folder)?.into()),

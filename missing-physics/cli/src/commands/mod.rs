@@ -9,6 +9,7 @@ mod new;
 mod output;
 mod predict;
 mod provenance;
+mod watch;
 
 pub use diagnose::{DiagnoseArguments, diagnose};
 pub use error::CommandError;
@@ -18,3 +19,4 @@ pub use many::{diagnose_many, into_folders};
 pub use new::new;
 pub use output::Said;
 pub use predict::predict;
+pub use watch::{WatchArguments, watch};
