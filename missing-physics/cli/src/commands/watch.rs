@@ -130,7 +130,9 @@ fn headline(text: &str) -> String {
 }
 
 fn line(run: &Run, look: &Look) -> String {
-    let begin = format!("run {}: e = {:.3}", run.label, look.e_value);
+    // From twenty on it is an alarm; how many powers of ten it has is enough of a large one.
+    let e = if look.e_value < 1e4 { format!("{:.3}", look.e_value) } else { format!("{:.0e}", look.e_value) };
+    let begin = format!("run {}: e = {e}", run.label);
     let Some(changed) = look.changed.as_ref().filter(|_| look.alarm.is_some()) else { return begin };
     format!("{begin}; something has changed from run {} on: {}", changed.first.1, what(changed))
 }
@@ -138,7 +140,7 @@ fn line(run: &Run, look: &Look) -> String {
 fn what(changed: &Changed) -> String {
     let Some((most, share)) = changed.what.first() else { return "nothing that is listed".into() };
     let one = changed.by.first().filter(|_| changed.by.len() == 1);
-    let by = one.map(|(by, error)| format!(" by {by:+.4} +- {error:.2}")).unwrap_or_default();
+    let by = one.map(|(by, error)| format!(" by {by:+.4} +- {error:.4}")).unwrap_or_default();
     let words = match most {
         What::Parameter { name, before, .. } => format!("{name} was {before:.5}, and differs{by}"),
         What::Mechanism { name, .. } => format!("{name}{by}"),
