@@ -28,6 +28,7 @@ fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
             "missing-physics" | "worlds" => vec![],
             name if SHARED.contains(&name) => vec![],
             "hw-drivers" => vec!["hw-traits"],
+            "hw-record" => vec!["hw-drivers", "hw-traits"],
             name if CHAPTERS.contains(&name) => SHARED.to_vec(),
             "missing-physics-pours" => vec![],
             "missing-physics-report" => vec!["missing-physics"],
