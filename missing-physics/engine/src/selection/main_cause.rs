@@ -17,9 +17,8 @@ use crate::selection::candidate::Candidate;
 use crate::selection::evidence::evidence;
 use crate::selection::share::unseen_misfit;
 
-/// The part of the squared misfit beyond the noise that a main cause takes away on unseen data: what takes 0.9 is one, what takes 0.85 is not, and the
-/// estimate of either scatters.
-const NEARLY_ALL: f64 = 0.875;
+/// The part of the squared misfit beyond the noise that a main cause takes away on unseen data.
+const NEARLY_ALL: f64 = 0.9;
 /// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
 const NEEDED: f64 = 5.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
