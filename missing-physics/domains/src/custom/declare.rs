@@ -1,10 +1,11 @@
 //! What a recording says of its simulator: program, parameters, mechanisms.
 
-use missing_physics::model::{ParameterRef, SpecBuilder, UNBOUNDED};
+use missing_physics::data::Run;
+use missing_physics::model::{ParameterRef, Quantity, SpecBuilder, UNBOUNDED};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::model::Names;
+use super::model::{Begins, Names};
 use super::process::Start;
 use crate::recording::{Header, ReadError, Section, quoted};
 
@@ -14,24 +15,58 @@ pub(super) fn program(header: &Header) -> Result<(Option<Start>, f64), ReadError
     let command = section.texts("command")?;
     let limit = section.number("timeout_s", 1e-3, 1e5)?.unwrap_or(60.0);
     let processes = section.number("processes", 1.0, 1024.0)?.unwrap_or(1.0);
+    let batch = section.number("batch", 1.0, 1024.0)?.unwrap_or(1.0);
     let step = section.number("step", 1e-9, 1.0)?.unwrap_or(1e-3);
     if processes.fract() != 0.0 {
         return Err(section.unfit("processes", processes.to_string(), "a whole number from 1 to 1024"));
+    }
+    if batch.fract() != 0.0 {
+        return Err(section.unfit("batch", batch.to_string(), "a whole number from 1 to 1024"));
     }
     let start = command.map(|command| Start {
         command: command.into_iter().map(str::to_owned).collect(),
         folder: header.source.working_folder().into(),
         limit: Duration::from_secs_f64(limit),
         processes: processes as usize,
+        batch: batch as usize,
     });
     Ok((start, step))
 }
 
-/// Adds the declared parameters and mechanisms to a specification.
-pub(super) fn declare(header: &Header, b: &mut SpecBuilder) -> Result<Names, ReadError> {
+/// Adds the declared parameters and mechanisms to a specification: what the program knows them by, and those that begin in each run
+/// where it says.
+pub(super) fn declare<'h>(
+    header: &'h Header,
+    b: &mut SpecBuilder,
+) -> Result<(Names, Vec<ByRun<'h>>), ReadError> {
     let mut names = Names::new();
+    let mut by_run = Vec::new();
     for section in header.root().sections("parameter")? {
-        parameter(&section, "start", None, b, &mut names)?;
+        let wanted = match section.list("start", UNBOUNDED[0], UNBOUNDED[1])? {
+            Some(list) => Some(Wanted::List(list)),
+            None => {
+                section.optional_text("start", "").unwrap_or(None).map(|text| Wanted::Text(text.to_owned()))
+            }
+        };
+        let default = match &wanted {
+            None => None,
+            Some(Wanted::List(list)) => Some(list.iter().sum::<f64>() / list.len() as f64),
+            Some(Wanted::Text(_)) => Some(0.0),
+        };
+        if let Some(wanted) = wanted {
+            if !section.flag("per_run")?.unwrap_or(false) {
+                return Err(section.unfit(
+                    "start",
+                    wanted.word(),
+                    "a number: one value for all runs (per_run is false)",
+                ));
+            }
+            let begin = default.unwrap_or(0.0);
+            let at = parameter(&section, Begin::At(begin), b, &mut names)?;
+            by_run.push(ByRun { section, slot: at.slot, wanted });
+        } else {
+            parameter(&section, Begin::Key("start", None), b, &mut names)?;
+        }
     }
     let mut ids = BTreeSet::new();
     for section in header.root().sections("mechanism")? {
@@ -48,21 +83,86 @@ pub(super) fn declare(header: &Header, b: &mut SpecBuilder) -> Result<Names, Rea
         let nuisance: Vec<ParameterRef> = section
             .sections("parameter")?
             .iter()
-            .map(|s| parameter(s, "off", Some(0.0), b, &mut names))
+            .map(|s| parameter(s, Begin::Key("off", Some(0.0)), b, &mut names))
             .collect::<Result<_, _>>()?;
         if nuisance.is_empty() {
             return Err(section.unfit("parameter", "absent", "at least one [[mechanism.parameter]]"));
         }
         b.mechanism(id, &nuisance, texts, &confused);
     }
-    Ok(names)
+    Ok((names, by_run))
 }
 
-/// One parameter, which begins (or is off) at the value of the key `start`.
+/// A parameter of each run that begins where its run says.
+pub(super) struct ByRun<'h> {
+    section: Section<'h>,
+    slot: usize,
+    wanted: Wanted,
+}
+
+/// What a recording writes as such a start.
+enum Wanted {
+    List(Vec<f64>),
+    Text(String),
+}
+
+impl Wanted {
+    fn word(&self) -> String {
+        match self {
+            Self::List(list) => format!("a list of {}", list.len()),
+            Self::Text(text) => quoted(text),
+        }
+    }
+}
+
+impl ByRun<'_> {
+    /// Its slot, and where it begins in each of the runs: a number for each of them, or the first reading of the channel with whose name
+    /// its own begins.
+    pub(super) fn begins(&self, runs: &[Run], channels: &[Quantity]) -> Result<(usize, Begins), ReadError> {
+        let begins = match &self.wanted {
+            Wanted::List(list) if list.len() == runs.len() => {
+                Begins::Given(runs.iter().map(|run| run.label.clone()).zip(list.iter().copied()).collect())
+            }
+            Wanted::List(_) => {
+                let expected = format!("{} numbers, one for each run in the order of the file", runs.len());
+                return Err(self.section.unfit("start", self.wanted.word(), expected));
+            }
+            Wanted::Text(text) if text == "measured" => {
+                let name = self.section.text("name", "a name")?;
+                let of = (0..channels.len()).filter(|&c| name.starts_with(&channels[c].name));
+                match of.max_by_key(|&c| channels[c].name.len()) {
+                    Some(channel) => Begins::Measured(channel),
+                    None => {
+                        let expected = format!(
+                            "a parameter whose name begins with a channel's ({}_at_start)",
+                            channels.first().map_or("", |c| c.name.as_str())
+                        );
+                        return Err(self.section.unfit("start", self.wanted.word(), expected));
+                    }
+                }
+            }
+            Wanted::Text(_) => {
+                let expected = "a number, a list of one for each run, or \"measured\"";
+                return Err(self.section.unfit("start", self.wanted.word(), expected));
+            }
+        };
+        Ok((self.slot, begins))
+    }
+}
+
+/// Where a parameter begins (or is off).
+#[derive(Clone, Copy)]
+enum Begin<'a> {
+    /// At the value of a key, or a default.
+    Key(&'a str, Option<f64>),
+    /// Somewhere within its bounds, near this value.
+    At(f64),
+}
+
+/// One parameter.
 fn parameter(
     section: &Section<'_>,
-    start: &str,
-    default: Option<f64>,
+    begin: Begin<'_>,
     b: &mut SpecBuilder,
     names: &mut Names,
 ) -> Result<ParameterRef, ReadError> {
@@ -78,10 +178,15 @@ fn parameter(
     if !(upper > lower) {
         return Err(section.unfit("upper", upper.to_string(), format!("a number above lower ({lower})")));
     }
-    let given = section.number(start, lower, upper)?;
-    let begin = match given.or(default.filter(|d| (lower..=upper).contains(d))) {
-        Some(value) => value,
-        None => section.required(start, lower, upper)?,
+    let begin = match begin {
+        Begin::At(value) => value.clamp(lower, upper),
+        Begin::Key(key, default) => {
+            let given = section.number(key, lower, upper)?;
+            match given.or(default.filter(|d| (lower..=upper).contains(d))) {
+                Some(value) => value,
+                None => section.required(key, lower, upper)?,
+            }
+        }
     };
     let scale = section.required("scale", f64::MIN_POSITIVE, f64::MAX)?;
     let at = if section.flag("per_run")?.unwrap_or(false) {

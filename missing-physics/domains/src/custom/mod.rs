@@ -4,6 +4,7 @@ mod answer;
 mod declare;
 mod model;
 mod process;
+mod sensors;
 mod simulator;
 mod terms;
 
@@ -17,7 +18,7 @@ use crate::domain::{CheckedRecording, Domain, Loaded, Template};
 use crate::plausible;
 use crate::reading::{calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Source, Table, quoted};
-pub use answer::{Failure, fill, read_answer};
+pub use answer::{Failure, fill, read_answer, read_batch};
 use model::{CustomModel, Program, Simulation};
 use process::Pool;
 pub use process::end_all;
@@ -54,8 +55,8 @@ impl Domain for Custom {
                 "a list of texts: the program and its arguments, run in the recording's folder",
             ),
             (
-                "[simulator] timeout_s, processes, step",
-                "optional: 60 s an answer, 1 at once, 1e-3 scales for derivatives",
+                "[simulator] timeout_s, processes, step, batch",
+                "optional: 60 s an answer, 1 at once, 1e-3 scales for derivatives, sets of parameters in a line",
             ),
             ("[[parameter]] name, unit, start, lower, upper, scale, per_run", "free in the baseline"),
             (
@@ -108,7 +109,7 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
     let (start, relative_step) = declare::program(header)?;
     let program = within.or_else(|| start.map(|start| -> Arc<dyn Simulator> { Arc::new(Pool::new(start)) }));
     let mut b = SpecBuilder::default();
-    let parameters = declare::declare(header, &mut b)?;
+    let (parameters, by_run) = declare::declare(header, &mut b)?;
     b.baseline(header.root().optional_text("baseline", "a sentence")?.unwrap_or(BASELINE));
     let channel_names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
     let calibration = calibration(header, &channel_names)?;
@@ -122,6 +123,7 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
     }
     let table = header.table("data", &known)?;
     let runs = runs(&table, &inputs, &channels)?;
+    let begins = by_run.iter().map(|p| p.begins(&runs, &channels)).collect::<Result<Vec<_>, ReadError>>()?;
     let rises = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
     let along = runs.iter().all(rises);
     let sizes = |quantities: &[Quantity], column: fn(&Run, usize) -> &[f64]| -> Vec<(Quantity, f64)> {
@@ -144,6 +146,7 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
             extent: along.then(extent),
         },
     );
+    let sensors = sensors::add(&mut b, &channels, &inputs, &runs);
     let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
     let simulation = match program {
         Some(simulator) => {
@@ -169,7 +172,7 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
         calibration,
         resolution,
     };
-    let model = CustomModel { spec: b.build_unchecked(), simulation, terms, relative_step };
+    let model = CustomModel { spec: b.build_unchecked(), simulation, terms, sensors, begins, relative_step };
     let loaded = Loaded::new(recording, model, experiments, Vec::new());
     Ok(CheckedRecording::from(loaded).with_hints(hints))
 }

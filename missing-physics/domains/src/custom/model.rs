@@ -7,11 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use missing_physics::data::Run;
 use missing_physics::model::{
-    Extensions, ExternalProgram, Model, PredictError, Quantity, Scope, Spec, difference_points,
-    finite_differences,
+    Extensions, ExternalProgram, Model, MultimodalModel, PredictError, Quantity, Scope, Spec,
+    difference_points, finite_differences,
 };
 
 use super::answer::Failure;
+use super::sensors::Sensors;
 use super::simulator::{Questions, Simulator};
 use super::terms::Candidate;
 use crate::memo::{Memo, bits};
@@ -60,6 +61,9 @@ pub(super) struct CustomModel {
     pub(super) spec: Spec,
     pub(super) simulation: Simulation,
     pub(super) terms: Vec<Candidate>,
+    pub(super) sensors: Sensors,
+    /// Slots of parameters of each run, and where their fits begin.
+    pub(super) begins: Vec<(usize, Begins)>,
     pub(super) relative_step: f64,
 }
 
@@ -168,6 +172,24 @@ impl Program {
     }
 }
 
+/// Where the fit of a run's own parameter begins.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Begins {
+    /// At these values, by label of the run.
+    Given(HashMap<String, f64>),
+    /// At the first reading of this channel.
+    Measured(usize),
+}
+
+impl Begins {
+    fn of(&self, run: &Run) -> Option<f64> {
+        match self {
+            Self::Given(values) => values.get(&run.label).copied(),
+            Self::Measured(channel) => run.outputs[*channel].iter().copied().find(|v| v.is_finite()),
+        }
+    }
+}
+
 fn asked(run: &Run, inputs: u64, rows: usize, values: &[f64]) -> Asked {
     (run.label.clone(), inputs, rows, bits(values))
 }
@@ -208,7 +230,16 @@ impl Model for CustomModel {
                 term.apply(shared[term.slot], &run.inputs, &predicted, out);
             }
         }
+        self.sensors.read(shared, run.inputs.first().map_or(&[], Vec::as_slice), out);
         Ok(())
+    }
+
+    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
+        for (slot, begins) in &self.begins {
+            if let Some(value) = begins.of(run) {
+                nuisance[*slot] = value;
+            }
+        }
     }
 
     fn relative_step(&self) -> f64 {
@@ -240,7 +271,14 @@ impl Model for CustomModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { program: Some(self), ..Extensions::default() }
+        Extensions { program: Some(self), modes: Some(self), ..Extensions::default() }
+    }
+}
+
+impl MultimodalModel for CustomModel {
+    fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
+        let first = self.spec.mechanisms[mechanism].parameters.first();
+        first.map_or_else(Vec::new, |first| self.sensors.starts(*first))
     }
 }
 

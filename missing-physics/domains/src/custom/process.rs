@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::answer::{Failure, read_answer};
+use super::answer::{Failure, read_answer, read_batch};
 use super::simulator::{Questions, Simulator};
 use crate::recording::quoted;
 
@@ -29,9 +29,15 @@ const FAREWELL: Duration = Duration::from_millis(200);
 struct Request<'a> {
     id: u64,
     run: &'a str,
-    parameters: BTreeMap<&'a str, f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameters: Option<Values<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    batch: Option<Vec<Values<'a>>>,
     inputs: BTreeMap<&'a str, &'a [f64]>,
 }
+
+/// Parameters by name.
+type Values<'a> = BTreeMap<&'a str, f64>;
 
 /// How a simulator is started.
 #[derive(Debug, Clone)]
@@ -44,6 +50,8 @@ pub(super) struct Start {
     pub(super) limit: Duration,
     /// How many may run at once, at least 1.
     pub(super) processes: usize,
+    /// How many sets of parameters it takes in one line.
+    pub(super) batch: usize,
 }
 
 /// Simulators that wait for work.
@@ -67,20 +75,16 @@ impl Pool {
         Self { start, state: Mutex::default(), freed: Condvar::new() }
     }
 
-    /// Predicts `channels` of a run, one after the other into `out`.
-    fn ask(
+    /// Asks one question: what is read of the line that answers it, which may take so long.
+    fn ask<'a, R>(
         &self,
-        run: &str,
-        parameters: BTreeMap<&str, f64>,
-        inputs: BTreeMap<&str, &[f64]>,
-        channels: &[String],
-        out: &mut [f64],
-    ) -> Result<(), Failure> {
+        request: impl FnOnce(u64) -> Request<'a>,
+        limit: Duration,
+        read: impl Fn(&str, u64) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
         let (mut process, id) = self.take()?;
-        let request = Request { id, run, parameters, inputs };
-        let mut ask = |process: &mut Process| {
-            process.ask(&request, self.start.limit).and_then(|line| read_answer(&line, id, channels, out))
-        };
+        let request = request(id);
+        let ask = |process: &mut Process| process.ask(&request, limit).and_then(|line| read(&line, id));
         let mut answer = ask(&mut process);
         // One that has answered before is asked once more, afresh: a slow answer does not lose all that was worked out.
         if process.hung
@@ -141,12 +145,34 @@ impl Pool {
 impl Simulator for Pool {
     fn predict(&self, questions: &Questions<'_>) -> Result<Vec<Vec<f64>>, Failure> {
         let Questions { run, parameters, sets, inputs, channels, rows } = *questions;
-        let answer = |values: &Vec<f64>| {
-            let parameters = parameters.iter().copied().zip(values.iter().copied()).collect();
-            let mut out = vec![0.0; rows * channels.len()];
-            self.ask(run, parameters, inputs.iter().copied().collect(), channels, &mut out).map(|()| out)
+        let named = |values: &Vec<f64>| -> Values<'_> {
+            parameters.iter().copied().zip(values.iter().copied()).collect()
         };
-        sets.iter().map(answer).collect()
+        let inputs: BTreeMap<&str, &[f64]> = inputs.iter().copied().collect();
+        let numbers = rows * channels.len();
+        let answer = |sets: &[Vec<f64>]| -> Result<Vec<Vec<f64>>, Failure> {
+            let limit = self.start.limit;
+            if let [alone] = sets {
+                let parameters = Some(named(alone));
+                let request = |id| Request { id, run, parameters, batch: None, inputs: inputs.clone() };
+                let read = |line: &str, id| {
+                    let mut out = vec![0.0; numbers];
+                    read_answer(line, id, channels, &mut out).map(|()| out)
+                };
+                return Ok(vec![self.ask(request, limit, read)?]);
+            }
+            let batch = Some(sets.iter().map(named).collect());
+            let request = |id| Request { id, run, parameters: None, batch, inputs: inputs.clone() };
+            let limit = limit.saturating_mul(u32::try_from(sets.len()).unwrap_or(u32::MAX));
+            let read = |line: &str, id| read_batch(line, id, channels, numbers, sets.len());
+            self.ask(request, limit, read)?.into_iter().collect()
+        };
+        let answers: Result<Vec<_>, Failure> = sets.chunks(self.start.batch.max(1)).map(answer).collect();
+        Ok(answers?.concat())
+    }
+
+    fn batches(&self) -> bool {
+        self.start.batch > 1
     }
 
     fn fault(&self) -> Option<String> {
@@ -357,6 +383,7 @@ mod tests {
             folder: std::env::temp_dir(),
             limit: Duration::from_secs(60),
             processes: 1,
+            batch: 1,
         }));
         let (done, all) = channel();
         for _ in 0..16 {

@@ -173,7 +173,7 @@ impl Candidate {
 }
 
 /// Rate of change at a row: the slope of the parabola through it and its neighbours, one-sided at the ends.
-fn rate(x: &[f64], y: &[f64], i: usize) -> f64 {
+pub(super) fn rate(x: &[f64], y: &[f64], i: usize) -> f64 {
     let slope = |a: usize, b: usize| (y[b] - y[a]) / (x[b] - x[a]);
     match (i > 0, i + 1 < x.len()) {
         (true, true) => {

@@ -345,6 +345,23 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// A list of numbers within `[lower, upper]`, if the key holds a list.
+    ///
+    /// # Errors
+    /// [`ReadError::Value`].
+    pub fn list(&self, key: &str, lower: f64, upper: f64) -> Result<Option<Vec<f64>>, ReadError> {
+        let Some(list) = self.value(key).and_then(Value::as_array) else { return Ok(None) };
+        let number = |v: &Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+        let numbers: Option<Vec<f64>> = list.iter().map(number).collect();
+        match numbers.filter(|n| !n.is_empty() && n.iter().all(|v| *v >= lower && *v <= upper)) {
+            Some(numbers) => Ok(Some(numbers)),
+            None => {
+                let expected = format!("numbers from {lower} to {upper}");
+                Err(self.unfit(key, "another list", expected))
+            }
+        }
+    }
+
     /// A list of texts, if it is there; at least one.
     ///
     /// # Errors

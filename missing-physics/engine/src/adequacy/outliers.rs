@@ -66,7 +66,7 @@ fn wild_rows(problem: &Problem<'_>) -> Result<Vec<Wild>, PredictError> {
     let rule = noise_rule(problem);
     let selection = problem.select(&[], &[]);
     let start = fit(problem, &selection, &rule, (&problem.shared.start, &problem.nuisance_start), None)?;
-    let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
+    let everything = problem.spec().asked();
     let linearised = Linearised::new(problem, &selection, &start, &everything, &rule)?;
     let scores = linearised.row_scores(&residuals(problem, &start)?);
     let mut found = Vec::new();

@@ -7,7 +7,7 @@ use crate::engine::begin::{Begun, rough_sigmas};
 use crate::engine::input::{DiagnoseError, Options};
 use crate::estimate::limits::limits;
 use crate::experiment;
-use crate::fit::prediction::predictions;
+use crate::fit::prediction::{predictions, residuals};
 use crate::law::found::improves;
 use crate::law::search::find;
 use crate::locate::locations::locate;
@@ -51,8 +51,8 @@ impl Course<'_> {
     /// Is a candidate adequate?
     fn test(&self, candidate: &Candidate, stream: u64) -> Result<Adequacy, PredictError> {
         let Begun { problem, rule, .. } = self.begun;
-        let rivals: Vec<usize> =
-            (0..problem.spec().mechanisms.len()).filter(|m| !candidate.set.contains(m)).collect();
+        let mut rivals = problem.spec().asked();
+        rivals.retain(|m| !candidate.set.contains(m));
         let seed = self.options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ stream;
         let replicates = self.options.replicates;
         test::test(problem, &candidate.selection, &candidate.fit, &rivals, rule, replicates, seed)
@@ -77,15 +77,15 @@ impl Course<'_> {
             diagnosis.limits = limits(problem, rule, baseline);
             return Ok(Outcome { diagnosis, contradicting: None });
         }
-        let (mut ranking, unfitted) = self.compare()?;
-        self.tell("adequacy of the best explanation", 0.0)?;
-        let best = ranking.best(self.options.alpha, |c, stream| self.test(c, stream))?;
-        self.tell("predicting unseen data", 0.0)?;
-        ranking.score(problem, best.as_ref());
-        // The chosen set has been selected to fit: only a clear failure speaks against it.
-        let fails = |best: &Best| best.p_value <= clearly(self.options.alpha);
-        let explained = best.as_ref().filter(|b| !fails(b) && ranking.gains(b.at));
+        let (mut ranking, unfitted) = self.compare(&problem.spec().asked())?;
+        let mut best = self.best(&mut ranking)?;
         let white = rough_sigmas(problem, rule, &baseline.fit);
+        if self.explains(&ranking, best.as_ref()).is_none()
+            && let Some((other, clear)) = self.unasked(&white)?
+        {
+            (ranking, best) = (other, Some(clear));
+        }
+        let explained = self.explains(&ranking, best.as_ref());
         let before = self.before(&answer)?;
         // Noise that is correlated as long as the runs are is no noise, and a member without which unseen data are predicted better is
         // imitating something else.
@@ -158,17 +158,52 @@ impl Course<'_> {
         answer.errors(&self.least_squares.fit, &held_out(&self.begun.problem, self.least_squares)?)
     }
 
-    /// Every set of mechanisms worth looking at, fitted; and mechanisms that could not be, with the reason.
-    fn compare(&self) -> Result<(Ranking, Vec<(usize, PredictError)>), DiagnoseError> {
+    /// The set that is preferred, and how it and others predict what they have not seen.
+    fn best(&self, ranking: &mut Ranking) -> Result<Option<Best>, DiagnoseError> {
+        self.tell("adequacy of the best explanation", 0.0)?;
+        let best = ranking.best(self.options.alpha, |c, stream| self.test(c, stream))?;
+        self.tell("predicting unseen data", 0.0)?;
+        ranking.score(&self.begun.problem, best.as_ref());
+        Ok(best)
+    }
+
+    /// The preferred set, where it explains the data: it has been selected to fit, so that only a clear failure speaks against it.
+    fn explains<'b>(&self, ranking: &Ranking, best: Option<&'b Best>) -> Option<&'b Best> {
+        best.filter(|b| b.p_value > clearly(self.options.alpha) && ranking.gains(b.at))
+    }
+
+    /// Where nothing that was asked for explains the data: what nobody has asked for, if it explains them and they are clear.
+    fn unasked(&self, white: &[f64]) -> Result<Option<(Ranking, Best)>, DiagnoseError> {
+        let Begun { problem, rule, .. } = self.begun;
+        let mechanisms = &problem.spec().mechanisms;
+        if mechanisms.iter().all(|m| !m.unasked) {
+            return Ok(None);
+        }
+        let everything: Vec<usize> = (0..mechanisms.len()).collect();
+        let (ranking, _) = self.compare(&everything)?;
+        let clear = clear_cases(problem, ranking.all(), white)?;
+        let mut ranking = ranking.only(&clear);
+        let best = self.best(&mut ranking)?;
+        let holds = self.explains(&ranking, best.as_ref()).is_some_and(|best| {
+            let chosen = ranking.at(best.at);
+            let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
+            chosen.set.iter().any(|&m| mechanisms[m].unasked)
+                && !slow(problem, &chosen.fit.noise, white)
+                && Judge::new(problem, rule, ranking.all(), white, parts).holds(&chosen.set)
+        });
+        Ok(best.filter(|_| holds).map(|best| (ranking, best)))
+    }
+
+    /// Every set of `mechanisms` worth looking at, fitted; and mechanisms that could not be, with the reason.
+    fn compare(&self, mechanisms: &[usize]) -> Result<(Ranking, Vec<(usize, PredictError)>), DiagnoseError> {
         const STAGE: &str = "comparing mechanisms";
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell(STAGE, 0.0)?;
         let competing = rule.competing();
         let among = candidate(problem, &competing, &[], &[], &baseline.fit, &[])?;
-        let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
         let progress = |done| self.observer.progress(Progress { stage: STAGE, done });
         let Searched { all, unfitted } =
-            search(problem, &competing, among, &everything, &progress).ok_or(DiagnoseError::Stopped)?;
+            search(problem, &competing, among, mechanisms, &progress).ok_or(DiagnoseError::Stopped)?;
         Ok((Ranking::new(all, held_out(problem, baseline)?), unfitted))
     }
 
@@ -278,6 +313,30 @@ impl Course<'_> {
         }
         Ok(())
     }
+}
+
+/// Which sets stand whoever asked for their members: each that nobody has asked for takes away so much that a cause which is like it to
+/// a thirtieth would be told apart from it.
+fn clear_cases(problem: &Problem<'_>, all: &[Candidate], white: &[f64]) -> Result<Vec<bool>, PredictError> {
+    /// Misfit that is taken away, in sigmas.
+    const CLEAR: f64 = 100.0;
+    let squares = |candidate: &Candidate| -> Result<f64, PredictError> {
+        let left = residuals(problem, &candidate.fit)?;
+        let of_channel = |(column, sigma): (&Vec<f64>, &f64)| {
+            column.iter().filter(|v| v.is_finite()).map(|v| (v / sigma).powi(2)).sum::<f64>()
+        };
+        Ok(left.iter().flat_map(|run| run.iter().zip(white)).map(of_channel).sum())
+    };
+    let squares = all.iter().map(squares).collect::<Result<Vec<f64>, _>>()?;
+    let mechanisms = &problem.spec().mechanisms;
+    let clear = |(candidate, left): (&Candidate, &f64)| {
+        candidate.set.iter().filter(|&&m| mechanisms[m].unasked).all(|&m| {
+            let without: Vec<usize> = candidate.set.iter().copied().filter(|&other| other != m).collect();
+            let before = all.iter().position(|c| c.set == without);
+            before.is_some_and(|before| squares[before] - left > CLEAR * CLEAR)
+        })
+    };
+    Ok(all.iter().zip(&squares).map(clear).collect())
 }
 
 /// Whether a channel's noise is a slow error: correlated over a good part of a run, and large beside the white noise.

@@ -30,6 +30,6 @@ pub(crate) fn limits(problem: &Problem<'_>, rule: &NoiseRule, baseline: &Candida
             .filter(|limit| limit.upper.is_finite())
             .collect()
     };
-    let all: Vec<Vec<Limit>> = (0..spec.mechanisms.len()).into_par_iter().map(of).collect();
+    let all: Vec<Vec<Limit>> = spec.asked().into_par_iter().map(of).collect();
     all.into_iter().flatten().collect()
 }

@@ -118,6 +118,9 @@ pub struct Mechanism {
     pub derived: Vec<Derived>,
     /// Quantities computed from each run's nuisance parameters, reported as they say ([`Over`]).
     pub derived_per_run: Vec<DerivedPerRun>,
+    /// Whether nobody has asked for it, since it may act in any rig (a sensor's gain): it is tried only where nothing else explains the
+    /// data, and named only where the data are clear enough to tell it from causes of which nobody has thought.
+    pub unasked: bool,
 }
 
 /// A candidate term of an unknown law: a parameter of the model that no mechanism frees.
@@ -144,6 +147,13 @@ pub struct Spec {
     pub mechanisms: Vec<Mechanism>,
     /// Candidate terms of an unknown law.
     pub terms: Vec<Term>,
+}
+
+impl Spec {
+    /// The mechanisms that somebody has asked for, by their indices.
+    pub(crate) fn asked(&self) -> Vec<usize> {
+        (0..self.mechanisms.len()).filter(|&m| !self.mechanisms[m].unasked).collect()
+    }
 }
 
 impl Spec {

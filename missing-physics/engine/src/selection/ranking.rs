@@ -61,6 +61,12 @@ impl Ranking {
         Self { all, physical, base, scores: Vec::new() }
     }
 
+    /// The same with some of the candidates alone: those that are `wanted`, in the order of [`Self::all`].
+    pub(crate) fn only(self, wanted: &[bool]) -> Self {
+        let kept = self.all.into_iter().zip(wanted).filter(|(_, wanted)| **wanted);
+        Self::new(kept.map(|(candidate, _)| candidate).collect(), self.base)
+    }
+
     pub(crate) fn all(&self) -> &[Candidate] {
         &self.all
     }
