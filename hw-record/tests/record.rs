@@ -36,11 +36,18 @@ fn two_devices_are_recorded_on_one_clock_with_gaps_said() {
     assert_eq!(ati.len() as u64, tallies["ati"].readings);
     assert!(ati.iter().all(|r| r.len() == 8 && (r[4] + 9.81).abs() < 1e-5));
     assert!(ati.windows(2).all(|w| w[1][0] >= w[0][0] && w[1][1] > w[0][1]));
-    // One in fifty is lost, one at a time.
-    let expected = tallies["ati"].readings / 49;
-    assert!(tallies["ati"].missing.abs_diff(expected) <= 1 + expected / 5, "{}", tallies["ati"]);
+    // At least one in fifty is lost; on a machine that is busy the sensor's stream has pauses as well.
+    let tally = &tallies["ati"];
+    let span = ati[ati.len() - 1][1] - ati[0][1];
+    assert!(tally.missing >= tally.readings / 50 - 1, "{tally}");
+    assert!(
+        (tally.missing + tally.readings).abs_diff((1000.0 * span).round() as u64 + 1) <= tally.gaps,
+        "{tally} in {span} s"
+    );
+    // The sensor's load tells its own time.
+    assert!(ati.iter().all(|r| (r[1] - ati[0][1] - (r[2] - ati[0][2])).abs() < 0.5));
     let ur = rows(&folder.path().join("ur.csv"));
-    assert!(ur.len() > 100 && ur.iter().all(|r| r.len() == 20 && (r[2] - 0.1).abs() < 1e-12));
+    assert!(ur.len() > 20 && ur.iter().all(|r| r.len() == 20 && (r[2] - 0.1).abs() < 1e-12));
 }
 
 /// Killed, it has lost no more than the last second.

@@ -116,11 +116,10 @@ fn since_then(
     context: &ReportContext,
 ) -> String {
     let recording = Recording { runs: runs.to_vec(), ..reference.clone() };
+    let begin = format!("runs since then, {}:", runs.len());
     match diagnose(model, &recording, &[], options, &Silent) {
-        Ok(found) => {
-            format!("the {} runs since then: {}", runs.len(), headline(&report::text(&found, context)))
-        }
-        Err(error) => format!("the {} runs since then cannot be diagnosed yet: {error}", runs.len()),
+        Ok(found) => format!("{begin} {}", headline(&report::text(&found, context))),
+        Err(error) => format!("{begin} they cannot be diagnosed yet: {error}"),
     }
 }
 
