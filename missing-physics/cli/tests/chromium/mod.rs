@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use serde_json::{Value, json};
 
 /// A browser with one page.
-pub struct Browser {
+pub(crate) struct Browser {
     child: Child,
     to: ChildStdin,
     from: BufReader<ChildStdout>,
@@ -17,7 +17,7 @@ pub struct Browser {
     /// What was complained of, and what was asked for.
     complaints: Vec<String>,
     asked: Vec<String>,
-    pub loaded: bool,
+    pub(crate) loaded: bool,
     _profile: tempfile::TempDir,
 }
 
@@ -29,7 +29,7 @@ impl Drop for Browser {
 }
 
 impl Browser {
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         let profile = tempfile::tempdir().unwrap();
         let mut child = Command::new("sh")
             .args(["-c", "exec chromium --headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-component-update --disable-sync --remote-debugging-pipe --user-data-dir=\"$0\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null"])
@@ -53,7 +53,7 @@ impl Browser {
         browser
     }
 
-    pub fn read(&mut self) -> Value {
+    pub(crate) fn read(&mut self) -> Value {
         let mut message = Vec::new();
         self.from.read_until(0, &mut message).unwrap();
         assert_eq!(message.pop(), Some(0), "the browser has gone");
@@ -72,7 +72,7 @@ impl Browser {
         message
     }
 
-    pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+    pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.calls += 1;
         let mut message = json!({"id": self.calls, "method": method, "params": parameters});
         if let Some(session) = &self.session {
@@ -88,17 +88,17 @@ impl Browser {
         }
     }
 
-    pub fn width(&mut self, width: u32) {
+    pub(crate) fn width(&mut self, width: u32) {
         let size = json!({"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false});
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
-    pub fn media(&mut self, media: &str, scheme: &str) {
+    pub(crate) fn media(&mut self, media: &str, scheme: &str) {
         let features = json!([{"name": "prefers-color-scheme", "value": scheme}]);
         self.call("Emulation.setEmulatedMedia", json!({"media": media, "features": features}));
     }
 
-    pub fn open(&mut self, page: &Path) {
+    pub(crate) fn open(&mut self, page: &Path) {
         self.loaded = false;
         self.call("Page.navigate", json!({"url": format!("file://{}", page.display())}));
         while !self.loaded {
@@ -106,19 +106,19 @@ impl Browser {
         }
     }
 
-    pub fn value(&mut self, script: &str) -> Value {
+    pub(crate) fn value(&mut self, script: &str) -> Value {
         let asked = json!({"expression": script, "returnByValue": true});
         let answer = self.call("Runtime.evaluate", asked);
         assert!(answer["exceptionDetails"].is_null(), "{script}: {answer}");
         answer["result"]["value"].clone()
     }
 
-    pub fn text(&mut self, script: &str) -> String {
+    pub(crate) fn text(&mut self, script: &str) -> String {
         self.value(script).as_str().unwrap().to_owned()
     }
 
     /// Waits for what the page has put off.
-    pub fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         let script = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
         self.call("Runtime.evaluate", json!({"expression": script, "awaitPromise": true}));
     }
@@ -132,7 +132,7 @@ impl Browser {
         [left + part * width, y]
     }
 
-    pub fn mouse(&mut self, kind: &str, part: f64, clicks: u32) {
+    pub(crate) fn mouse(&mut self, kind: &str, part: f64, clicks: u32) {
         let [x, y] = self.place(part);
         let buttons = u32::from(kind != "mouseReleased");
         let button = if kind == "mouseMoved" && clicks == 0 { "none" } else { "left" };
@@ -143,7 +143,7 @@ impl Browser {
     }
 
     /// What is said of the row at a place, and its abscissa.
-    pub fn point(&mut self, part: f64) -> (String, f64) {
+    pub(crate) fn point(&mut self, part: f64) -> (String, f64) {
         self.mouse("mouseMoved", 0.5, 0);
         self.mouse("mouseMoved", part, 0);
         let said = self.text("document.querySelector('.where').textContent");
@@ -151,7 +151,7 @@ impl Browser {
         (said, number.unwrap_or(f64::NAN))
     }
 
-    pub fn drag(&mut self, from: f64, to: f64) {
+    pub(crate) fn drag(&mut self, from: f64, to: f64) {
         self.mouse("mouseMoved", from, 0);
         self.mouse("mousePressed", from, 1);
         self.mouse("mouseMoved", 0.5 * (from + to), 1);
@@ -159,7 +159,7 @@ impl Browser {
         self.mouse("mouseReleased", to, 1);
     }
 
-    pub fn choose(&mut self, label: &str, index: usize) -> String {
+    pub(crate) fn choose(&mut self, label: &str, index: usize) -> String {
         let script = format!(
             "(() => {{ const s = document.querySelector('select[aria-label=\"{label}\"]'); s.selectedIndex = {index}; s.dispatchEvent(new Event('change')); return s.selectedOptions[0].textContent; }})()"
         );
@@ -169,7 +169,7 @@ impl Browser {
     }
 
     /// Nobody complained, and the page alone was read.
-    pub fn quiet(&mut self) {
+    pub(crate) fn quiet(&mut self) {
         self.settle();
         assert!(self.complaints.is_empty(), "{:?}", self.complaints);
         // What a page has made itself is no request that leaves it.
@@ -179,7 +179,7 @@ impl Browser {
     }
 
     /// Evaluates a script that takes time, and returns what it promises.
-    pub fn awaited(&mut self, script: &str) -> Value {
+    pub(crate) fn awaited(&mut self, script: &str) -> Value {
         let asked = json!({"expression": script, "returnByValue": true, "awaitPromise": true});
         let answer = self.call("Runtime.evaluate", asked);
         assert!(answer["exceptionDetails"].is_null(), "{script}: {answer}");
@@ -187,7 +187,7 @@ impl Browser {
     }
 
     /// Keeps a picture of the whole page, for people.
-    pub fn picture(&mut self, name: &str) {
+    pub(crate) fn picture(&mut self, name: &str) {
         let whole = json!({"captureBeyondViewport": true});
         let taken = self.call("Page.captureScreenshot", whole);
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));

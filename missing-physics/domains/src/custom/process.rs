@@ -389,8 +389,10 @@ mod tests {
         for _ in 0..16 {
             let (pool, done) = (Arc::clone(&pool), done.clone());
             std::thread::spawn(move || {
-                let asked = pool.ask("a", BTreeMap::new(), BTreeMap::new(), &[], &mut []);
-                let _ = done.send(asked);
+                let alone = [vec![]];
+                let (run, parameters, sets, inputs) = ("a", &[][..], &alone[..], &[][..]);
+                let asked = Questions { run, parameters, sets, inputs, channels: &[], rows: 0 };
+                let _ = done.send(pool.predict(&asked));
             });
         }
         for _ in 0..16 {

@@ -3,6 +3,7 @@
 mod experiments;
 mod local;
 mod model;
+mod off;
 mod setup;
 mod spec;
 
