@@ -183,8 +183,8 @@ fn shared_practice_sounds() {
 }
 
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_practice_machines() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_practice_machines() {
     shared_practice("motion");
 }
 
