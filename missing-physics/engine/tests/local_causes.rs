@@ -93,10 +93,10 @@ fn a_step_that_departs_is_found_where_it_departs() {
     assert!((from - 0.7).abs() < 0.06 && to > 0.95, "{place:?}");
     assert_eq!(place.runs.len(), 5);
     let as_if = place.as_if.unwrap();
-    // A tenth more, as it was made.
+    // A tenth more, as it was made: the mean over the interval that was found, whose edges are known to a part of it only.
     assert_eq!(as_if.what, "longer steps");
     let [low, high] = as_if.sizes[0].ci95;
-    assert!(low < 0.1 && 0.1 < high && high - low < 0.02, "{:?}", as_if.sizes);
+    assert!((as_if.sizes[0].value - 0.1).abs() < 0.01 && high - low < 0.02, "{:?}", as_if.sizes);
 }
 
 #[test]
