@@ -5,5 +5,5 @@ mod source;
 mod tally;
 
 pub use recorder::{RecordError, record};
-pub use source::{Reading, Source, SourceError, source};
+pub use source::{Next, Source, SourceError, source};
 pub use tally::Tally;

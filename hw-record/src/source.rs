@@ -7,8 +7,8 @@ use hw_drivers::ur::Rtde;
 use hw_traits::force_torque::ForceTorque as _;
 use hw_traits::gripper::Gripper as _;
 
-/// A reading: the time on the device's clock (s), and a number for each column.
-pub type Reading = (f64, Vec<f64>);
+/// Waits for a reading: the time on the device's clock (s), and a number for each column.
+pub type Next = Box<dyn FnMut() -> Result<(f64, Vec<f64>), DriverError> + Send>;
 
 /// A stream of readings that can be recorded.
 pub struct Source {
@@ -16,8 +16,8 @@ pub struct Source {
     pub name: String,
     /// Its columns, with units.
     pub columns: Vec<String>,
-    /// Waits for a reading.
-    pub next: Box<dyn FnMut() -> Result<Reading, DriverError> + Send>,
+    /// Waits for a reading: the time on the device's clock (s), and a number for each column.
+    pub next: Next,
 }
 
 /// Why there is no such source.
