@@ -3,7 +3,6 @@
 mod experiments;
 mod local;
 mod model;
-mod off;
 mod setup;
 mod spec;
 

@@ -1,17 +1,7 @@
 //! CSV tables with named columns, read strictly.
 
-use std::sync::Arc;
-
 use super::error::ReadError;
 use super::words::{one_line, quoted, unit_of};
-
-/// A table as it comes from a source.
-pub(super) enum Sheet {
-    /// The text of a CSV file.
-    Text(String),
-    /// Columns that were never text.
-    Columns(Arc<[(String, Values)]>),
-}
 
 /// Numbers beyond this are mistakes of unit or format.
 const LARGEST_NUMBER: f64 = 1e12;
