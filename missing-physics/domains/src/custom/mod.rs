@@ -324,8 +324,10 @@ mod tests {
         let line = Arc::new(Line::default());
         let loaded = load_with(&source("custom"), line.clone(), false).unwrap();
         let (model, run) = (&loaded.model, &loaded.recording.runs[0]);
-        // The coefficients of terms, which are off, beside the slope.
-        let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
+        // All that is beside the slope is off.
+        let parameters = &model.spec().parameters;
+        let mut shared: Vec<f64> =
+            parameters.iter().filter(|p| p.scope == Scope::Shared).map(|p| p.start).collect();
         shared[0] = 1.5;
         let (mut out, mut slope) = (vec![0.0; 9], vec![0.0; 9]);
         model.jacobian(run, &shared, &[], &[0], &[], &mut out, &mut slope).unwrap();

@@ -71,7 +71,12 @@ impl Rig for Machine {
         {
             listed[1] = asymmetric;
         }
-        (machine, Choice { listed, unlisted: whole(rng, 0, UNLISTED - 1) })
+        let placed: Vec<usize> = (0..UNLISTED).filter(|k| machine.place(*k).is_some()).collect();
+        let unlisted = match hidden {
+            Hidden::Local if !placed.is_empty() => placed[whole(rng, 0, placed.len() - 1)],
+            _ => whole(rng, 0, UNLISTED - 1),
+        };
+        (machine, Choice { listed, unlisted })
     }
 
     fn candidates(&self) -> Vec<usize> {
@@ -118,7 +123,7 @@ impl Rig for Machine {
     }
 
     fn describe_unlisted(&self, which: usize, key: &mut Key) {
-        let Unlisted { what, at, width, run, .. } = self.unlisted[which];
+        let Unlisted { what, run, .. } = self.unlisted[which];
         let text = match what {
             What::Push => format!("a push in run {}", run + 1),
             What::Patch => "a bump in a range of positions".into(),
@@ -126,18 +131,7 @@ impl Rig for Machine {
             What::Change => format!("more resistance from run {} on", run + 1),
         };
         key.unlisted = Some(text);
-        key.place = match what {
-            What::Push => {
-                let label = (run + 1).to_string();
-                Some(Place::new("t_s", at - width, f64::INFINITY).in_runs([label]))
-            }
-            What::Patch => {
-                let position = self.world.plant.joints().first().map_or(0, |joint| joint.position);
-                let output = self.world.plant.outputs().iter().find(|o| o.1 == position);
-                output.map(|(name, _)| Place::new(name, at - 2.0 * width, at + 2.0 * width))
-            }
-            What::Hum | What::Change => None,
-        };
+        key.place = self.place(which);
     }
 
     fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
@@ -190,6 +184,28 @@ impl Machine {
         machine.plain = machine.readings(&machine.world, &Effects::default());
         machine.nuisances = machine.taken();
         machine
+    }
+
+    /// Where an unlisted effect acts, if at a place.
+    fn place(&self, which: usize) -> Option<Place> {
+        let Unlisted { what, at, width, run, .. } = self.unlisted[which];
+        match what {
+            What::Push => {
+                let place = Place::new("t_s", at - width, f64::INFINITY);
+                Some(place.in_runs([(run + 1).to_string()]))
+            }
+            What::Patch => {
+                let position = self.world.plant.joints().first().map_or(0, |joint| joint.position);
+                let outputs = self.world.plant.outputs();
+                let (name, _) = outputs.iter().find(|o| o.1 == position)?;
+                Some(Place::new(name, at - 2.0 * width, at + 2.0 * width))
+            }
+            What::Change => {
+                let later = (run..self.world.runs.len()).map(|run| (run + 1).to_string());
+                Some(Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(later))
+            }
+            What::Hum => None,
+        }
     }
 
     /// What of the unlisted could happen to a machine.
