@@ -76,6 +76,8 @@ struct Session {
     started: bool,
     sent: u32,
     next: Instant,
+    /// Controller's time at the start of the stream, s.
+    zero_s: f64,
     heard: Instant,
     doubles: [f64; 8],
     integers: [i32; 3],
@@ -226,6 +228,7 @@ impl Session {
             started: false,
             sent: 0,
             next: Instant::now(),
+            zero_s: 0.0,
             heard: Instant::now(),
             doubles: [0.0; 8],
             integers: [0; 3],
@@ -247,7 +250,7 @@ impl Session {
                 break;
             }
             let package: Vec<u8> = self.bytes.drain(..length.max(3)).collect();
-            self.obey(package[2], &package[3..], faults)?;
+            self.obey(package[2], &package[3..], faults, begin)?;
         }
         if self.started && !faults.silent && Instant::now() >= self.next {
             self.next += self.period;
@@ -259,13 +262,13 @@ impl Session {
             if faults.lose_every > 0 && self.sent.is_multiple_of(faults.lose_every) {
                 return Some(());
             }
-            let data = self.data(&lock(shared).world, faults, begin);
+            let data = self.data(&lock(shared).world, faults);
             self.send(b'U', &data, faults)?;
         }
         Some(())
     }
 
-    fn data(&self, world: &UrWorld, faults: &UrFaults, begin: Instant) -> Vec<u8> {
+    fn data(&self, world: &UrWorld, faults: &UrFaults) -> Vec<u8> {
         let mut data = Vec::new();
         if self.version >= 2 {
             let wrong = faults.garble_every > 0 && self.sent.is_multiple_of(faults.garble_every);
@@ -274,7 +277,9 @@ impl Session {
         for field in &self.fields {
             let six: [f64; 6] = match field.as_str() {
                 "timestamp" => {
-                    data.extend(begin.elapsed().as_secs_f64().to_be_bytes());
+                    // A controller's own steps are even, whenever they are sent.
+                    let t_s = self.zero_s + f64::from(self.sent) * self.period.as_secs_f64();
+                    data.extend(t_s.to_be_bytes());
                     continue;
                 }
                 "safety_mode" => {
@@ -296,7 +301,7 @@ impl Session {
         data
     }
 
-    fn obey(&mut self, kind: u8, payload: &[u8], faults: &UrFaults) -> Option<()> {
+    fn obey(&mut self, kind: u8, payload: &[u8], faults: &UrFaults, begin: Instant) -> Option<()> {
         let text =
             |bytes: &[u8]| String::from_utf8_lossy(bytes).split(',').map(str::to_owned).collect::<Vec<_>>();
         let types =
@@ -330,6 +335,7 @@ impl Session {
             }
             b'S' => {
                 (self.started, self.next) = (true, Instant::now());
+                self.zero_s = begin.elapsed().as_secs_f64();
                 self.send(b'S', &[1], faults)
             }
             b'U' => self.write(payload),
