@@ -107,25 +107,27 @@ pub trait ForceModel {
 /// Part of a calibrated range that may be asked for beyond it.
 pub(crate) const SLACK: f64 = 0.05;
 
-/// Predictions of presses, by what was calibrated without them: each inner value of a quantity is left out in turn. The outer ones are not:
-/// that would be extrapolation, which a calibration refuses.
+/// Errors with each inner radius, and with each inner stretch, left out in turn. The outer ones are not: that would be extrapolation, which a
+/// calibration refuses.
 pub(crate) fn left_out<M: ForceModel>(
     presses: &[Press],
-    of: impl Fn(&Press) -> f64,
     fit: impl Fn(&[Press]) -> Result<M, CalibrationError>,
-) -> Result<Option<LeftOut>, CalibrationError> {
-    let values = distinct(presses.iter().map(&of));
-    let mut pairs = Vec::new();
-    if values.len() >= 4 {
-        for &value in &values[1..values.len() - 1] {
-            let (without, others): (Vec<Press>, Vec<Press>) = presses.iter().partition(|p| of(p) == value);
-            let model = fit(&others)?;
-            for p in without.iter().filter(|p| p.indentation_m > 0.0) {
-                pairs.push((model.force_n(p.radius_m, p.stretch_m, p.indentation_m)?, p.force_n));
+) -> Result<[Option<LeftOut>; 2], CalibrationError> {
+    let without = |of: fn(&Press) -> f64| -> Result<_, CalibrationError> {
+        let values = distinct(presses.iter().map(of));
+        let mut pairs = Vec::new();
+        if values.len() >= 4 {
+            for &value in &values[1..values.len() - 1] {
+                let (out, others): (Vec<Press>, Vec<Press>) = presses.iter().partition(|p| of(p) == value);
+                let model = fit(&others)?;
+                for p in out.iter().filter(|p| p.indentation_m > 0.0) {
+                    pairs.push((model.force_n(p.radius_m, p.stretch_m, p.indentation_m)?, p.force_n));
+                }
             }
         }
-    }
-    Ok(LeftOut::of(&pairs))
+        Ok(LeftOut::of(&pairs))
+    };
+    Ok([without(|p| p.radius_m)?, without(|p| p.stretch_m)?])
 }
 
 /// Whether presses hold numbers in range, and states enough: three radii and three stretches, each pushing back.

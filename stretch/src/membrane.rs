@@ -36,9 +36,7 @@ impl MembraneModel {
     /// [`CalibrationError`].
     pub fn fit(presses: &[Press]) -> Result<Self, CalibrationError> {
         check(presses)?;
-        let left_out =
-            [left_out(presses, |p| p.radius_m, Self::of)?, left_out(presses, |p| p.stretch_m, Self::of)?];
-        Ok(Self { left_out, ..Self::of(presses)? })
+        Ok(Self { left_out: left_out(presses, Self::of)?, ..Self::of(presses)? })
     }
 
     fn of(presses: &[Press]) -> Result<Self, CalibrationError> {

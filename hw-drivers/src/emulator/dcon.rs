@@ -1,10 +1,10 @@
-use std::io::{ErrorKind, Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::io::Write as _;
+use std::net::{SocketAddr, TcpStream};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::life::Life;
+use super::session::{Served, lock, receive, serve};
 
 /// What goes wrong with the modules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,11 +38,7 @@ pub struct DconEmulator {
     _life: Life,
 }
 
-fn lock(air: &Mutex<Air>) -> MutexGuard<'_, Air> {
-    air.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl Air {
+impl Served for Air {
     fn advance(&mut self, dt: f64) {
         if self.watch_s > 0.0 && self.heard.elapsed().as_secs_f64() > self.watch_s {
             (self.ended, self.volts, self.watch_s) = (true, 5.0, 0.0);
@@ -50,6 +46,12 @@ impl Air {
         self.pressure_pa = (self.pressure_pa + (self.volts - 5.0) / 5.0 * 1e5 * dt).clamp(0.0, 3e5);
     }
 
+    fn is_cut(&self) -> bool {
+        self.faults.cut
+    }
+}
+
+impl Air {
     fn answer(&mut self, line: &str) -> Option<String> {
         if line == "~**" {
             self.heard = Instant::now();
@@ -90,9 +92,6 @@ impl DconEmulator {
     /// # Errors
     /// Those of a socket on loopback.
     pub fn start() -> std::io::Result<Self> {
-        let listener = TcpListener::bind("127.0.0.1:0")?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
         let air = Air {
             volts: 5.0,
             pressure_pa: 0.0,
@@ -102,26 +101,7 @@ impl DconEmulator {
             faults: DconFaults::default(),
         };
         let air = Arc::new(Mutex::new(air));
-        let theirs = Arc::clone(&air);
-        let life = Life::begin(move |ended| {
-            let mut session: Option<(TcpStream, Vec<u8>)> = None;
-            let mut last = Instant::now();
-            while !ended.load(Ordering::Relaxed) {
-                lock(&theirs).advance(last.elapsed().as_secs_f64());
-                last = Instant::now();
-                if lock(&theirs).faults.cut {
-                    session = None;
-                } else if let Ok((stream, _)) = listener.accept() {
-                    session = stream.set_nonblocking(true).ok().map(|()| (stream, Vec::new()));
-                }
-                if let Some((stream, bytes)) = &mut session
-                    && step(stream, bytes, &theirs).is_none()
-                {
-                    session = None;
-                }
-                std::thread::sleep(Duration::from_micros(500));
-            }
-        })?;
+        let (address, life) = serve(&air, Duration::from_micros(500), step)?;
         Ok(Self { address, air, _life: life })
     }
 
@@ -143,13 +123,7 @@ impl DconEmulator {
 }
 
 fn step(stream: &mut TcpStream, bytes: &mut Vec<u8>, air: &Mutex<Air>) -> Option<()> {
-    let mut more = [0; 256];
-    match stream.read(&mut more) {
-        Ok(0) => return None,
-        Ok(count) => bytes.extend(&more[..count]),
-        Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-        Err(_) => return None,
-    }
+    receive(stream, bytes)?;
     while let Some(end) = bytes.iter().position(|b| *b == b'\r') {
         let line: Vec<u8> = bytes.drain(..=end).collect();
         let line = String::from_utf8_lossy(&line).trim().to_owned();

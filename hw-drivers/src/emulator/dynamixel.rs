@@ -1,10 +1,10 @@
-use std::io::{ErrorKind, Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::io::Write as _;
+use std::net::{SocketAddr, TcpStream};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::life::Life;
+use super::session::{Served, lock, receive, serve};
 
 /// What goes wrong with a servo.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -42,10 +42,6 @@ pub struct DynamixelEmulator {
     _life: Life,
 }
 
-fn lock(servo: &Mutex<Servo>) -> MutexGuard<'_, Servo> {
-    servo.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// The checksum of protocol 2.0, bit by bit.
 fn checksum(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0u16, |sum, byte| {
@@ -58,15 +54,7 @@ fn checksum(bytes: &[u8]) -> u16 {
     })
 }
 
-impl Servo {
-    fn long(&self, at: usize) -> i32 {
-        i32::from_le_bytes([self.table[at], self.table[at + 1], self.table[at + 2], self.table[at + 3]])
-    }
-
-    fn put(&mut self, at: usize, bytes: &[u8]) {
-        self.table[at..at + bytes.len()].copy_from_slice(bytes);
-    }
-
+impl Served for Servo {
     fn advance(&mut self, dt: f64) {
         let watch = self.table[98];
         if (1..=127).contains(&watch) && self.heard.elapsed().as_secs_f64() > 0.02 * f64::from(watch) {
@@ -96,6 +84,20 @@ impl Servo {
         self.put(126, &current.to_le_bytes());
         self.put(128, &(speed.round() as i32).to_le_bytes());
         self.put(132, &place.to_le_bytes());
+    }
+
+    fn is_cut(&self) -> bool {
+        self.faults.cut
+    }
+}
+
+impl Servo {
+    fn long(&self, at: usize) -> i32 {
+        i32::from_le_bytes([self.table[at], self.table[at + 1], self.table[at + 2], self.table[at + 3]])
+    }
+
+    fn put(&mut self, at: usize, bytes: &[u8]) {
+        self.table[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
     /// The status packet to an instruction.
@@ -153,33 +155,11 @@ impl DynamixelEmulator {
     /// # Errors
     /// Those of a socket on loopback.
     pub fn start() -> std::io::Result<Self> {
-        let listener = TcpListener::bind("127.0.0.1:0")?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
         let now = Instant::now();
         let faults = DynamixelFaults::default();
         let servo = Servo { table: [0; 200], place: 2048.0, heard: now, power: now, faults };
         let servo = Arc::new(Mutex::new(servo));
-        let theirs = Arc::clone(&servo);
-        let life = Life::begin(move |ended| {
-            let mut session: Option<(TcpStream, Vec<u8>)> = None;
-            let mut last = Instant::now();
-            while !ended.load(Ordering::Relaxed) {
-                lock(&theirs).advance(last.elapsed().as_secs_f64());
-                last = Instant::now();
-                if lock(&theirs).faults.cut {
-                    session = None;
-                } else if let Ok((stream, _)) = listener.accept() {
-                    session = stream.set_nonblocking(true).ok().map(|()| (stream, Vec::new()));
-                }
-                if let Some((stream, bytes)) = &mut session
-                    && step(stream, bytes, &theirs).is_none()
-                {
-                    session = None;
-                }
-                std::thread::sleep(Duration::from_micros(300));
-            }
-        })?;
+        let (address, life) = serve(&servo, Duration::from_micros(300), step)?;
         Ok(Self { address, servo, _life: life })
     }
 
@@ -201,13 +181,7 @@ impl DynamixelEmulator {
 }
 
 fn step(stream: &mut TcpStream, bytes: &mut Vec<u8>, servo: &Mutex<Servo>) -> Option<()> {
-    let mut more = [0; 256];
-    match stream.read(&mut more) {
-        Ok(0) => return None,
-        Ok(count) => bytes.extend(&more[..count]),
-        Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-        Err(_) => return None,
-    }
+    receive(stream, bytes)?;
     let length = match bytes.get(5..7) {
         Some([low, high]) => 7 + usize::from(*low) + 256 * usize::from(*high),
         _ => return Some(()),

@@ -8,6 +8,7 @@ mod dcon;
 mod dynamixel;
 mod life;
 mod robotiq;
+mod session;
 mod ur;
 
 pub use ati::{AtiEmulator, AtiFaults, AtiPages};

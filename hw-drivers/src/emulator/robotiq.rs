@@ -1,10 +1,10 @@
-use std::io::{ErrorKind, Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::io::Write as _;
+use std::net::{SocketAddr, TcpStream};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use super::life::Life;
+use super::session::{Served, lock, receive, serve};
 
 /// How a gripper is spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,11 +54,7 @@ pub struct RobotiqEmulator {
     _life: Life,
 }
 
-fn lock(hand: &Mutex<Hand>) -> MutexGuard<'_, Hand> {
-    hand.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl Hand {
+impl Served for Hand {
     fn advance(&mut self, dt: f64) {
         if !(self.activated && self.going) {
             return;
@@ -76,6 +72,12 @@ impl Hand {
         }
     }
 
+    fn is_cut(&self) -> bool {
+        self.faults.cut
+    }
+}
+
+impl Hand {
     fn set(&mut self, action: u8, position: u8, speed: u8, force: u8) {
         self.activated = action & 1 != 0;
         self.going = action & 8 != 0;
@@ -97,12 +99,11 @@ impl RobotiqEmulator {
     /// # Errors
     /// Those of a socket on loopback.
     pub fn start(protocol: RobotiqProtocol) -> std::io::Result<Self> {
-        let listener = TcpListener::bind("127.0.0.1:0")?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
         let hand = Arc::new(Mutex::new(Hand::default()));
-        let theirs = Arc::clone(&hand);
-        let life = Life::begin(move |ended| serve(&listener, &theirs, protocol, ended))?;
+        let answers = move |stream: &mut TcpStream, bytes: &mut Vec<u8>, hand: &Mutex<Hand>| {
+            step(stream, bytes, hand, protocol)
+        };
+        let (address, life) = serve(&hand, Duration::from_micros(500), answers)?;
         Ok(Self { address, hand, _life: life })
     }
 
@@ -123,44 +124,14 @@ impl RobotiqEmulator {
     }
 }
 
-fn serve(listener: &TcpListener, hand: &Mutex<Hand>, protocol: RobotiqProtocol, ended: &AtomicBool) {
-    let mut session: Option<(TcpStream, Vec<u8>)> = None;
-    let mut last = Instant::now();
-    while !ended.load(Ordering::Relaxed) {
-        let faults = {
-            let mut hand = lock(hand);
-            hand.advance(last.elapsed().as_secs_f64());
-            hand.faults
-        };
-        last = Instant::now();
-        if faults.cut {
-            session = None;
-        } else if let Ok((stream, _)) = listener.accept() {
-            session = stream.set_nonblocking(true).ok().map(|()| (stream, Vec::new()));
-        }
-        if let Some((stream, bytes)) = &mut session
-            && step(stream, bytes, hand, protocol, &faults).is_none()
-        {
-            session = None;
-        }
-        std::thread::sleep(Duration::from_micros(500));
-    }
-}
-
 fn step(
     stream: &mut TcpStream,
     bytes: &mut Vec<u8>,
     hand: &Mutex<Hand>,
     protocol: RobotiqProtocol,
-    faults: &RobotiqFaults,
 ) -> Option<()> {
-    let mut more = [0; 512];
-    match stream.read(&mut more) {
-        Ok(0) => return None,
-        Ok(count) => bytes.extend(&more[..count]),
-        Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-        Err(_) => return None,
-    }
+    let faults = lock(hand).faults;
+    receive(stream, bytes)?;
     let answered = match protocol {
         RobotiqProtocol::UrCap => text(bytes, hand),
         RobotiqProtocol::Rtu => rtu(bytes, hand),
