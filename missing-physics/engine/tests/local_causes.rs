@@ -93,10 +93,23 @@ fn a_step_that_departs_is_found_where_it_departs() {
     assert!((from - 0.7).abs() < 0.06 && to > 0.95, "{place:?}");
     assert_eq!(place.runs.len(), 5);
     let as_if = place.as_if.unwrap();
-    // A tenth more, as it was made: the mean over the interval that was found, whose edges are known to a part of it only.
+    // A tenth more beyond 0.7, as it was made, seen as a size in the interval that was found: by least squares, each walk's begin free.
     assert_eq!(as_if.what, "longer steps");
+    let walked = |run: &Run, least: f64| -> Vec<f64> {
+        let at: Vec<f64> =
+            sums(0.0, run.inputs[0].iter().map(|&x| if x >= least && x <= to { x } else { 0.0 })).collect();
+        let mean = at.iter().sum::<f64>() / at.len() as f64;
+        at.into_iter().map(|v| v - mean).collect()
+    };
+    let (mut product, mut square) = (0.0, 0.0);
+    for run in &walks(0.7, 0.1, 0).runs {
+        let (found, made) = (walked(run, from), walked(run, 0.7));
+        product += found.iter().zip(made).map(|(f, m)| 0.1 * f * m).sum::<f64>();
+        square += found.iter().map(|f| f * f).sum::<f64>();
+    }
+    let mean = product / square;
     let [low, high] = as_if.sizes[0].ci95;
-    assert!((as_if.sizes[0].value - 0.1).abs() < 0.01 && high - low < 0.02, "{:?}", as_if.sizes);
+    assert!(low < mean && mean < high && high - low < 0.02, "{mean} {:?}", as_if.sizes);
 }
 
 #[test]
