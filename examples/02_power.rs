@@ -36,7 +36,7 @@ fn size(world: &FlightWorld, seed: u64) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let count = if examples::small() { 3 } else { 60 };
+    let count = if examples::small() { 1 } else { 60 };
     let base = FlightWorld::thrown(Measured::Position);
     type Grow = fn(f64) -> Effects;
     // Name, the oracle's size in standard errors, and the effect of a size.

@@ -1,13 +1,13 @@
 //! How often the right mechanism is named, and how often its 95 % interval holds the truth.
 //!
-//! `cargo run --release -p examples --example 03_intervals` (1,000 worlds; `--small`: 24)
+//! `cargo run --release -p examples --example 03_intervals` (1,000 worlds; `--small`: 8)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use worlds::noise::Noise;
 use worlds::physics::flight::{Effects, FlightWorld, Measured};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let count = if examples::small() { 6 } else { 250 };
+    let count = if examples::small() { 2 } else { 250 };
     let base = FlightWorld::thrown(Measured::Position);
     let drop = FlightWorld { noise: Noise::white(0.005), ..FlightWorld::dropped(4, [45, 55], 30.0) };
     let of = |world: FlightWorld, effects: Effects| FlightWorld { effects, ..world };

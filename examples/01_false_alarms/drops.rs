@@ -4,7 +4,7 @@ use worlds::physics::bounce::BounceWorld;
 
 /// Drops of 3 to 8 impacts, timed alone or placed as well, with and without a calibration, the restitution scattered or not.
 pub(crate) fn drops() -> Result<(), Box<dyn std::error::Error>> {
-    let count = if examples::small() { 1 } else { 20 };
+    let (count, fewest): (u64, _) = if examples::small() { (1, 8) } else { (20, 3) };
     let drops = BounceWorld::drops();
     let scattered = BounceWorld { restitution_scatter: 0.005, ..drops };
     let kinds = [
@@ -18,7 +18,7 @@ pub(crate) fn drops() -> Result<(), Box<dyn std::error::Error>> {
     println!("{:36} {:>7} {:>8} {:>8}", "drops in which nothing is hidden", "number", "at 5 %", "at 1 %");
     let mut all = Vec::new();
     for (k, (name, world)) in kinds.iter().enumerate() {
-        for impacts in 3..=8 {
+        for impacts in fewest..=8 {
             let files = |seed: u64| {
                 let runs = 10 + (seed % 3) as usize * 10;
                 let [header, data] = BounceWorld { impacts, runs, ..*world }.files(seed);

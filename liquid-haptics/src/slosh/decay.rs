@@ -1,6 +1,6 @@
 //! The free decay of a mode as a sensor reads it, with what real walls, surfaces and sensors add.
 
-use super::linear::{EVEN, Propagator};
+use super::linear::{Propagator, STEPS_PER_RADIAN, Series};
 
 /// Effects beyond a linear, viscously damped mode; all zero is off.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -59,17 +59,20 @@ impl Decay {
     /// [`DecayError`].
     pub fn read(&self, t_s: &[f64], [a, b]: [f64; 2], out: &mut [f64]) -> Result<(), DecayError> {
         self.check()?;
-        let e = &self.effects;
-        let linear = e.friction == 0.0
-            && e.quadratic_per_reading == 0.0
-            && (e.frequency_change == 0.0 || e.largest_amplitude == 0.0);
         let damped = self.omega_rad_s * (1.0 - self.damping_ratio * self.damping_ratio).sqrt();
         let start = [a, -self.damping_ratio * self.omega_rad_s * a + damped * b];
-        if linear {
+        if self.is_linear() {
             self.propagate(t_s, start, out);
             return Ok(());
         }
         self.integrate(t_s, start, out)
+    }
+
+    /// Whether no effect is on, so that readings are proportional to the start.
+    pub fn is_linear(&self) -> bool {
+        let e = &self.effects;
+        let even = e.frequency_change == 0.0 || e.largest_amplitude == 0.0;
+        e.friction == 0.0 && e.quadratic_per_reading == 0.0 && even
     }
 
     /// Relative change of the frequency of the motion through the start `[a, b]` (as in [`Self::read`]), viscosity and friction left
@@ -110,18 +113,23 @@ impl Decay {
         range("quadratic_per_reading", quadratic, "0 or more", quadratic >= 0.0 && quadratic.is_finite())
     }
 
-    /// The linear motion, from row to row; rows that are evenly spaced share their sines.
+    /// The linear motion: rows that are close together are read off the step that holds them.
     fn propagate(&self, t_s: &[f64], [mut x, mut v]: [f64; 2], out: &mut [f64]) {
-        let mut now = 0.0;
-        let (mut span, mut over_span) = (0.0, Propagator::new(self.omega_rad_s, self.damping_ratio, 0.0));
+        let (w, ratio) = (self.omega_rad_s, self.damping_ratio);
+        let per_step = w * STEPS_PER_RADIAN;
+        let step = 1.0 / per_step;
+        let over = |h| Propagator::new(w, ratio, h);
+        let (whole, mut begin) = (over(step), 0.0);
+        let mut series = Series::new(w, ratio, step, [x, v]);
         for (reading, &t) in out.iter_mut().zip(t_s) {
-            let h = t - now;
-            if !(f64::abs(h - span) <= EVEN * h.abs()) {
-                (span, over_span) = (h, Propagator::new(self.omega_rad_s, self.damping_ratio, h));
+            if t - begin >= step {
+                let ahead = ((t - begin) / step).floor().max(1.0);
+                let to_there = if ahead == 1.0 { whole } else { over(ahead * step) };
+                (x, v) = to_there.apply(x, v);
+                begin += ahead * step;
+                series = Series::new(w, ratio, step, [x, v]);
             }
-            (x, v) = over_span.apply(x, v);
-            *reading = x;
-            now = t;
+            *reading = series.at((t - begin) * per_step);
         }
     }
 }

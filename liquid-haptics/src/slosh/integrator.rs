@@ -1,10 +1,7 @@
 //! The decay with its effects, integrated: Runge-Kutta about the exact linear motion, stopped at the turning points of dry friction.
 
 use super::decay::{Decay, DecayError, QUINTIC};
-use super::linear::{EVEN, Propagator};
-
-/// Steps of the integrator per radian of the mode.
-const STEPS_PER_RADIAN: f64 = 4.0;
+use super::linear::{Propagator, STEPS_PER_RADIAN, Series};
 
 impl Decay {
     /// What the effects add to the acceleration.
@@ -16,60 +13,65 @@ impl Decay {
             - force
     }
 
-    /// Readings with the effects, from position and speed at time 0, as [`Decay::read`].
+    /// Readings with the effects, from position and speed at time 0, as [`Decay::read`]. Steps have a length of their own, whatever the
+    /// rows are; each row is read off the step that holds it.
     pub(super) fn integrate(&self, t_s: &[f64], start: [f64; 2], out: &mut [f64]) -> Result<(), DecayError> {
         let (w, friction) = (self.omega_rad_s, self.effects.friction);
-        let stiffening = self.stiffening();
         let bound = 1e3 * (start[0].abs() + start[1].abs() / w + friction);
         let mut state = Motion { x: start[0], v: start[1], direction: 0.0 };
         state.set_off(w, friction);
-        let mut now = 0.0;
-        let mut stride = Stride::new(self, 0.0);
+        let whole = Stride::new(self, 1.0 / (w * STEPS_PER_RADIAN));
+        let (mut begin, mut step) = (0.0, self.step(&state, &whole));
         for (reading, &t) in out.iter_mut().zip(t_s) {
-            let span = t - now;
-            if span > 0.0 && !state.stuck() {
-                let steps = (span * w * STEPS_PER_RADIAN).ceil().max(1.0);
-                let h = span / steps;
-                if (h - stride.h).abs() > EVEN * h {
-                    stride = Stride::new(self, h);
+            while !state.stuck() && t >= begin + step.h {
+                begin += step.h;
+                state = step.end;
+                // Long after a wave has grown beyond all bounds no step need be taken.
+                if !(state.x.abs() <= bound) {
+                    return Err(DecayError::Diverges { t_s: t });
                 }
-                for _ in 0..steps as usize {
-                    self.step(&mut state, &stride, stiffening);
-                    if state.stuck() {
-                        break;
-                    }
-                }
-                now = t;
+                step = self.step(&state, &whole);
             }
-            if !(state.x.abs() <= bound) {
+            *reading = if state.stuck() { state.x } else { step.motion.at((t - begin) / step.h) };
+            if !(reading.abs() <= bound) {
                 return Err(DecayError::Diverges { t_s: t });
             }
-            *reading = state.x;
         }
         Ok(())
     }
 
-    /// One step, with the turning points inside it.
-    fn step(&self, state: &mut Motion, stride: &Stride, stiffening: f64) {
-        let friction = self.effects.friction * self.omega_rad_s * self.omega_rad_s;
-        let mut part = *stride;
-        for _ in 0..8 {
-            let force = friction * state.direction;
-            let (x, v) = self.runge_kutta(state, &part, stiffening, force);
-            if friction == 0.0 || v * state.direction > 0.0 {
-                (state.x, state.v) = (x, v);
-                return;
-            }
-            let turn = self.turning_point(state, part.h, stiffening, force);
-            let (x, _) = self.runge_kutta(state, &turn, stiffening, force);
-            (state.x, state.v) = (x, 0.0);
-            state.set_off(self.omega_rad_s, self.effects.friction);
-            let left = part.h - turn.h;
-            if state.stuck() || left <= 1e-12 * stride.h {
-                return;
-            }
-            part = Stride::new(self, left);
+    /// The step from a state, which ends at the turning point where dry friction has one.
+    fn step(&self, begin: &Motion, whole: &Stride) -> Step {
+        let stiffening = self.stiffening();
+        let force = self.effects.friction * self.omega_rad_s * self.omega_rad_s * begin.direction;
+        let advance = |stride: &Stride| self.runge_kutta(begin, stride, stiffening, force);
+        let push = |x, v| self.push(x, v, stiffening, force);
+        let pushes = |end: &Motion| [push(begin.x, begin.v), push(end.x, end.v)];
+        let (x, v) = advance(whole);
+        let end = Motion { x, v, ..*begin };
+        if self.effects.friction == 0.0 || v * begin.direction > 0.0 || begin.stuck() {
+            return Step { h: whole.h, motion: self.motion(begin, whole, &end, pushes(&end)), end };
         }
+        if begin.v == 0.0 {
+            // Hardly pulled beyond friction, and not moved by it.
+            let end = Motion { direction: 0.0, ..*begin };
+            return Step { h: 0.0, motion: self.motion(begin, whole, &end, [0.0; 2]), end };
+        }
+        let turn = self.turning_point(begin, whole.h, stiffening, force);
+        let mut end = Motion { x: advance(&turn).0, v: 0.0, ..*begin };
+        let motion = self.motion(begin, &turn, &end, pushes(&end));
+        end.set_off(self.omega_rad_s, self.effects.friction);
+        Step { h: turn.h, motion, end }
+    }
+
+    /// The positions within a step, from what the effects add to the acceleration at both ends.
+    fn motion(&self, begin: &Motion, stride: &Stride, end: &Motion, push: [f64; 2]) -> Series {
+        let (w, ratio, h) = (self.omega_rad_s, self.damping_ratio, stride.h);
+        let (x, v) = stride.whole.apply(begin.x, begin.v);
+        let (x, v) = (end.x - x, end.v - v);
+        let acceleration = push[1] - w * w * x - 2.0 * ratio * w * v;
+        let linear = Series::new(w, ratio, h, [begin.x, begin.v]);
+        linear.departing(push[0] * h * h, [x, v * h, acceleration * h * h])
     }
 
     /// The stride after which the motion turns, somewhere within `h` (the speed is monotone there): Newton's method
@@ -130,7 +132,15 @@ impl Stride {
     }
 }
 
+/// A step: how long it is, how the position moves within it, and where it ends.
+struct Step {
+    h: f64,
+    motion: Series,
+    end: Motion,
+}
+
 /// Position and speed, and which way dry friction points (0: at rest).
+#[derive(Debug, Clone, Copy)]
 struct Motion {
     x: f64,
     v: f64,

@@ -4,6 +4,7 @@ mod envelope;
 mod experiments;
 mod local;
 mod model;
+mod reading;
 mod setup;
 mod spec;
 mod start;

@@ -1,9 +1,10 @@
 //! The full model of a decaying wave: physics from `liquid-haptics`, the arm and the sensor, and all parameters.
 
-use liquid_haptics::slosh::{Decay, Effects, SloshError, UprightCylinder};
+use liquid_haptics::slosh::{SloshError, UprightCylinder};
 use missing_physics::data::Run;
 use missing_physics::model::{Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec};
 
+use super::reading::Reading;
 use super::setup::{Channel, Setup, cylinder};
 use super::spec::{ARM_RAD_S, Layout, build, second_band};
 use super::start::{first_wave, peaks, viscosity_guess};
@@ -91,69 +92,18 @@ impl SloshModel {
 
     /// Angular frequency (rad/s) and damping ratio of a run's first mode.
     pub(super) fn first_mode(&self, run: &Run, shared: &[f64]) -> [f64; 2] {
-        let (p, cylinder) = (&self.layout, self.cylinder(run));
-        let omega = cylinder.angular_frequency_rad_s(0, shared[p.tension.slot] / self.setup.density_kg_m3);
-        [omega, cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999)]
+        self.reading(run).first_mode(shared)
     }
 
-    /// The first mode.
-    fn wave_at(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        let p = &self.layout;
-        let [omega_rad_s, damping_ratio] = self.first_mode(run, shared);
-        let mode = Decay {
-            omega_rad_s,
-            damping_ratio,
-            effects: Effects {
-                friction: shared[p.friction.slot],
-                quadratic_per_reading: shared[p.quadratic.slot],
-                frequency_change: shared[p.frequency.slot] * self.largest * self.largest,
-                largest_amplitude: self.largest,
-            },
-        };
-        let times = run.inputs.first().ok_or("there is no column of times")?;
-        mode.read(times, [nuisance[p.cos.slot], nuisance[p.sin.slot]], out).map_err(|e| e.to_string())
-    }
-
-    /// What is added to the first mode's reading: other oscillations, and the sensor's zero and transient.
-    fn add_others(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        let (p, cylinder) = (&self.layout, self.cylinder(run));
-        let times = run.inputs.first().ok_or("there is no column of times")?;
-        let mode =
-            |omega_rad_s, damping_ratio| Decay { omega_rad_s, damping_ratio, effects: Effects::default() };
-        // With another fill the second mode moves by as much as theory says.
-        let moved =
-            cylinder.angular_frequency_rad_s(1, 0.0) / self.cylinders[0].angular_frequency_rad_s(1, 0.0);
-        let second = mode(moved * shared[p.second_omega.slot], shared[p.second_damping.slot]);
-        let arm = mode(shared[p.arm_omega.slot], shared[p.arm_damping.slot]);
-        let zero = nuisance[p.zero.slot];
-        out.iter_mut().for_each(|y| *y += zero);
-        let mut more = Vec::new();
-        for (mode, cos, sin) in [(second, p.second_cos, p.second_sin), (arm, p.arm_cos, p.arm_sin)] {
-            let start = [nuisance[cos.slot], nuisance[sin.slot]];
-            if start != [0.0; 2] {
-                more.resize(times.len(), 0.0);
-                mode.read(times, start, &mut more).map_err(|e| e.to_string())?;
-                out.iter_mut().zip(&more).for_each(|(y, x)| *y += x);
-            }
-        }
-        let transient = nuisance[p.transient.slot];
-        if transient != 0.0 {
-            for (y, t) in out.iter_mut().zip(times) {
-                *y += transient * (-t / shared[p.lag.slot]).exp();
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether a parameter acts on what is added to the first mode, and not on that mode.
-    fn is_added(&self, shared: bool, slot: usize) -> bool {
-        let p = &self.layout;
-        if shared {
-            [p.second_omega, p.second_damping, p.arm_omega, p.arm_damping, p.lag]
-                .iter()
-                .any(|a| a.slot == slot)
-        } else {
-            slot != p.cos.slot && slot != p.sin.slot
+    fn reading<'a>(&'a self, run: &'a Run) -> Reading<'a> {
+        let [density_kg_m3, largest] = [self.setup.density_kg_m3, self.largest];
+        Reading {
+            layout: &self.layout,
+            full: &self.cylinders[0],
+            cylinder: self.cylinder(run),
+            density_kg_m3,
+            largest,
+            run,
         }
     }
 }
@@ -170,8 +120,8 @@ impl Model for SloshModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.wave_at(run, shared, nuisance, out)
-            .and_then(|()| self.add_others(run, shared, nuisance, out))
+        self.reading(run)
+            .all(shared, nuisance, out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
@@ -186,23 +136,27 @@ impl Model for SloshModel {
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
         self.predict(run, shared, nuisance, out)?;
+        let reading = self.reading(run);
         let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
         let mut below = vec![0.0; out.len()];
         let free = shared_free.iter().map(|&s| (true, s)).chain(nuisance_free.iter().map(|&s| (false, s)));
         for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(out.len().max(1))) {
+            let failed = |reason| PredictError { run: run.label.clone(), reason };
+            if !is_shared && let Some(done) = reading.proportional(&shared, slot, column) {
+                done.map_err(failed)?;
+                continue;
+            }
             let info = &self.spec.parameters[if is_shared { self.shared[slot] } else { self.nuisance[slot] }];
             let value = if is_shared { shared[slot] } else { nuisance[slot] };
             let step = 1e-5 * info.scale.max(1e-3 * value.abs());
             let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
             for (x, target) in [(high, &mut *column), (low, &mut below)] {
                 *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = x;
-                let done = if self.is_added(is_shared, slot) {
-                    target.fill(0.0);
-                    self.add_others(run, &shared, &nuisance, target)
-                } else {
-                    self.wave_at(run, &shared, &nuisance, target)
+                let done = match reading.part_of(slot).filter(|_| is_shared) {
+                    Some(part) => reading.part(part, &shared, &nuisance, target),
+                    None => reading.first(&shared, &nuisance, target),
                 };
-                done.map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+                done.map_err(failed)?;
             }
             *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = value;
             column.iter_mut().zip(&below).for_each(|(d, b)| *d = (*d - b) / (high - low));
