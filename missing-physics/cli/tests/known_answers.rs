@@ -323,15 +323,15 @@ fn named_sets(answer: &Value) -> Vec<Vec<String>> {
     sets
 }
 
-/// A basketball from a bridge: linear drag comes nearest, with 0.899 of the misfit (0.9 is wanted); another g by 1.7 m/s^2 would fit better, and is none
-/// that there is.
+/// A basketball from a bridge: another scale of the video by a sixth, which is another g by 1.7 m/s^2, fits best, linear drag nearly as well, and
+/// which of them it is these data do not tell.
 #[test]
 #[ignore = "needs ../shared"]
-fn shared_measured_basketball_is_nearly_drag() {
+fn shared_measured_basketball_is_drag_or_another_scale() {
     let answer = answer(&shared("recordings/real/trajectory/desilva-blue-basketball"), "0");
-    assert_eq!(answer["verdict"], "unexplained");
-    assert_eq!(ids(&answer["closest"]["ids"]), ["linear-drag"]);
-    assert!(answer["closest"]["share"].as_f64().unwrap() > 0.85);
+    assert_eq!(answer["verdict"], "partly");
+    let both = [["camera-scale"], ["linear-drag"]].map(|set| set.map(str::to_owned).to_vec());
+    assert_eq!(named_sets(&answer), both);
 }
 
 /// The force of the wave whose torque is among the bundled recordings: what is named of the torque comes nearest, with 0.883 of the misfit.

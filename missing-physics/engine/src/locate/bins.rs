@@ -6,6 +6,8 @@ use crate::problem::Problem;
 
 /// Intervals have their ends at these quantiles of a variable.
 const BINS: usize = 24;
+/// So many values between the neighbours of an edge may be that edge.
+const FINER: usize = 12;
 
 /// A variable, and its value at each row of each run.
 pub(crate) struct Along {
@@ -43,6 +45,23 @@ pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, 
     Ok(all)
 }
 
+/// The values of a variable in the rows in which one of some channels was measured, rising.
+fn measured(problem: &Problem<'_>, channels: std::ops::Range<usize>, along: &Along) -> Vec<f64> {
+    let of_run = |(rows, values): (&crate::problem::RunRows, &Vec<f64>)| -> Vec<f64> {
+        channels.clone().flat_map(|c| rows.valid[c].iter().map(|&i| values[i])).collect()
+    };
+    let mut values: Vec<f64> = problem.rows.iter().zip(&along.values).flat_map(of_run).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// So many of rising values, with about as many between each two; fewer where some are equal.
+fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
+    let mut some: Vec<f64> = (0..count).map(|k| values[k * values.len() / count]).collect();
+    some.dedup();
+    some
+}
+
 /// Bins with about as many measured rows each, one for each value where there are few.
 #[derive(Debug, Clone)]
 pub(crate) struct Bins {
@@ -59,31 +78,45 @@ impl Bins {
         channels: std::ops::Range<usize>,
         along: &Along,
     ) -> Option<Self> {
-        let of_run = |(rows, values): (&crate::problem::RunRows, &Vec<f64>)| -> Vec<f64> {
-            let measured = channels.clone().flat_map(|c| rows.valid[c].iter());
-            measured.map(|&i| values[i]).collect()
-        };
-        let mut values: Vec<f64> = problem.rows.iter().zip(&along.values).flat_map(of_run).collect();
-        values.sort_by(f64::total_cmp);
+        let values = measured(problem, channels, along);
         let mut single = values.clone();
         single.dedup();
-        let starts: Vec<f64> = if single.len() <= BINS {
-            single
-        } else {
-            let mut starts: Vec<f64> = (0..BINS).map(|k| values[k * values.len() / BINS]).collect();
-            starts.dedup();
-            starts
-        };
-        if starts.len() < 2 {
-            return None;
+        let starts: Vec<f64> = if single.len() <= BINS { single } else { quantiles(&values, BINS) };
+        (starts.len() > 1).then(|| Self::beginning_at(&starts, &values))
+    }
+
+    /// The same rows with more edges, where those of an interval may be: between the neighbours of each of its edges.
+    pub(crate) fn finer(&self, problem: &Problem<'_>, along: &Along, (from, to): (usize, usize)) -> Self {
+        let values = measured(problem, 0..problem.channels(), along);
+        let mut starts = vec![values[0]];
+        for edge in [from, to] {
+            let low = edge.checked_sub(1).map_or(f64::NEG_INFINITY, |before| self.spans[before][0]);
+            let high = self.spans.get(edge + 1).map_or(f64::INFINITY, |after| after[0]);
+            let mut near: Vec<f64> = values.iter().copied().filter(|v| *v >= low && *v <= high).collect();
+            near.dedup();
+            starts.extend(if near.len() <= FINER { near } else { quantiles(&near, FINER) });
+            starts.extend(self.spans.get(edge).map(|span| span[0]));
         }
+        starts.sort_by(f64::total_cmp);
+        starts.dedup();
+        Self::beginning_at(&starts, &values)
+    }
+
+    /// The edges among those of [`Self::finer`] that lie between the neighbours of one of these.
+    pub(crate) fn near(&self, edge: usize, finer: &Self) -> std::ops::RangeInclusive<usize> {
+        let begin = |at: usize| self.spans.get(at).map_or(finer.len(), |span| finer.of(span[0]));
+        begin(edge.saturating_sub(1))..=begin(edge + 1)
+    }
+
+    /// Bins that begin at rising values, the first one at the least; of rising values.
+    fn beginning_at(starts: &[f64], values: &[f64]) -> Self {
         let mut bins = Self { inner: starts[1..].to_vec(), spans: Vec::new() };
         bins.spans = vec![[f64::INFINITY, f64::NEG_INFINITY]; starts.len()];
-        for x in values {
+        for &x in values {
             let span = &mut bins.spans[bins.inner.partition_point(|start| *start <= x)];
             *span = [span[0].min(x), span[1].max(x)];
         }
-        Some(bins)
+        bins
     }
 
     pub(crate) fn len(&self) -> usize {

@@ -2,6 +2,7 @@
 
 mod bins;
 mod cause;
+mod intervals;
 mod least_squares;
 pub(crate) mod locations;
 mod projection;

@@ -10,65 +10,106 @@ use crate::model::PredictError;
 use crate::problem::Problem;
 
 /// Powers of a variable that a size may be made of.
-const POWERS: usize = 2;
+const POWERS: usize = 3;
 
-/// How the size goes along the variable within the interval: even, or rising from zero at its beginning or end.
+/// A square that is less than this part of the terms it is the sum of is none.
+const ROUNDING: f64 = 1e-10;
+
+/// How the size goes along the variable within the interval: even, or from zero at its beginning or end, straight or bent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
     Even,
-    FromBegin,
-    FromEnd,
+    Straight(Edge),
+    Bent(Edge),
+}
+
+/// An edge of an interval.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Edge {
+    Begin,
+    End,
 }
 
 impl Form {
-    pub(crate) const ALL: [Self; 3] = [Self::Even, Self::FromBegin, Self::FromEnd];
+    pub(crate) const ALL: [Self; 5] = [
+        Self::Even,
+        Self::Straight(Edge::Begin),
+        Self::Straight(Edge::End),
+        Self::Bent(Edge::Begin),
+        Self::Bent(Edge::End),
+    ];
 
-    /// How much of each power it has.
-    fn weights(self, bins: &Bins, (from, to): (usize, usize)) -> [f64; POWERS] {
-        match self {
-            Self::Even => [1.0, 0.0],
-            Self::FromBegin => [-bins.edge(from), 1.0],
-            Self::FromEnd => [-bins.edge(to), 1.0],
-        }
+    /// How many sizes it is made of.
+    pub(crate) fn sizes(self) -> usize {
+        if matches!(self, Self::Bent(_)) { 2 } else { 1 }
+    }
+
+    /// How much each of its sizes has of each power.
+    fn weights(self, bins: &Bins, (from, to): (usize, usize)) -> [[f64; POWERS]; 2] {
+        let (Self::Straight(edge) | Self::Bent(edge)) = self else { return [[1.0, 0.0, 0.0], [0.0; POWERS]] };
+        let zero = bins.edge(if edge == Edge::Begin { from } else { to });
+        let bend = if self.sizes() > 1 { [zero * zero, -2.0 * zero, 1.0] } else { [0.0; POWERS] };
+        [[-zero, 1.0, 0.0], bend]
     }
 }
 
-/// An effect over some runs: its product with the residual, its square beside nuisance parameters, and along shared ones.
+/// An effect over some runs, of up to two sizes: their products with the residual, their squares and cross product beside nuisance
+/// parameters, and what they have along shared ones.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Effect {
-    pub(crate) product: f64,
-    square: f64,
-    along_shared: Vec<f64>,
+    product: [f64; 2],
+    square: [f64; 2],
+    cross: f64,
+    along_shared: Vec<[f64; 2]>,
 }
 
 impl Effect {
-    /// Adds (or, with -1, takes away) that of other runs.
-    pub(crate) fn add(&mut self, other: &Self, sign: f64) {
-        self.product += sign * other.product;
-        self.square += sign * other.square;
-        if self.along_shared.is_empty() {
-            self.along_shared.resize(other.along_shared.len(), 0.0);
+    /// Adds that of other runs.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.along_shared.resize(other.along_shared.len(), [0.0; 2]);
+        for k in 0..2 {
+            self.product[k] += other.product[k];
+            self.square[k] += other.square[k];
+            self.along_shared.iter_mut().zip(&other.along_shared).for_each(|(a, b)| a[k] += b[k]);
         }
-        self.along_shared.iter_mut().zip(&other.along_shared).for_each(|(a, b)| *a += sign * b);
+        self.cross += other.cross;
     }
 
-    /// The square beside all parameters; zero where hardly anything is left beside them.
-    fn beside(&self) -> f64 {
-        let beside = self.square - dot(&self.along_shared, &self.along_shared);
-        if beside > 1e-6 * self.square { beside } else { 0.0 }
+    /// The product of two sizes beside all parameters.
+    fn beside(&self, product: f64, (a, b): (usize, usize)) -> f64 {
+        product - self.along_shared.iter().map(|along| along[a] * along[b]).sum::<f64>()
+    }
+
+    /// The first size's square beside all parameters; zero where hardly anything is left beside them.
+    fn first(&self) -> f64 {
+        told(self.beside(self.square[0], (0, 0)), self.square[0])
     }
 
     /// By how much the sum of squares falls.
     pub(crate) fn gain(&self) -> f64 {
-        let beside = self.beside();
-        if beside > 0.0 { self.product * self.product / beside } else { 0.0 }
+        let first = self.first();
+        if first <= 0.0 {
+            return 0.0;
+        }
+        let gain = self.product[0] * self.product[0] / first;
+        let part = self.beside(self.cross, (0, 1)) / first;
+        let second = self.beside(self.square[1], (1, 1)) - part * part * first;
+        let second = told(second, self.square[1]);
+        if second <= 0.0 {
+            return gain;
+        }
+        gain + (self.product[1] - part * self.product[0]).powi(2) / second
     }
 
-    /// The size that fits best, and its standard error.
-    pub(crate) fn size(&self) -> [f64; 2] {
-        let beside = self.beside();
-        [self.product / beside, beside.sqrt().recip()]
+    /// The first size that fits best; not a number where it is not told.
+    pub(crate) fn size(&self) -> f64 {
+        self.product[0] / self.first()
     }
+}
+
+/// A square beside others that hardly anything is left of is zero.
+fn told(beside: f64, square: f64) -> f64 {
+    if beside > 1e-6 * square { beside } else { 0.0 }
 }
 
 /// Sums of one run: of the columns that all bins before an edge give, power by power.
@@ -85,11 +126,14 @@ pub(crate) struct Responses {
     runs: Vec<OfRun>,
 }
 
-/// How much a component has at each row of each run: along the variable as a power, within some bins and runs.
-fn amounts(along: &Along, bins: &Bins, power: usize, within: impl Fn(usize, usize) -> bool) -> Vec<Vec<f64>> {
-    let of_row = |run: usize, x: f64| {
-        if within(run, bins.of(x)) { bins.along(x).powi(power as i32) } else { 0.0 }
-    };
+/// How much a component has at each row of each run: a function of the variable (from -1 to 1), within some bins and runs.
+fn amounts(
+    along: &Along,
+    bins: &Bins,
+    size: impl Fn(f64) -> f64,
+    within: impl Fn(usize, usize) -> bool,
+) -> Vec<Vec<f64>> {
+    let of_row = |run: usize, x: f64| if within(run, bins.of(x)) { size(bins.along(x)) } else { 0.0 };
     along.values.iter().enumerate().map(|(r, v)| v.iter().map(|x| of_row(r, *x)).collect()).collect()
 }
 
@@ -105,26 +149,32 @@ pub(crate) struct Asked<'a> {
     pub(crate) bins: &'a Bins,
 }
 
+/// What a size of a form does.
+pub(crate) struct Column {
+    /// By run.
+    pub(crate) moved: Vec<Vec<f64>>,
+    /// Its mean over the rows at which it acts.
+    pub(crate) mean: f64,
+}
+
 impl Asked<'_> {
-    /// The effect of a form in an interval and some runs, by run, and its mean size there.
-    pub(crate) fn column(
+    /// What each size of a form does in an interval and some runs.
+    pub(crate) fn columns(
         &self,
         interval: (usize, usize),
         form: Form,
         runs: &[bool],
-    ) -> Result<(Vec<Vec<f64>>, f64), PredictError> {
-        let weights = form.weights(self.bins, interval);
+    ) -> Result<Vec<Column>, PredictError> {
         let within = |run: usize, bin: usize| runs[run] && bin >= interval.0 && bin < interval.1;
-        let [mut all, linear] = [0, 1].map(|power| amounts(self.along, self.bins, power, within));
-        for (run, linear) in all.iter_mut().zip(&linear) {
-            run.iter_mut().zip(linear).for_each(|(even, linear)| {
-                *even = weights[0] * *even + weights[1] * linear;
-            });
-        }
-        let active = all.iter().flatten().filter(|v| **v != 0.0);
-        let (sum, n) = active.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-        let moved = self.unknown.response(self.problem, self.fit, self.sigma, self.component, &all)?;
-        Ok((moved, if n > 0.0 { sum / n } else { 0.0 }))
+        let rows = amounts(self.along, self.bins, |_| 1.0, within).into_iter().flatten().sum::<f64>();
+        let of_size = |weights: &[f64; POWERS]| {
+            let size = |x: f64| weights.iter().rev().fold(0.0, |sum, weight| sum * x + weight);
+            let all = amounts(self.along, self.bins, size, within);
+            let sum: f64 = all.iter().flatten().sum();
+            let moved = self.unknown.response(self.problem, self.fit, self.sigma, self.component, &all)?;
+            Ok(Column { moved, mean: sum / rows.max(1.0) })
+        };
+        form.weights(self.bins, interval)[..form.sizes()].iter().map(of_size).collect()
     }
 }
 
@@ -141,7 +191,7 @@ impl Responses {
                 if bin == bins.len() {
                     break;
                 }
-                let only = amounts(along, bins, power, |_, b| b == bin);
+                let only = amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
                 let moved = unknown.response(problem, fit, sigma, component, &only)?;
                 for (run, (sum, mut moved)) in sums.iter_mut().zip(moved).enumerate() {
                     projection.beside_nuisance(run, &mut moved);
@@ -163,22 +213,28 @@ impl Responses {
 
     /// The effect of a form in an interval of bins, in each run.
     pub(crate) fn by_run(&self, bins: &Bins, (from, to): (usize, usize), form: Form) -> Vec<Effect> {
-        let weights = form.weights(bins, (from, to));
         let edges = self.bins + 1;
-        let mut parts = Vec::with_capacity(2 * POWERS);
-        for (power, weight) in weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0) {
-            parts.push((power * edges + to, weight));
-            parts.push((power * edges + from, -weight));
-        }
+        let parts = form.weights(bins, (from, to)).map(|weights| -> Vec<(usize, f64)> {
+            let powers = weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0);
+            powers.flat_map(|(p, w)| [(p * edges + to, w), (p * edges + from, -w)]).collect()
+        });
         let of_run = |run: &OfRun| {
-            let sum = |column: &[f64]| parts.iter().map(|(k, w)| w * column[*k]).sum::<f64>();
-            let square = parts
-                .iter()
-                .map(|(k, w)| w * parts.iter().map(|(l, v)| v * run.squares[(*k, *l)]).sum::<f64>());
+            let sum = |k: usize, column: &[f64]| parts[k].iter().map(|(at, w)| w * column[*at]).sum::<f64>();
+            let square = |a: usize, b: usize| {
+                let terms = parts[a]
+                    .iter()
+                    .flat_map(|(k, w)| parts[b].iter().map(move |(l, v)| w * v * run.squares[(*k, *l)]));
+                let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), t| (sum + t, size + t.abs()));
+                if sum.abs() > ROUNDING * size { sum } else { 0.0 }
+            };
+            let squares = [square(0, 0), square(1, 1)];
+            let is_there = |k: usize| squares[k] > 0.0;
+            let all = |column: &[f64]| [0, 1].map(|k| if is_there(k) { sum(k, column) } else { 0.0 });
             Effect {
-                product: sum(&run.products),
-                square: square.sum::<f64>().max(0.0),
-                along_shared: run.along_shared.iter().map(|d| sum(d)).collect(),
+                product: all(&run.products),
+                square: squares.map(|square| square.max(0.0)),
+                cross: if is_there(0) && is_there(1) { square(0, 1) } else { 0.0 },
+                along_shared: run.along_shared.iter().map(|direction| all(direction)).collect(),
             }
         };
         self.runs.iter().map(of_run).collect()

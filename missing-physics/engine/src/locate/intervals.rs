@@ -1,0 +1,235 @@
+//! Hypotheses along one variable: in which interval, in what form and in which runs an unknown acts.
+
+use crate::locate::bins::Bins;
+use crate::locate::responses::{Effect, Form, Responses};
+
+/// So many groups of neighbouring runs are told apart.
+const GROUPS: usize = 40;
+/// By how much a change that goes on to the last run is worth more than what is over before.
+const STAYS: f64 = 1.0;
+/// A subset of the runs is sought among so many at most.
+const SUBSETS: usize = 64;
+
+/// A hypothesis along one variable.
+#[derive(Clone)]
+pub(crate) struct Found {
+    pub(crate) bins: Bins,
+    pub(crate) interval: (usize, usize),
+    pub(crate) form: Form,
+    pub(crate) runs: Vec<bool>,
+    pub(crate) components: Vec<usize>,
+    /// By how much the sum of squares falls, and what of that is paid.
+    pub(crate) gain: f64,
+    pub(crate) price: f64,
+}
+
+impl Found {
+    pub(crate) fn worth(&self) -> f64 {
+        self.gain - self.price
+    }
+}
+
+/// The best hypotheses along one variable: in all runs or neighbouring ones, and in a subset of them.
+#[derive(Clone, Default)]
+pub(crate) struct Best {
+    pub(crate) simple: Option<Found>,
+    pub(crate) some_runs: Option<Found>,
+}
+
+/// An effect in several runs.
+fn total(runs: impl Iterator<Item = Effect>) -> Effect {
+    runs.fold(Effect::default(), |mut sum, run| {
+        sum.add(&run);
+        sum
+    })
+}
+
+/// The intervals along one variable, for all components of an unknown.
+pub(crate) struct Scan<'a> {
+    pub(crate) bins: &'a Bins,
+    pub(crate) responses: &'a [Responses],
+    pub(crate) runs: usize,
+    /// Whether what acts in a run shows in that run alone.
+    pub(crate) alone: bool,
+    pub(crate) rows: f64,
+}
+
+impl Scan<'_> {
+    /// The best hypotheses.
+    pub(crate) fn best(&self) -> Best {
+        let mut best = Best::default();
+        let n = self.bins.len();
+        let intervals = (n * (n + 1) / 2) as f64;
+        for interval in (0..n).flat_map(|from| (from + 1..=n).map(move |to| (from, to))) {
+            for form in Form::ALL {
+                let effects: Vec<Vec<Effect>> =
+                    self.responses.iter().map(|r| r.by_run(self.bins, interval, form)).collect();
+                let whole = interval == (0, n) && form == Form::Even;
+                let scanned = if whole { 0.0 } else { 2.0 * (Form::ALL.len() as f64 * intervals).ln() };
+                self.all_runs(&effects, interval, form, scanned, &mut best.simple);
+                if self.alone && self.runs > 1 && form == Form::Even {
+                    self.neighbouring_runs(&effects, interval, scanned, &mut best.simple);
+                    self.some_runs(&effects, interval, scanned, &mut best.some_runs);
+                }
+            }
+        }
+        best
+    }
+
+    /// The best of each component alone and of all together, in some runs.
+    fn judge(
+        &self,
+        effects: &[Effect],
+        (interval, form): ((usize, usize), Form),
+        scanned: f64,
+        best: &mut Option<Found>,
+        runs: impl Fn() -> Vec<bool>,
+    ) {
+        let price = form.sizes() as f64 * self.rows.ln();
+        let gains: Vec<f64> = effects.iter().map(Effect::gain).collect();
+        let mut better = |gain: f64, price: f64, components: Vec<usize>| {
+            if best.as_ref().is_none_or(|b| gain - price > b.worth()) && gain.is_finite() {
+                let bins = self.bins.clone();
+                *best = Some(Found { bins, interval, form, runs: runs(), components, gain, price });
+            }
+        };
+        gains.iter().enumerate().for_each(|(c, gain)| better(*gain, price + scanned, vec![c]));
+        if gains.len() > 1 {
+            let all = gains.len();
+            better(gains.iter().sum(), all as f64 * price + scanned, (0..all).collect());
+        }
+    }
+
+    fn all_runs(
+        &self,
+        effects: &[Vec<Effect>],
+        interval: (usize, usize),
+        form: Form,
+        scanned: f64,
+        best: &mut Option<Found>,
+    ) {
+        let sums: Vec<Effect> = effects.iter().map(|runs| total(runs.iter().cloned())).collect();
+        self.judge(&sums, (interval, form), scanned, best, || vec![true; self.runs]);
+    }
+
+    /// From one run to another one, in their order.
+    fn neighbouring_runs(
+        &self,
+        effects: &[Vec<Effect>],
+        interval: (usize, usize),
+        scanned: f64,
+        best: &mut Option<Found>,
+    ) {
+        let groups = self.runs.min(GROUPS);
+        let begin = |group: usize| group * self.runs / groups;
+        let scanned = scanned + 2.0 * ((groups * (groups + 1) / 2) as f64).ln();
+        for from in 0..groups {
+            let mut sums = vec![Effect::default(); effects.len()];
+            for to in from + 1..=groups {
+                for (sum, effects) in sums.iter_mut().zip(effects) {
+                    effects[begin(to - 1)..begin(to)].iter().for_each(|e| sum.add(e));
+                }
+                if (from, to) != (0, groups) {
+                    // A change that goes on has another side that fits as well, the runs before it.
+                    let scanned = if to == groups { scanned - STAYS } else { scanned };
+                    let runs = || (0..self.runs).map(|r| r >= begin(from) && r < begin(to)).collect();
+                    self.judge(&sums, (interval, Form::Even), scanned, best, runs);
+                }
+            }
+        }
+    }
+
+    /// Those runs in which a component alone has the larger size.
+    fn some_runs(
+        &self,
+        effects: &[Vec<Effect>],
+        interval: (usize, usize),
+        scanned: f64,
+        best: &mut Option<Found>,
+    ) {
+        if self.runs > SUBSETS || self.runs < 3 {
+            return;
+        }
+        for (component, effects) in effects.iter().enumerate() {
+            let mut order: Vec<usize> = (0..self.runs).filter(|&r| effects[r].size().is_finite()).collect();
+            order.sort_by(|&a, &b| effects[b].size().total_cmp(&effects[a].size()));
+            for reversed in [false, true] {
+                if reversed {
+                    order.reverse();
+                }
+                let mut sum = Effect::default();
+                let mut ways = 0.0;
+                for (k, &run) in order.iter().enumerate().take(self.runs / 2) {
+                    sum.add(&effects[run]);
+                    // The number of ways to choose so many of the runs, and that number itself.
+                    ways += (((self.runs - k) as f64) / (k + 1) as f64).ln();
+                    let price = self.rows.ln() + scanned + 2.0 * (ways + (self.runs as f64).ln());
+                    let gain = sum.gain();
+                    if best.as_ref().is_none_or(|b| gain - price > b.worth()) {
+                        let mut runs = vec![false; self.runs];
+                        order[..=k].iter().for_each(|&r| runs[r] = true);
+                        let (form, components, bins) = (Form::Even, vec![component], self.bins.clone());
+                        *best = Some(Found { bins, interval, form, runs, components, gain, price });
+                    }
+                }
+            }
+        }
+    }
+
+    /// A hypothesis found with fewer edges, of the components that are scanned here, with its edges anywhere between their neighbours
+    /// there: each where it is as likely to be before as behind.
+    pub(crate) fn finer(&self, found: Found) -> Found {
+        let forms = if found.runs.contains(&false) { &Form::ALL[..1] } else { &Form::ALL[..] };
+        let price = |form: Form| {
+            let sizes = self.responses.len() as f64 * (form.sizes() as f64 - found.form.sizes() as f64);
+            found.price + sizes * self.rows.ln()
+        };
+        let worth = |interval: (usize, usize), form: Form| {
+            let of_component = |r: &Responses| {
+                let runs = r.by_run(self.bins, interval, form).into_iter().zip(&found.runs);
+                total(runs.filter(|(_, acts)| **acts).map(|(effect, _)| effect)).gain()
+            };
+            self.responses.iter().map(of_component).sum::<f64>() - price(form)
+        };
+        let [from, to] = [found.interval.0, found.interval.1].map(|edge| found.bins.near(edge, self.bins));
+        let intervals = from.flat_map(|from| to.clone().map(move |to| (from, to))).filter(|(f, t)| f < t);
+        let judged: Vec<Edges> = intervals
+            .flat_map(|interval| forms.iter().map(move |&form| (interval, form)))
+            .map(|(interval, form)| Edges { interval, form, worth: worth(interval, form) })
+            .filter(|edges| edges.worth.is_finite())
+            .collect();
+        let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth()) else {
+            return found;
+        };
+        let [from, to] = [|e: &Edges| e.interval.0, |e: &Edges| e.interval.1].map(|of| middle(&judged, of));
+        let middle = likeliest(judged.iter().filter(|e| e.interval == (from, to))).unwrap_or(best);
+        let price = price(middle.form);
+        let (interval, form, gain) = (middle.interval, middle.form, best.worth + price);
+        Found { bins: self.bins.clone(), interval, form, gain, price, ..found }
+    }
+}
+
+/// Edges that are tried.
+struct Edges {
+    interval: (usize, usize),
+    form: Form,
+    worth: f64,
+}
+
+fn likeliest<'a>(edges: impl Iterator<Item = &'a Edges>) -> Option<&'a Edges> {
+    edges.max_by(|a, b| a.worth.total_cmp(&b.worth))
+}
+
+/// The edge before which there is half of the likelihood.
+fn middle(judged: &[Edges], edge: impl Fn(&Edges) -> usize) -> usize {
+    let most = likeliest(judged.iter()).map_or(0.0, |best| best.worth);
+    let mut weights: Vec<(usize, f64)> =
+        judged.iter().map(|e| (edge(e), (0.5 * (e.worth - most)).exp())).collect();
+    weights.sort_by_key(|weight| weight.0);
+    let mut left = 0.5 * weights.iter().map(|weight| weight.1).sum::<f64>();
+    let passed = |weight: &&(usize, f64)| {
+        left -= weight.1;
+        left <= 0.0
+    };
+    weights.iter().find(passed).map_or(0, |weight| weight.0)
+}
