@@ -1,9 +1,7 @@
 //! Which row, which sensor: each whole number gets a fit of its own, and those that the data do not tell apart stay open.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Curve, mechanism, parameter, recording};
+use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::model::Mechanism;

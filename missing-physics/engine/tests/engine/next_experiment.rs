@@ -1,9 +1,7 @@
 //! What is proposed next.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Curve, mechanism, parameter, recording};
+use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::Run;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::model::{Experiment, Parameter, Scope};

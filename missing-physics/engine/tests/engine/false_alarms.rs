@@ -6,9 +6,7 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
-use common::{Ball, World};
+use crate::common::{Ball, World};
 use missing_physics::diagnosis::Verdict;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;

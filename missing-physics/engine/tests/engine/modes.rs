@@ -1,9 +1,7 @@
 //! A likelihood with many tops: the highest is found, and an interval reaches to those that are as likely.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Curve, mechanism, parameter, recording};
+use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;

@@ -5,13 +5,11 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
+use crate::common::{Burst, Dice, hiss, strike};
 use bounce_audio::hear::{HearError, HearSettings, StrayReason, hear, hear_times};
 use bounce_audio::localise::{ArrayError, LocaliseError};
 use bounce_audio::onset::{Listened, OnsetError, OnsetSettings};
 use bounce_audio::wav::Sound;
-use common::{Burst, Dice, hiss, strike};
 
 const C: f64 = 343.0;
 const RATE: f64 = 44_100.0;

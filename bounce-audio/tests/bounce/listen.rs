@@ -5,17 +5,15 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
 use std::path::Path;
 
+use crate::common::{Dice, bundled, hiss, quantile, shared};
 use bounce_audio::fake::{Burst, Court, Room, RoomError};
 use bounce_audio::hear::{HearError, HearSettings, hear};
 use bounce_audio::listen::{Delays, Listener, Placed, Sounded};
 use bounce_audio::onset::OnsetError;
 use bounce_audio::playback::Playback;
 use bounce_audio::wav::Sound;
-use common::{Dice, bundled, hiss, quantile, shared};
 use hw_traits::microphones::Microphones;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,9 +1,7 @@
 //! Models that know so many mechanisms that only those which promise anything are fitted; parameters that may stay open.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Curve, mechanism, parameter, recording};
+use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};

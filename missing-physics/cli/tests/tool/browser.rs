@@ -1,11 +1,9 @@
 //! The pages in a real browser: pointing, zooming, picking; nothing is complained of, and nothing is asked for from anywhere.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod chromium;
-
 use std::path::{Path, PathBuf};
 
-use chromium::Browser;
+use crate::chromium::Browser;
 use missing_physics::engine::Options;
 use missing_physics::observer::Silent;
 use missing_physics_cli::commands::{DiagnoseArguments, diagnose, diagnose_many};

@@ -1,9 +1,7 @@
 //! Runs that arrive one by one: no more false alarms than promised, changes found, named and dated.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Curve, mechanism, parameter, recording};
+use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::stream::{Look, Watch, What};
 use missing_physics::model::{Parameter, Scope, UNBOUNDED};

@@ -1,9 +1,7 @@
 //! Specifications, recordings and experiments that make no sense: each is refused by its own error, and nothing panics.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Ball, World, mechanism, parameter};
+use crate::common::{Ball, World, mechanism, parameter};
 use missing_physics::data::{Recording, RecordingError, Run};
 use missing_physics::engine::{DiagnoseError, Options, diagnose};
 use missing_physics::likelihood::{Likelihood, Scores};

@@ -1,9 +1,7 @@
 //! A parameter at whose values predictions jump: the likelihood is a stair.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{mechanism, parameter, recording};
+use crate::common::{mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::model::{Extensions, Model, MultimodalModel, PredictError, Spec};

@@ -5,9 +5,7 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
-use common::{mechanism, parameter};
+use crate::common::{mechanism, parameter};
 use missing_physics::data::Run;
 use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};

@@ -1,9 +1,7 @@
 //! Parameters of a run that stand at a bound.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Ball, World};
+use crate::common::{Ball, World};
 use missing_physics::data::Recording;
 use missing_physics::diagnosis::Verdict;
 use missing_physics::engine::{Options, diagnose};

@@ -1,9 +1,7 @@
 //! Runs that differ, and runs that contradict the others.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Ball, World};
+use crate::common::{Ball, World};
 use missing_physics::data::Recording;
 use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};

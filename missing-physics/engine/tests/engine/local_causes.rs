@@ -1,9 +1,7 @@
 //! Rows that are not alone: each reading is the sum of all steps so far, so that a step that departs shows in all readings after it.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{parameter, recording};
+use crate::common::{parameter, recording};
 use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Location;
 use missing_physics::engine::{Options, diagnose};

@@ -5,12 +5,10 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
+use crate::common::Dice;
 use bounce_audio::localise::{
     Array, ArrayError, SurveyError, SurveyPrior, Tap, locate_in_space, speed_of_sound_m_s, survey,
 };
-use common::Dice;
 
 const C: f64 = 343.0;
 const TRIANGLE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0762], [0.55, 0.0, 0.0762], [0.275, 0.55, 0.0762]];

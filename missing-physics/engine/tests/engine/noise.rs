@@ -1,9 +1,7 @@
 //! What is known of the noise: replicates, and readings that are none.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Ball, World};
+use crate::common::{Ball, World};
 use missing_physics::data::Recording;
 use missing_physics::diagnosis::{NoiseSource, Verdict};
 use missing_physics::engine::{Options, diagnose};

@@ -5,11 +5,9 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
+use crate::common::{Burst, Dice, hiss, quantile, shared, strike};
 use bounce_audio::localise::{ArrayError, LocaliseError, Localiser};
 use bounce_audio::wav::Sound;
-use common::{Burst, Dice, hiss, quantile, shared, strike};
 
 const C: f64 = 343.0;
 const TRIANGLE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0762], [0.55, 0.0, 0.0762], [0.275, 0.55, 0.0762]];
@@ -169,7 +167,7 @@ fn nonsense_is_an_error() {
     assert!(matches!(refused, Err(LocaliseError::Energy { channel: 0, .. })), "{refused:?}");
 }
 
-/// Prints how long one place takes: `cargo test --release -p bounce-audio --test localise -- --ignored --nocapture`.
+/// Prints how long one place takes: `cargo test --release -p bounce-audio --test bounce localise -- --ignored --nocapture`.
 #[test]
 #[ignore = "by hand: a time depends on the machine"]
 fn time_of_one_place() {

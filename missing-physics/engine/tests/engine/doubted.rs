@@ -1,9 +1,7 @@
 //! A second effect so faint that the first alone may be doubted, but is hardly less likely.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Curve, mechanism, parameter, recording};
+use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::Run;
 use missing_physics::diagnosis::Verdict;
 use missing_physics::engine::{Options, diagnose};

@@ -5,13 +5,11 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
 use std::path::PathBuf;
 
+use crate::common::{bundled, quantile, shared};
 use bounce_audio::hear::{HearSettings, hear, hear_times};
 use bounce_audio::wav::Sound;
-use common::{bundled, quantile, shared};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {

@@ -1,9 +1,7 @@
 //! A diagnosis can be written by serde as it stands.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
-use common::{Ball, World};
+use crate::common::{Ball, World};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
 

@@ -31,7 +31,7 @@ fn falls(runs: std::ops::Range<usize>, drag_from: usize, rng: &mut ChaCha8Rng) -
 }
 
 fn folder(path: &Path, rows: &str) {
-    let toml = include_str!("../../../recordings/dropped-ball/recording.toml");
+    let toml = include_str!("../../../../recordings/dropped-ball/recording.toml");
     std::fs::write(path.join("recording.toml"), toml).unwrap();
     std::fs::write(path.join("data.csv"), format!("run,t_s,z_m\n{rows}")).unwrap();
 }

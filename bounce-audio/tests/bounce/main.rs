@@ -1,0 +1,15 @@
+//! All tests of the crate: one program, linked once.
+
+mod common;
+mod cup;
+mod drop;
+mod flight;
+mod hear;
+mod integrator;
+mod listen;
+mod localise;
+mod place;
+mod posterior;
+mod practice;
+mod track;
+mod wav;

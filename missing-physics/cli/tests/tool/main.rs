@@ -1,0 +1,19 @@
+//! The tool, as a program that is run: one program of tests, linked once.
+
+mod bad_recordings;
+mod browser;
+mod chromium;
+mod clock;
+mod custom;
+mod drops;
+mod import;
+mod located;
+mod machines;
+mod next_experiment;
+mod outputs;
+mod pages;
+mod prove;
+mod repair;
+mod report;
+mod templates;
+mod watch;
