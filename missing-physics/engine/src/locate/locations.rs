@@ -164,6 +164,8 @@ impl Places<'_> {
         }
         let label = |r: usize| self.problem.recording.runs[r].label.clone();
         let mean = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
+        // Of all rows that a fit with an offset was made to, rounding alone is left of it.
+        let mean = if mean.abs() > 1e-9 * self.sigma[channel] { mean } else { 0.0 };
         let square = residuals.iter().map(|v| v * v).sum::<f64>() / residuals.len().max(1) as f64;
         let larger = |a: f64, v: f64| if v.abs() > a.abs() { v } else { a };
         let (from, to) = within.interval;
