@@ -32,6 +32,26 @@ pub trait Number:
     /// `self += other * factor`.
     fn add_scaled(&mut self, other: Self, factor: f64);
 
+    /// Becomes `a + b`, in its place.
+    fn set_sum(&mut self, a: &Self, b: &Self) {
+        *self = *a + *b;
+    }
+
+    /// Becomes `a - b`, in its place.
+    fn set_difference(&mut self, a: &Self, b: &Self) {
+        *self = *a - *b;
+    }
+
+    /// Becomes `a b`, in its place.
+    fn set_product(&mut self, a: &Self, b: &Self) {
+        *self = *a * *b;
+    }
+
+    /// Becomes `a factor`, in its place.
+    fn set_scaled(&mut self, a: &Self, factor: f64) {
+        *self = *a * factor;
+    }
+
     /// The number without its real part.
     #[must_use]
     fn infinitesimal(self) -> Self {
@@ -218,10 +238,43 @@ impl<const N: usize> Number for Dual<N> {
         Self { re: value, eps: self.scaled(derivative) }
     }
 
+    #[inline]
     fn add_scaled(&mut self, other: Self, factor: f64) {
         self.re += other.re * factor;
         for (a, b) in self.eps.iter_mut().zip(&other.eps) {
             *a += b * factor;
+        }
+    }
+
+    #[inline]
+    fn set_sum(&mut self, a: &Self, b: &Self) {
+        self.re = a.re + b.re;
+        for (k, e) in self.eps.iter_mut().enumerate() {
+            *e = a.eps[k] + b.eps[k];
+        }
+    }
+
+    #[inline]
+    fn set_difference(&mut self, a: &Self, b: &Self) {
+        self.re = a.re - b.re;
+        for (k, e) in self.eps.iter_mut().enumerate() {
+            *e = a.eps[k] - b.eps[k];
+        }
+    }
+
+    #[inline]
+    fn set_product(&mut self, a: &Self, b: &Self) {
+        self.re = a.re * b.re;
+        for (k, e) in self.eps.iter_mut().enumerate() {
+            *e = b.re * a.eps[k] + a.re * b.eps[k];
+        }
+    }
+
+    #[inline]
+    fn set_scaled(&mut self, a: &Self, factor: f64) {
+        self.re = a.re * factor;
+        for (k, e) in self.eps.iter_mut().enumerate() {
+            *e = a.eps[k] * factor;
         }
     }
 }
@@ -251,6 +304,7 @@ impl<const N: usize> Sub for Dual<N> {
 
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self { re: self.re * other.re, eps: self.mixed(other.re, &other, self.re) }
     }
@@ -315,6 +369,21 @@ impl<const N: usize> SubAssign for Dual<N> {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+
+    /// What is computed in place is what operators give.
+    #[test]
+    fn operations_in_place_are_those_of_the_operators() {
+        let (x, y) = (Dual::<2>::parameter(0.4, 0) * 3.0, Dual::<2>::parameter(1.3, 1).sin());
+        let mut z = Dual::from(0.0);
+        z.set_sum(&x, &y);
+        assert_eq!(z, x + y);
+        z.set_difference(&x, &y);
+        assert_eq!(z, x - y);
+        z.set_product(&x, &y);
+        assert_eq!(z, x * y);
+        z.set_scaled(&x, -0.7);
+        assert_eq!(z, x * -0.7);
+    }
 
     /// Every function's derivatives against differences.
     #[test]

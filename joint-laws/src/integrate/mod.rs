@@ -423,8 +423,13 @@ impl<T: Number> Integrator<T> {
                 let first = if events < MOST_EVENTS { self.first(machine, *t, x, h) } else { None };
                 let end = first.map_or(until, |(_, part)| *t + part * h);
                 while let Some(r) = reads.next_if(|r| r.t_s <= end) {
+                    let by = shift(r);
+                    if r.t_s == until && by == T::from(0.0) {
+                        read(machine, r, &self.trial);
+                        continue;
+                    }
                     let mut point = std::mem::take(&mut self.point);
-                    self.within_moved(x, h, (r.t_s - *t) / h, shift(r), &mut point);
+                    self.within_moved(x, h, (r.t_s - *t) / h, by, &mut point);
                     read(machine, r, &point);
                     self.point = point;
                 }

@@ -16,14 +16,43 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
 }
 
-/// Dot products of columns with each other.
+/// [`dot`] of one column with four others, which takes it from memory once.
+fn dot_four(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
+    let n = a.len();
+    let others = others.map(|b| &b[..n]);
+    let mut sums = [[0.0; 4]; 4];
+    let whole = n - n % 4;
+    for k in (0..whole).step_by(4) {
+        for (sums, b) in sums.iter_mut().zip(&others) {
+            for i in 0..4 {
+                sums[i] += a[k + i] * b[k + i];
+            }
+        }
+    }
+    let mut dots = [0.0; 4];
+    for ((dot, s), b) in dots.iter_mut().zip(&sums).zip(&others) {
+        let tail: f64 = a[whole..].iter().zip(&b[whole..]).map(|(x, y)| x * y).sum();
+        *dot = (s[0] + s[1]) + (s[2] + s[3]) + tail;
+    }
+    dots
+}
+
+/// Dot products of columns with each other; those that are zero all through cost nothing.
 pub(crate) fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
     let n = columns.len();
     let mut gram = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            gram[(i, j)] = dot(&columns[i], &columns[j]);
-            gram[(j, i)] = gram[(i, j)];
+    let full: Vec<usize> = (0..n).filter(|&i| columns[i].iter().any(|v| *v != 0.0)).collect();
+    for (k, &i) in full.iter().enumerate() {
+        let before = &full[..=k];
+        for four in before.chunks_exact(4) {
+            let dots = dot_four(&columns[i], [0, 1, 2, 3].map(|j| &columns[four[j]][..]));
+            for (&j, dot) in four.iter().zip(dots) {
+                (gram[(i, j)], gram[(j, i)]) = (dot, dot);
+            }
+        }
+        for &j in before.chunks_exact(4).remainder() {
+            let dot = dot(&columns[i], &columns[j]);
+            (gram[(i, j)], gram[(j, i)]) = (dot, dot);
         }
     }
     gram

@@ -192,6 +192,13 @@ impl Equations {
         free
     }
 
+    /// The same with inputs that are joined by straight lines.
+    pub(super) fn joined(&self) -> Self {
+        let mut joined = self.clone();
+        joined.inputs.iter_mut().for_each(|i| i.between = Between::Linear);
+        joined
+    }
+
     /// The place of a parameter among the names of expressions.
     pub(super) fn parameter_name(&self, parameter: usize) -> usize {
         self.states.len() + self.inputs.len() + parameter

@@ -169,6 +169,7 @@ pub(super) fn one<T: Number>(f: One, a: T) -> T {
 }
 
 /// A function of two numbers.
+#[inline]
 pub(super) fn two<T: Number>(f: Two, a: T, b: T) -> T {
     match f {
         Two::Add => a + b,

@@ -4,6 +4,7 @@ mod effects;
 mod equations;
 mod expression;
 mod growth;
+mod knots;
 mod machine;
 mod model;
 mod read;

@@ -22,6 +22,9 @@ const FINEST_FOR_LAWS: f64 = 0.125;
 /// yields more is a spring.
 const STIFFER: f64 = 3.0;
 
+/// Some dry friction, in parts of a joint's typical acceleration.
+const RUBS: f64 = 0.1;
+
 /// How the motion is followed: by which method, in which steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pace {
@@ -38,7 +41,7 @@ impl Default for Pace {
 }
 
 /// The model: equations, and every effect that may act beside them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct MotionModel {
     equations: Equations,
     spec: Spec,
@@ -116,6 +119,22 @@ impl MotionModel {
         let speeds = scales.joints.iter().map(|j| j.speed).collect();
         let cut = cut.map(|runs| runs.iter().map(|r| r.inputs[0].first().copied().unwrap_or(0.0)).collect());
         Self { equations, spec, roles, off, per_run, free_states, middles, speeds, pace, scales, cut }
+    }
+
+    /// The same model under equations that only take their inputs otherwise.
+    pub(super) fn under(&self, equations: Equations) -> Self {
+        Self { equations, ..self.clone() }
+    }
+
+    /// Shared parameters with some dry friction in every joint.
+    pub(super) fn rubbing(&self, shared: &[f64]) -> Vec<f64> {
+        let mut rubbing = shared.to_vec();
+        for (role, value) in self.roles.iter().zip(&mut rubbing) {
+            if let Role::Joint(joint, OfJoint::Coulomb) = *role {
+                *value = RUBS * self.scales.joints[joint].acceleration;
+            }
+        }
+        rubbing
     }
 
     /// The equations.
@@ -455,6 +474,7 @@ impl Model for MotionModel {
                 1 => self.columns::<1>(at, chunk, out, jacobian),
                 2 | 3 => self.columns::<3>(at, chunk, out, jacobian),
                 4 | 5 => self.columns::<5>(at, chunk, out, jacobian),
+                6 => self.columns::<6>(at, chunk, out, jacobian),
                 _ => self.columns::<8>(at, chunk, out, jacobian),
             }
             .map_err(|reason| PredictError { run: run.label.clone(), reason })?;

@@ -150,17 +150,23 @@ impl Tape {
         self.moving.iter().for_each(|&k| self.compute(k, registers));
     }
 
-    fn compute<T: Number>(&self, k: usize, r: &mut [T]) {
-        r[self.names + k] = match self.ops[k] {
-            Op::Constant(v) => T::from(v),
-            Op::Negate(a) => -r[a],
-            Op::Shift(a, v) => r[a] + v,
-            Op::Scale(a, v) => r[a] * v,
-            Op::Over(v, a) => r[a].recip() * v,
-            Op::Whole(a, n) => r[a].powi(n),
-            Op::One(f, a) => one(f, r[a]),
-            Op::Two(f, a, b) => two(f, r[a], r[b]),
-        };
+    #[inline]
+    fn compute<T: Number>(&self, k: usize, registers: &mut [T]) {
+        let (r, rest) = registers.split_at_mut(self.names + k);
+        let Some(out) = rest.first_mut() else { return };
+        match self.ops[k] {
+            Op::Two(Two::Add, a, b) => out.set_sum(&r[a], &r[b]),
+            Op::Two(Two::Subtract, a, b) => out.set_difference(&r[a], &r[b]),
+            Op::Two(Two::Multiply, a, b) => out.set_product(&r[a], &r[b]),
+            Op::Scale(a, v) => out.set_scaled(&r[a], v),
+            Op::Negate(a) => out.set_scaled(&r[a], -1.0),
+            Op::Constant(v) => *out = T::from(v),
+            Op::Shift(a, v) => *out = r[a] + v,
+            Op::Over(v, a) => *out = r[a].recip() * v,
+            Op::Whole(a, n) => *out = r[a].powi(n),
+            Op::One(f, a) => *out = one(f, r[a]),
+            Op::Two(f, a, b) => *out = two(f, r[a], r[b]),
+        }
     }
 
     /// The value of an expression, once all is computed.

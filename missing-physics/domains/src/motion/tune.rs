@@ -11,7 +11,7 @@ use super::equations::Equations;
 use super::growth::too_long;
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range};
-use super::windows::{cut, rows, thin};
+use super::windows::{Thinned, cut, rows, thin};
 
 /// The coarsest step of the integration, in rows.
 const COARSEST: f64 = 16.0;
@@ -21,6 +21,8 @@ const FINEST: f64 = 256.0;
 const OFTEN: f64 = 3.0;
 /// Errors of the integration that are put up with, in sigmas of all rows together.
 const UNSEEN: f64 = 0.3;
+/// Sum of squares, in sigmas of all rows, by which a motion may differ under inputs that are joined by lines.
+const ALIKE: f64 = 1.0;
 /// By how much one step a row has to fit better than the exact motion, as a sum of squares in parts of what is left of a reading.
 const BETTER: f64 = 20.0;
 /// The least noise of a channel that is reckoned with, in parts of its range.
@@ -40,15 +42,72 @@ pub(super) struct Tuned {
     pub(super) remarks: Vec<String>,
 }
 
-/// The full model, and the recording as it can be followed.
+/// The full model, and the recording as it can be followed: of a long one, no more rows than need be.
 ///
 /// # Errors
 /// Why the equations give no prediction, in words.
-pub(super) fn tuned(equations: Equations, mut recording: Recording) -> Result<Tuned, String> {
-    let mut remarks = Vec::new();
-    if let Some(every) = thin(&equations, &mut recording) {
-        remarks.push(format!("one of {every} measured values counts: more would take longer than they tell"));
+pub(super) fn tuned(equations: Equations, recording: Recording) -> Result<Tuned, String> {
+    let Some(Thinned { every, exact, joined }) = thin(&equations, &recording) else {
+        return followed(equations, recording, true);
+    };
+    let counts = format!("one of {every} measured values counts: more would take longer than they tell");
+    drop(recording);
+    let by_lines =
+        joined.map(|joined| followed(equations.joined(), joined, false)).transpose().ok().flatten();
+    if let Some(mut tuned) = by_lines.filter(|tuned| same_motion(&equations, tuned, &exact)) {
+        tuned.remarks.insert(0, format!("{counts}; between those, inputs count by straight lines"));
+        return Ok(tuned);
     }
+    let mut tuned = followed(equations, exact, true)?;
+    tuned.remarks.insert(0, counts);
+    Ok(tuned)
+}
+
+/// Whether a motion under inputs that are joined by lines is the one under the inputs as they are, with dry friction and without.
+fn same_motion(equations: &Equations, tuned: &Tuned, exact: &Recording) -> bool {
+    let model = &tuned.model;
+    let Some(window) = liveliest(&tuned.recording) else { return true };
+    let of_run = |r: &&Run| window.label == r.label || window.label.starts_with(&format!("{}, ", r.label));
+    let Some(run) = exact.runs.iter().find(of_run) else { return false };
+    let within = |t: &f64| (window.inputs[0][0]..=window.inputs[0][window.len() - 1]).contains(t);
+    let first = run.inputs[0].partition_point(|t| *t < window.inputs[0][0]);
+    let count = run.inputs[0].iter().filter(|t| within(t)).count();
+    let run = Run { kind: window.kind, ..rows(run, first, first + count) };
+    let as_is = model.under(equations.clone());
+    let all: usize = tuned.recording.runs.iter().map(Run::len).sum();
+    let sigmas: Vec<f64> =
+        (0..tuned.recording.channels.len()).map(|c| sigma(&tuned.recording, &window, c)).collect();
+    let starts = shared_starts(model);
+    let nuisance = nuisance(model, &window);
+    let predict = |model: &MotionModel, run: &Run, shared: &[f64]| -> Option<Vec<Vec<f64>>> {
+        let mut out = vec![0.0; run.len() * sigmas.len()];
+        model.predict(run, shared, &nuisance, &mut out).ok()?;
+        Some(out.chunks(run.len().max(1)).map(<[f64]>::to_vec).collect())
+    };
+    let differ = |shared: &[f64]| -> Option<f64> {
+        let (lines, as_is) = (predict(model, &window, shared)?, predict(&as_is, &run, shared)?);
+        let mut sum = 0.0;
+        let mut row = 0;
+        for (k, t) in run.inputs[0].iter().enumerate() {
+            while window.inputs[0][row] < *t && row + 1 < window.len() {
+                row += 1;
+            }
+            if window.inputs[0][row] == *t {
+                let columns = lines.iter().zip(&as_is).zip(&sigmas);
+                sum += columns.map(|((a, b), sigma)| ((a[row] - b[k]) / sigma).powi(2)).sum::<f64>();
+            }
+        }
+        Some(sum * all as f64 / window.len() as f64)
+    };
+    let rubbing = model.rubbing(&starts);
+    let unseen = |shared: &[f64]| differ(shared).is_some_and(|squares| squares <= ALIKE);
+    unseen(&starts) && unseen(&rubbing)
+}
+
+/// The full model, and the recording as it can be followed, all of its rows; `steps`: whether a simulator may have made it, one step a
+/// row.
+fn followed(equations: Equations, recording: Recording, steps: bool) -> Result<Tuned, String> {
+    let mut remarks = Vec::new();
     let mut model = MotionModel::baseline(equations, first_pace(&recording));
     let starts: Vec<f64> = shared_starts(&model);
     resolve(&mut model, &recording, &starts)?;
@@ -59,7 +118,8 @@ pub(super) fn tuned(equations: Equations, mut recording: Recording) -> Result<Tu
         model.set_pace(free.pace());
     } else {
         resolve(&mut model, &recording, &fitted)?;
-        if let Some(better) = by_the_rows(&mut model, &recording, &fitted) {
+        let by_the_rows = steps.then(|| by_the_rows(&mut model, &recording, &fitted)).flatten();
+        if let Some(better) = by_the_rows {
             fitted = better;
             remarks.push(
                 "the motion is followed by one Runge-Kutta step a row, as a simulator may have done it: this fits better than the exact \

@@ -4,14 +4,20 @@
 //! acceleration integrated twice), the misfit at a run's end says how well the start was known, not which physics is missing. Such runs
 //! are cut into windows whose starts are free (multiple shooting; Bock 1981, doi:10.1007/978-3-642-68220-9_8).
 
+use joint_laws::signal::Between;
 use missing_physics::data::{Recording, Run};
 
 use super::equations::Equations;
+use super::knots::{fewer, jumps};
+use super::scales::range;
 
 /// Measured values that count at the most.
 const MOST_VALUES: usize = 12_000;
 /// Rows of inputs that are followed at the most.
 const MOST_ROWS: usize = 200_000;
+
+/// Joining inputs by lines is worth it where it leaves fewer rows by this factor.
+const FEWER: usize = 2;
 
 /// The rows `from..to` of a run, as a run of its own.
 pub(super) fn rows(run: &Run, from: usize, to: usize) -> Run {
@@ -49,8 +55,18 @@ pub(super) fn continues(window: &Run) -> bool {
     window.kind % 2 == 1
 }
 
-/// A recording of which no more rows count than need be, and by how much it was thinned; inputs stay as they are while they can.
-pub(super) fn thin(equations: &Equations, recording: &mut Recording) -> Option<usize> {
+/// A recording of which no more rows count than need be.
+pub(super) struct Thinned {
+    /// Of so many measured values one counts.
+    pub(super) every: usize,
+    /// With inputs as they are, while they can.
+    pub(super) exact: Recording,
+    /// With inputs joined by straight lines between the rows that count, where that makes fewer rows.
+    pub(super) joined: Option<Recording>,
+}
+
+/// A recording of which no more rows count than need be, where it has more.
+pub(super) fn thin(equations: &Equations, recording: &Recording) -> Option<Thinned> {
     let measured = |run: &Run| run.outputs.iter().flatten().filter(|v| v.is_finite()).count();
     let values: usize = recording.runs.iter().map(measured).sum();
     let all: usize = recording.runs.iter().map(Run::len).sum();
@@ -59,23 +75,52 @@ pub(super) fn thin(equations: &Equations, recording: &mut Recording) -> Option<u
     }
     let every = values.div_ceil(MOST_VALUES);
     let inputs = 1..=equations.inputs.len();
-    for run in &mut recording.runs {
+    let held: Vec<bool> = equations.inputs.iter().map(|i| i.between == Between::Hold).collect();
+    let spans: Vec<f64> = inputs
+        .clone()
+        .map(|k| {
+            let [low, high] = range(recording.runs.iter().flat_map(|r| r.inputs[k].iter().copied()));
+            high - low
+        })
+        .collect();
+    let (mut exact, mut joined) = (Vec::new(), Vec::new());
+    for run in &recording.runs {
         let n = run.len();
         let changes = |i: usize, j: usize| inputs.clone().any(|k| run.inputs[k][i] != run.inputs[k][j]);
         let counts: Vec<Vec<bool>> = run.outputs.iter().map(|column| every_measured(column, every)).collect();
+        let counted = |i: usize| counts.iter().any(|c| c[i]);
+        let outputs = run.outputs.iter().zip(&counts).map(|(column, counts)| {
+            column.iter().zip(counts).map(|(v, counts)| if *counts { *v } else { f64::NAN }).collect()
+        });
+        let run = Run { outputs: outputs.collect(), ..run.clone() };
         let needed =
             |i: usize| all <= MOST_ROWS && i > 0 && (changes(i, i - 1) || i + 1 < n && changes(i, i + 1));
+        let kept: Vec<usize> = (0..n).filter(|&i| i == 0 || counted(i) || needed(i)).collect();
+        exact.push(pick(&run, &kept));
+        let mut jumps: Vec<usize> = inputs
+            .clone()
+            .zip(&spans)
+            .zip(&held)
+            .filter(|(_, held)| **held)
+            .flat_map(|((k, span), _)| jumps(&run.inputs[k], *span))
+            .collect();
+        jumps.sort_unstable();
+        jumps.dedup();
         let kept: Vec<usize> =
-            (0..n).filter(|&i| i == 0 || counts.iter().any(|c| c[i]) || needed(i)).collect();
-        let pick = |column: &Vec<f64>| kept.iter().map(|&i| column[i]).collect();
-        let picked: Vec<Vec<f64>> = run.inputs.iter().map(pick).collect();
-        let thinned = |(column, counts): (&Vec<f64>, &Vec<bool>)| {
-            kept.iter().map(|&i| if counts[i] { column[i] } else { f64::NAN }).collect()
-        };
-        let outputs: Vec<Vec<f64>> = run.outputs.iter().zip(&counts).map(thinned).collect();
-        (run.inputs, run.outputs) = (picked, outputs);
+            (0..n).filter(|&i| i == 0 || counted(i) || jumps.binary_search(&i).is_ok()).collect();
+        joined.push(fewer(&run, &kept, &jumps, &held));
     }
-    Some(every)
+    let rows = |runs: &[Run]| runs.iter().map(Run::len).sum::<usize>();
+    let fewer = FEWER * rows(&joined) <= rows(&exact) || all > MOST_ROWS;
+    let with = |runs: Vec<Run>| Recording { runs, ..recording.clone() };
+    let joined = (fewer && !equations.inputs.is_empty()).then(|| with(joined));
+    Some(Thinned { every, exact: with(exact), joined })
+}
+
+/// Some rows of a run.
+fn pick(run: &Run, rows: &[usize]) -> Run {
+    let pick = |columns: &[Vec<f64>]| columns.iter().map(|c| rows.iter().map(|&i| c[i]).collect()).collect();
+    Run { label: run.label.clone(), inputs: pick(&run.inputs), outputs: pick(&run.outputs), kind: run.kind }
 }
 
 /// Which values of a column count: of those that are measured, each of a number.

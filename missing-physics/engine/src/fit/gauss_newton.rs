@@ -11,6 +11,11 @@ use crate::problem::{Problem, Selection};
 const MAX_ITERATIONS: usize = 60;
 /// The same of a model that knows many mechanisms: most of what is tried explains nothing, and is not worth more.
 const ITERATIONS_OF_MANY: usize = 24;
+/// The same where a fit to all data shows where one to a part of them ends.
+const ITERATIONS_AGAIN: usize = 6;
+/// Gain in the sum of squares that a step promises, in units of what is left of a value, below which it is not taken by a model that knows
+/// many mechanisms: it would move no parameter by more than a thirtieth of its error.
+const NOT_WORTH: f64 = 1e-3;
 /// What a step may promise at most, in parts of the sum of squares, where a fit that does not go down any more is at its end.
 const STALLED: f64 = 1e-4;
 /// Gain in the sum of squares, in units of what is left of a value, below which a step that does not go down is not shortened further.
@@ -68,6 +73,18 @@ pub(crate) fn solve(
     solve_within(most, problem, selection, noise, (shared, nuisance))
 }
 
+/// The same to a part of the data, from where a fit to all of them ends.
+pub(crate) fn solve_again(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    shared: &[f64],
+    nuisance: &[Vec<f64>],
+) -> Result<Fit, PredictError> {
+    let most = if problem.knows_many() { ITERATIONS_AGAIN } else { MAX_ITERATIONS };
+    solve_within(most, problem, selection, noise, (shared, nuisance))
+}
+
 /// The same in at most so many iterations.
 pub(crate) fn solve_within(
     iterations: usize,
@@ -92,7 +109,8 @@ pub(crate) fn solve_within(
         let predicted = step.predicted;
         promised = predicted;
         held = step.held;
-        if !(predicted > 1e-9 * (1.0 + 1e-6 * linear.chi2)) {
+        let least = if many { NOT_WORTH * left } else { 1e-9 * (1.0 + 1e-6 * linear.chi2) };
+        if !(predicted > least) {
             converged = true;
             break;
         }

@@ -13,7 +13,9 @@ use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, Selection};
 
 /// Steps of a fit.
-const STEPS: usize = 12;
+const STEPS: usize = 40;
+/// Gain of a step in the sum of squares, in units of what is left of a value, after which a fit is at its end.
+const NO_GAIN: f64 = 1e-4;
 /// Halvings of a step that does not go down.
 const HALVINGS: usize = 6;
 /// Rounds in which process and parameters are fitted in turn.
@@ -104,6 +106,7 @@ pub(crate) fn given(
     let n_shared = selection.shared.len();
     let (mut shared, mut nuisance) = (start.shared.clone(), start.nuisance.clone());
     let mut here = normals(problem, selection, curves, process, &shared, &nuisance)?;
+    let values = (0..problem.channels()).map(|c| problem.count(c)).sum::<usize>().max(1);
     let mut held = vec![false; n_shared];
     let mut converged = false;
     for _ in 0..STEPS {
@@ -136,7 +139,8 @@ pub(crate) fn given(
                 break;
             }
         }
-        if gained.is_none_or(|g| g < 1e-4) {
+        let left = (here.chi2 / values as f64).max(1.0);
+        if gained.is_none_or(|gained| gained < NO_GAIN * left) {
             converged = true;
             break;
         }

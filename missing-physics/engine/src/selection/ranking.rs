@@ -13,6 +13,8 @@ use crate::selection::held_out::{HeldOut, held_out};
 const RIVAL_GAP: f64 = 3.0;
 /// A richer set must beat an adequate simpler one by this log evidence.
 const EARNED: f64 = 3.0;
+/// A mechanism less probable than this is not asked how it predicts unseen data, where there are many.
+const IMPROBABLE: f64 = 1e-6;
 /// Rivals that are told apart by simulation.
 const MOST_RIVALS: usize = 6;
 
@@ -142,12 +144,17 @@ impl Ranking {
         unknowns(small) < unknowns(large) && nested(small, large) && small.evidence > large.evidence - EARNED
     }
 
-    /// Lets the single mechanisms and the preferred set predict what they have not seen.
+    /// Lets the single mechanisms and the preferred set predict what they have not seen; of a model that knows many, those that are
+    /// probable or in that set.
     pub(crate) fn score(&mut self, problem: &Problem<'_>, best: Option<&Best>) {
-        let wanted = |i: usize| {
-            let c = &self.all[i];
-            (c.set.len() <= 1 || best.is_some_and(|b| b.at == i)) && c.evidence.is_finite()
+        let chosen = best.map(|b| &self.all[b.at].set);
+        let probable = |i: usize| {
+            let in_chosen = chosen.is_some_and(|chosen| self.all[i].set.iter().all(|m| chosen.contains(m)));
+            in_chosen || self.physical.iter().any(|&(k, probability)| k == i && probability > IMPROBABLE)
         };
+        let single = |i: usize| self.all[i].set.len() <= 1 && (!problem.knows_many() || probable(i));
+        let wanted =
+            |i: usize| (single(i) || best.is_some_and(|b| b.at == i)) && self.all[i].evidence.is_finite();
         self.scores = (0..self.all.len())
             .into_par_iter()
             .map(|i| if wanted(i) { held_out(problem, &self.all[i]).ok() } else { None })

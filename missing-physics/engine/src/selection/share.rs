@@ -1,6 +1,6 @@
 //! What part of the misfit a set of mechanisms takes away on data that it has not seen.
 
-use crate::fit::gauss_newton::solve;
+use crate::fit::gauss_newton::solve_again;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
@@ -35,9 +35,9 @@ pub(crate) fn unseen_misfit(
             let nuisance =
                 |ids: &[usize]| -> Vec<Vec<f64>> { ids.iter().map(|&r| fit.nuisance[r].clone()).collect() };
             let seen = problem.of_runs(&train);
-            let trained = solve(&seen, selection, white, &fit.shared, &nuisance(&train))?;
+            let trained = solve_again(&seen, selection, white, &fit.shared, &nuisance(&train))?;
             let unseen = problem.of_runs(&test);
-            let tested = solve(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
+            let tested = solve_again(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
             add(&residuals(&unseen, &tested)?);
         }
         return Ok(misfit.max(0.0));
@@ -53,7 +53,7 @@ pub(crate) fn unseen_misfit(
             }
             problem.with(recording)
         };
-        let trained = solve(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
+        let trained = solve_again(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
         add(&residuals(&without(false), &trained)?);
     }
     Ok(misfit.max(0.0))

@@ -15,6 +15,8 @@ use crate::statistics::median;
 const REACH: usize = 256;
 /// Below this share of its information left by the fit, a row cannot be judged: it determines a parameter by itself.
 const FREEDOM: f64 = 0.05;
+/// A row that is off by no more than so many steps in which its readings come is no accident, however still all others are.
+const STEPS: f64 = 2.0;
 /// A channel with fewer measured rows has no scale of its own to judge a row by.
 const FEWEST_ROWS: usize = 24;
 
@@ -83,6 +85,7 @@ impl<'a> Fitted<'a> {
         let (shape, sigma) = self.noise[channel];
         let whitener = linearised.problem.whitener(run, channel, linearised.in_play[shape]);
         let block = &linearised.blocks[run][channel];
+        let step = linearised.problem.recording.resolution.get(channel).copied().unwrap_or(0.0);
         let mut left = column.to_vec();
         for (&id, x) in ids.iter().zip(&self.coefficients[run]) {
             left.iter_mut().zip(&block.raw[id]).for_each(|(r, c)| *r -= x * c);
@@ -99,7 +102,7 @@ impl<'a> Fitted<'a> {
                 let informed = self.informed(run, whole, along);
                 let shift = dot(&image, &residual[rows]) / informed;
                 let z = if informed > FREEDOM * whole { shift * informed.sqrt() / sigma } else { 0.0 };
-                (z, stands_alone(&left, i, shift))
+                (z, shift.abs() > STEPS * step && stands_alone(&left, i, shift))
             })
             .collect()
     }

@@ -82,18 +82,23 @@ impl Linearised<'_> {
         coefficients: &[Vec<f64>],
     ) -> (f64, f64) {
         let (mut squares, mut log_determinant) = (0.0, 0.0);
+        let mut others: Vec<(usize, f64)> = Vec::with_capacity(ids.len());
         for ((row, values), x) in self.blocks.iter().zip(&products.values).zip(coefficients) {
             // The nuisance coefficients are fitted anew under each shape; the others are given.
             let block = &row[channel].shapes[shape];
             let borders = &block.eliminated.borders;
             let product = &values[channel][shape];
+            let mine = &row[channel].mine;
+            let acts = |(a, _): &(usize, f64)| !mine.contains(a) && block.gram[(*a, *a)] > 0.0;
+            others.clear();
+            others.extend(ids.iter().copied().zip(x.iter().copied()).filter(acts));
             let mut form = product.left;
-            let others = || ids.iter().zip(x).filter(|(a, _)| !row[channel].mine.contains(a));
-            for (&a, xa) in others() {
-                let mut inner = -2.0 * (product.with[a] - dot(&borders[a], &product.nuisance));
-                for (&c, xc) in others() {
-                    inner += (block.gram[(a, c)] - dot(&borders[a], &borders[c])) * xc;
-                }
+            for (k, &(a, xa)) in others.iter().enumerate() {
+                let column = block.gram.column(a);
+                let left = |c: usize| column[c] - dot(&borders[a], &borders[c]);
+                let mut inner = -2.0 * (product.with[a] - dot(&borders[a], &product.nuisance)) + left(a) * xa;
+                let pairs: f64 = others[..k].iter().map(|&(c, xc)| left(c) * xc).sum();
+                inner += 2.0 * pairs;
                 form += xa * inner;
             }
             squares += form.max(0.0);
