@@ -5,6 +5,7 @@ mod equations;
 mod expression;
 mod growth;
 mod knots;
+mod local;
 mod machine;
 mod model;
 mod read;
@@ -60,10 +61,7 @@ impl Domain for Motion {
 
     fn spec(&self) -> Spec {
         // A machine with one of everything.
-        let all = equations::Equations::example();
-        let scales = scales::Scales::of_example(&all);
-        let starts: Vec<f64> = all.parameters.iter().map(|p| p.value).collect();
-        MotionModel::baseline(all, model::Pace::default()).full(scales, &starts, None).spec().clone()
+        listed(equations::Equations::example())
     }
 
     fn template(&self) -> Template {
@@ -72,17 +70,16 @@ impl Domain for Motion {
 
     fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let (equations, recording) = read::read(header)?;
-        let first = MotionModel::baseline(equations.clone(), model::Pace::default());
         let contents = Contents {
             channels: recording.channels.clone(),
             calibration: recording.calibration.clone(),
             variable: recording.variables[0].clone(),
             runs: recording.runs.iter().map(RunContents::of).collect(),
-            spec: first.spec().clone(),
+            spec: listed(equations.clone()),
         };
-        let file = header.file.clone();
+        let (file, whole) = (header.file.clone(), header.gaps());
         Ok(CheckedRecording::new(contents, move || {
-            let tuned = tune::tuned(equations, recording).map_err(|why| ReadError::Value {
+            let tuned = tune::tuned(equations, recording, whole).map_err(|why| ReadError::Value {
                 file,
                 key: "model".into(),
                 got: "without an answer".into(),
@@ -91,4 +88,11 @@ impl Domain for Motion {
             Ok(Loaded::new(tuned.recording, tuned.model, Vec::new(), tuned.remarks))
         }))
     }
+}
+
+/// Everything that may act beside equations, of sizes that say nothing.
+fn listed(equations: equations::Equations) -> Spec {
+    let scales = scales::Scales::of_example(&equations);
+    let starts: Vec<f64> = equations.parameters.iter().map(|p| p.value).collect();
+    MotionModel::baseline(equations, model::Pace::default()).full(scales, &starts, None).spec().clone()
 }

@@ -168,6 +168,25 @@ impl MotionModel {
         self.start(run, nuisance, self.equations.states.len())
     }
 
+    /// Leads the machine through a run: `at_row` gets it at each row, the time and the states.
+    pub(super) fn along(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        mut at_row: impl FnMut(&mut Driven<'_, f64>, f64, &[f64]),
+    ) -> Result<(), String> {
+        let mut setting = self.setting(run, shared, nuisance, &[]);
+        // A row is where the machine is then, whatever its sensors are late by.
+        setting.delays.fill(None);
+        self.follow(run, setting, nuisance, |machine, reading, x| at_row(machine, reading.t_s, x))
+    }
+
+    /// A typical size of each state.
+    pub(super) fn state_sizes(&self) -> &[f64] {
+        &self.scales.states
+    }
+
     /// States and derivatives at each row of a run.
     pub(super) fn course(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Course, String> {
         let mut course = Course {
@@ -175,10 +194,9 @@ impl MotionModel {
             rates: vec![Vec::with_capacity(run.len()); self.equations.states.len()],
         };
         let mut rates = Vec::new();
-        let setting = self.setting(run, shared, nuisance, &[]);
-        self.follow(run, setting, nuisance, |machine, reading, x| {
+        self.along(run, shared, nuisance, |machine, t, x| {
             rates.resize(x.len(), 0.0);
-            machine.smooth(reading.t_s, x, &mut rates);
+            machine.smooth(t, x, &mut rates);
             for (k, (states, list)) in course.states.iter_mut().zip(&mut course.rates).enumerate() {
                 states.push(x[k]);
                 list.push(rates[k]);
@@ -448,7 +466,12 @@ impl Model for MotionModel {
     }
 
     fn extensions(&self) -> Extensions<'_> {
-        Extensions { modes: Some(self), limits: Some(self), ..Extensions::default() }
+        Extensions {
+            modes: Some(self),
+            limits: Some(self),
+            local_causes: Some(self),
+            ..Extensions::default()
+        }
     }
 
     fn jacobian(

@@ -42,12 +42,14 @@ pub(super) struct Tuned {
     pub(super) remarks: Vec<String>,
 }
 
-/// The full model, and the recording as it can be followed: of a long one, no more rows than need be.
+/// The full model, and the recording as it can be followed: of a long one, no more rows than need be, unless all of them are asked for
+/// (`whole`).
 ///
 /// # Errors
 /// Why the equations give no prediction, in words.
-pub(super) fn tuned(equations: Equations, recording: Recording) -> Result<Tuned, String> {
-    let Some(Thinned { every, exact, joined }) = thin(&equations, &recording) else {
+pub(super) fn tuned(equations: Equations, recording: Recording, whole: bool) -> Result<Tuned, String> {
+    let thinned = if whole { None } else { thin(&equations, &recording) };
+    let Some(Thinned { every, exact, joined }) = thinned else {
         return followed(equations, recording, true);
     };
     let counts = format!("one of {every} measured values counts: more would take longer than they tell");

@@ -1,0 +1,225 @@
+//! What a force, or a flow, does that acts at some rows only; and the positions and speeds along which it may act.
+
+use joint_laws::integrate::Machine as _;
+use missing_physics::data::Run;
+use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
+use nalgebra::{DMatrix, DVector};
+
+use super::model::MotionModel;
+use super::units;
+
+/// A step in a state, in parts of its size, at which the change of a derivative is asked for.
+const STEP: f64 = 1e-5;
+/// Terms of the exponential series by which a deviation is followed from row to row.
+const TERMS: usize = 4;
+
+/// The motion's linearisation at a row.
+struct Linear {
+    /// How a deviation of the states changes their derivatives, and the outputs.
+    rates: DMatrix<f64>,
+    outputs: DMatrix<f64>,
+}
+
+impl MotionModel {
+    /// The states that an unknown acts on through their derivative: of each joint its velocity, and of each level itself.
+    fn acted_on(&self) -> Vec<(Quantity, usize)> {
+        let equations = self.equations();
+        let quantity = |what: &str, name: &str, several: bool, state: usize| {
+            let name = if several { format!("{what}_on_{name}") } else { what.to_owned() };
+            let unit = units::text(&equations.states[state].name);
+            Quantity::new(name, if unit.is_empty() { "1/s".into() } else { format!("{unit}/s") })
+        };
+        let several = equations.joints.len() > 1;
+        let joints =
+            equations.joints.iter().map(|j| (quantity("force", &j.name, several, j.velocity), j.velocity));
+        let several = equations.levels.len() > 1;
+        let flow =
+            |&level: &usize| (quantity("inflow", &equations.states[level].name, several, level), level);
+        joints.chain(equations.levels.iter().map(flow)).collect()
+    }
+
+    /// The states along which a cause may act, and the outputs that measure them as they stand.
+    fn places(&self) -> Vec<(usize, Option<usize>)> {
+        let equations = self.equations();
+        let of_joints = equations.joints.iter().flat_map(|j| [j.position, j.velocity]);
+        let mut states: Vec<usize> = of_joints.chain(equations.levels.iter().copied()).collect();
+        states.sort_unstable();
+        states.dedup();
+        let measured = |state| equations.outputs.iter().position(|o| o.state == Some(state));
+        states.into_iter().map(|state| (state, measured(state))).collect()
+    }
+
+    /// The linearisation at each row of a run.
+    fn linear(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Vec<Linear>, PredictError> {
+        let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
+        let sizes = self.state_sizes();
+        let mut all = Vec::with_capacity(run.len());
+        let (mut beside, mut rates) = (Vec::new(), vec![[0.0; 2]; states]);
+        self.along(run, shared, nuisance, |machine, t, x| {
+            let mut here =
+                Linear { rates: DMatrix::zeros(states, states), outputs: DMatrix::zeros(outputs, states) };
+            let mut room = vec![0.0; x.len()];
+            let mut read = vec![[0.0; 2]; outputs];
+            for state in 0..states {
+                let step = STEP * sizes[state];
+                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                    beside.clear();
+                    beside.extend_from_slice(x);
+                    beside[state] += sign * step;
+                    machine.smooth(t, &beside, &mut room);
+                    rates.iter_mut().zip(&room).for_each(|(rate, now)| rate[side] = *now);
+                    machine.outputs(t, &beside, |_| true, |c, value| read[c][side] = value);
+                }
+                let slope = |[up, down]: [f64; 2]| (up - down) / (2.0 * step);
+                for (k, rate) in rates.iter().enumerate() {
+                    here.rates[(k, state)] = slope(*rate);
+                }
+                for (c, value) in read.iter().enumerate() {
+                    here.outputs[(c, state)] = slope(*value);
+                }
+            }
+            all.push(here);
+        })
+        .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+        Ok(all)
+    }
+}
+
+/// How a deviation moves on over a time under constant rates of change of it.
+fn moved(deviation: &mut DVector<f64>, rates: &DMatrix<f64>, acts: (usize, f64), time_s: f64) {
+    let mut term = rates * &*deviation;
+    term[acts.0] += acts.1;
+    term *= time_s;
+    *deviation += &term;
+    for k in 2..=TERMS {
+        term = rates * term * (time_s / k as f64);
+        *deviation += &term;
+    }
+}
+
+/// A measured column with its gaps closed by straight lines; `None` where nothing was measured.
+fn closed(times: &[f64], column: &[f64]) -> Option<Vec<f64>> {
+    let known: Vec<usize> = (0..column.len()).filter(|&i| column[i].is_finite()).collect();
+    let (first, last) = (*known.first()?, *known.last()?);
+    let at = |i: usize| {
+        let next = known.partition_point(|&k| k < i);
+        if i <= first {
+            column[first]
+        } else if i >= last {
+            column[last]
+        } else {
+            let (a, b) = (known[next - 1], known[next]);
+            column[a] + (column[b] - column[a]) * (times[i] - times[a]) / (times[b] - times[a])
+        }
+    };
+    Some((0..column.len()).map(at).collect())
+}
+
+impl LocalCauses for MotionModel {
+    fn unknowns(&self) -> Vec<LocalUnknown> {
+        let components: Vec<Quantity> = self.acted_on().into_iter().map(|a| a.0).collect();
+        if components.is_empty() {
+            return Vec::new();
+        }
+        let name = if self.equations().joints.is_empty() { "a flow" } else { "a force" };
+        vec![LocalUnknown { name: name.into(), components }]
+    }
+
+    fn response(
+        &self,
+        (_, component): (usize, usize),
+        runs: &[Run],
+        shared: &[f64],
+        nuisance: &[Vec<f64>],
+        amounts: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>, PredictError> {
+        let acted_on = self.acted_on()[component].1;
+        let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
+        let of_run = |((run, nuisance), amounts): ((&Run, &Vec<f64>), &Vec<f64>)| {
+            let n = run.len();
+            let mut out = vec![0.0; outputs * n];
+            let Some(first) = amounts.iter().position(|a| *a != 0.0) else { return Ok(out) };
+            let linear = self.linear(run, shared, nuisance)?;
+            let mut deviation = DVector::zeros(states);
+            for row in first.max(1)..linear.len() {
+                let half_s = 0.5 * (run.inputs[0][row] - run.inputs[0][row - 1]);
+                for k in [row - 1, row] {
+                    moved(&mut deviation, &linear[k].rates, (acted_on, amounts[k]), half_s);
+                }
+                let read = &linear[row].outputs * &deviation;
+                for (c, value) in read.iter().enumerate() {
+                    out[c * n + row] = *value;
+                }
+            }
+            Ok(out)
+        };
+        runs.iter().zip(nuisance).zip(amounts).map(of_run).collect()
+    }
+
+    fn states(&self) -> Vec<Quantity> {
+        let equations = self.equations();
+        let named = |(state, output): (usize, Option<usize>)| {
+            let name = output.map_or(&equations.states[state].name, |o| &equations.outputs[o].name);
+            Quantity::new(name.as_str(), units::text(name))
+        };
+        self.places().into_iter().map(named).collect()
+    }
+
+    fn state(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {
+        let followed = self
+            .course(run, shared, nuisance)
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+        let place = |(state, output): (usize, Option<usize>)| {
+            let measured = output.and_then(|o| closed(&run.inputs[0], &run.outputs[o]));
+            measured.unwrap_or_else(|| followed.states[state].clone())
+        };
+        Ok(self.places().into_iter().map(place).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use super::*;
+    use crate::motion::equations::Equations;
+    use crate::motion::model::Pace;
+    use crate::motion::scales::Scales;
+    use missing_physics::model::{Model as _, Scope};
+
+    /// A force that acts at all rows alike is the mechanism `constant-force`, by its derivative.
+    #[test]
+    fn a_force_at_all_rows_is_a_constant_force() {
+        let all = Equations::example();
+        let scales = Scales::of_example(&all);
+        let starts: Vec<f64> = all.parameters.iter().map(|p| p.value).collect();
+        let inputs = all.inputs.len();
+        let outputs = all.outputs.len();
+        let model = MotionModel::baseline(all, Pace::default()).full(scales, &starts, None);
+        let times: Vec<f64> = (0..200).map(|k| 0.005 * f64::from(k)).collect();
+        let wave: Vec<f64> = times.iter().map(|t| (5.0 * t).sin()).collect();
+        let run = Run {
+            label: "1".into(),
+            inputs: std::iter::once(times.clone()).chain(vec![wave; inputs]).collect(),
+            outputs: vec![vec![0.1; times.len()]; outputs],
+            kind: 0,
+        };
+        let spec = model.spec();
+        let of = |scope| {
+            spec.parameters.iter().filter(move |p| p.scope == scope).map(|p| p.start).collect::<Vec<f64>>()
+        };
+        let (shared, nuisance) = (of(Scope::Shared), of(Scope::PerRun));
+        let constant = spec.mechanisms.iter().find(|m| m.id.starts_with("constant-force")).unwrap();
+        let slot = spec.slots()[constant.parameters[0]];
+        let rows = outputs * times.len();
+        let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows]);
+        model.jacobian(&run, &shared, &nuisance, &[slot], &[], &mut out, &mut jacobian).unwrap();
+        let amounts = [vec![1.0; times.len()]];
+        let response =
+            model.response((0, 0), std::slice::from_ref(&run), &shared, &[nuisance], &amounts).unwrap();
+        let largest = jacobian.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        assert!(largest > 0.0);
+        for (a, b) in response[0].iter().zip(&jacobian) {
+            assert!((a - b).abs() < 2e-3 * largest, "{a} {b}");
+        }
+    }
+}
