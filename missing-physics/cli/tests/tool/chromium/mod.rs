@@ -1,5 +1,9 @@
 //! Chromium without a window, told what to do through a pipe (Chrome DevTools Protocol).
-#![allow(dead_code, reason = "each test file uses what it needs of it")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "a test stops where it fails, and each test file uses what it needs of it"
+)]
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;

@@ -1,6 +1,10 @@
 //! A small model of a thrown ball (height only), and worlds made without it.
 
-#![allow(dead_code, reason = "not every test uses all of it")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "a test stops where it fails, and not every test uses all of this"
+)]
 
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{
