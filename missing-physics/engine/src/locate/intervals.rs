@@ -201,10 +201,13 @@ impl Scan<'_> {
         let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth()) else {
             return found;
         };
+        // Edges that may be anywhere are worth what they are on average, not what the best of them is.
+        let likelihoods = judged.iter().map(|e| (0.5 * (e.worth - best.worth)).exp());
+        let average = best.worth + 2.0 * (likelihoods.sum::<f64>() / judged.len() as f64).ln();
         let [from, to] = [|e: &Edges| e.interval.0, |e: &Edges| e.interval.1].map(|of| middle(&judged, of));
         let middle = likeliest(judged.iter().filter(|e| e.interval == (from, to))).unwrap_or(best);
         let price = price(middle.form);
-        let (interval, form, gain) = (middle.interval, middle.form, best.worth + price);
+        let (interval, form, gain) = (middle.interval, middle.form, average.max(found.worth()) + price);
         Found { bins: self.bins.clone(), interval, form, gain, price, ..found }
     }
 }
