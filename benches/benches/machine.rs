@@ -1,4 +1,5 @@
-//! A machine followed and fitted, by rows and joints: derivatives of one run's prediction, and the time of a whole reading.
+//! A machine's recording read and, up to 2,000 rows, diagnosed again and again, by rows and joints; larger ones are diagnosed once, for what
+//! is said of them.
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
 #![allow(
     clippy::unwrap_used,

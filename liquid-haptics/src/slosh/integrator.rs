@@ -26,7 +26,7 @@ impl Decay {
             while !state.stuck() && t >= begin + step.h {
                 begin += step.h;
                 state = step.end;
-                // Long after a wave has grown beyond all bounds no step need be taken.
+                // A wave that has grown beyond all bounds is not followed to the next row.
                 if !(state.x.abs() <= bound) {
                     return Err(DecayError::Diverges { t_s: t });
                 }

@@ -236,3 +236,6 @@ impl SloshModel {
 const ENVELOPES: usize = 8;
 /// How many peaks of a residual's spectrum are tried.
 const PEAKS: usize = 6;
+
+#[cfg(test)]
+mod tests;

@@ -120,38 +120,35 @@ impl Reading<'_> {
         out: &mut [f64],
     ) -> Option<Result<(), String>> {
         let p = self.layout;
-        let one = |of: ParameterRef| (of.slot == slot).then_some(1.0);
-        let unit = |[cos, sin]: [ParameterRef; 2]| match (one(cos), one(sin)) {
-            (None, None) => None,
-            (cos, sin) => Some([cos.unwrap_or(0.0), sin.unwrap_or(0.0)]),
-        };
-        if one(p.zero).is_some() {
+        let is = |parameter: ParameterRef| parameter.slot == slot;
+        let is_one_of = |pair: [ParameterRef; 2]| pair.into_iter().any(is);
+        let unit = |pair: [ParameterRef; 2]| pair.map(|parameter| f64::from(is(parameter)));
+        let (first, second, arm) = ([p.cos, p.sin], [p.second_cos, p.second_sin], [p.arm_cos, p.arm_sin]);
+        if is(p.zero) {
             out.fill(1.0);
-            return Some(Ok(()));
+            Some(Ok(()))
+        } else if is(p.transient) {
+            Some(fade(self.run, shared[p.lag.slot], out))
+        } else if is_one_of(second) {
+            Some(read(&self.oscillation(Part::Second, shared), self.run, unit(second), out))
+        } else if is_one_of(arm) {
+            Some(read(&self.oscillation(Part::Arm, shared), self.run, unit(arm), out))
+        } else {
+            let wave = self.wave(shared);
+            (is_one_of(first) && wave.is_linear()).then(|| read(&wave, self.run, unit(first), out))
         }
-        if one(p.transient).is_some() {
-            return Some(fade(self.run, shared[p.lag.slot], out));
-        }
-        let wave = self.wave(shared);
-        let (decay, start) =
-            match [[p.cos, p.sin], [p.second_cos, p.second_sin], [p.arm_cos, p.arm_sin]].map(unit) {
-                [Some(start), ..] if wave.is_linear() => (wave, start),
-                [_, Some(start), _] => (self.oscillation(Part::Second, shared), start),
-                [_, _, Some(start)] => (self.oscillation(Part::Arm, shared), start),
-                _ => return None,
-            };
-        Some(read(&decay, self.run, start, out))
     }
 
     /// The part that a shared parameter acts on, where that is not the first mode.
     pub(super) fn part_of(&self, slot: usize) -> Option<Part> {
         let p = self.layout;
         let of = |parameters: &[ParameterRef]| parameters.iter().any(|a| a.slot == slot);
-        match () {
-            () if of(&[p.second_omega, p.second_damping]) => Some(Part::Second),
-            () if of(&[p.arm_omega, p.arm_damping]) => Some(Part::Arm),
-            () if of(&[p.lag]) => Some(Part::Transient),
-            () => None,
+        if of(&[p.second_omega, p.second_damping]) {
+            Some(Part::Second)
+        } else if of(&[p.arm_omega, p.arm_damping]) {
+            Some(Part::Arm)
+        } else {
+            of(&[p.lag]).then_some(Part::Transient)
         }
     }
 }
