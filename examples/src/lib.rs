@@ -4,6 +4,7 @@ pub mod bars;
 pub mod dough;
 pub mod grains;
 pub mod plot;
+pub mod rig;
 
 use indicatif::{ParallelProgressIterator, ProgressStyle};
 use missing_physics::data::{Recording, Run};

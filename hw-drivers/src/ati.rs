@@ -146,10 +146,7 @@ impl NetFt {
         let mut packet = [0; 2048];
         let waited_s = self.settings.timeout_s;
         match self.socket.recv(&mut packet) {
-            Ok(bytes) if bytes > 0 && bytes.is_multiple_of(RECORD) => {
-                self.waiting.extend(packet[..bytes].chunks_exact(RECORD).filter_map(record));
-            }
-            Ok(_) => self.losses.garbled += 1,
+            Ok(bytes) => self.take(&packet[..bytes]),
             Err(error) => {
                 // The sensor may have been without power, or the request may be lost.
                 self.losses.restarts += 1;
@@ -159,6 +156,15 @@ impl NetFt {
             }
         }
         Ok(())
+    }
+
+    /// Takes the records of a packet.
+    fn take(&mut self, packet: &[u8]) {
+        if packet.is_empty() || !packet.len().is_multiple_of(RECORD) {
+            self.losses.garbled += 1;
+        } else {
+            self.waiting.extend(packet.chunks_exact(RECORD).filter_map(record));
+        }
     }
 
     /// The time of a record, s; none for one that is older than the newest.
@@ -241,6 +247,22 @@ impl ForceTorque for NetFt {
             sum = sum.plus(&self.raw()?.value);
         }
         self.offset = sum.scaled(-1.0 / count as f64);
+        Ok(())
+    }
+
+    /// What the computer keeps of a stream that is not read is a quarter of a second at 1 kHz, and the oldest of it.
+    fn skip(&mut self) -> Result<(), DriverError> {
+        let failed = |device: &str, e: std::io::Error| DriverError::of_io(device, "receive", &e, 0.0);
+        self.socket.set_nonblocking(true).map_err(|e| failed(&self.device, e))?;
+        let mut packet = [0; 2048];
+        while let Ok(bytes) = self.socket.recv(&mut packet) {
+            self.take(&packet[..bytes]);
+        }
+        self.socket.set_nonblocking(false).map_err(|e| failed(&self.device, e))?;
+        while let Some(record) = self.waiting.pop_front() {
+            // Its number still counts: what is lost is counted by it.
+            let _ = self.date(&record);
+        }
         Ok(())
     }
 }

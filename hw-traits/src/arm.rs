@@ -6,6 +6,7 @@ use crate::forward::forward;
 
 /// Where a tool is and how it is turned, in a frame that whoever passes it on has to name (`tool_in_world`).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Position of the tool's origin, m.
     pub position_m: [f64; 3],

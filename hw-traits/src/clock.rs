@@ -9,6 +9,7 @@ use crate::forward::forward;
 
 /// A value and when it was true.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stamped<T> {
     /// Time of the measurement (not of its arrival) on the device's own clock, in s; its zero is arbitrary.
     pub t_s: f64,

@@ -3,6 +3,7 @@ use crate::forward::forward;
 /// What kind of thing went wrong, in terms that a driver can act on without knowing the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub enum ErrorKind {
     /// The device does not answer, or the link to it broke; trying again may help.
     Link,

@@ -8,6 +8,7 @@ use crate::forward::forward;
 ///
 /// Signs: what the load exerts on the sensor. A mass that hangs from an upright sensor pulls along the world's down.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wrench {
     /// Force in N.
     pub force_n: [f64; 3],
@@ -37,6 +38,16 @@ pub trait ForceTorque: ErrorType {
     /// # Errors
     /// As [`ForceTorque::read`].
     fn tare(&mut self, readings: usize) -> Result<(), Self::Error>;
+
+    /// Leaves out readings that were taken before this call and have not been returned: the next one is new.
+    ///
+    /// What is provided is right for a device that measures when it is asked; one that streams has to leave out what waits.
+    ///
+    /// # Errors
+    /// As [`ForceTorque::read`].
+    fn skip(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
 }
 
 forward!(ForceTorque {
@@ -46,6 +57,10 @@ forward!(ForceTorque {
 
     fn tare(&mut self, readings: usize) -> Result<(), Self::Error> {
         T::tare(self, readings)
+    }
+
+    fn skip(&mut self) -> Result<(), Self::Error> {
+        T::skip(self)
     }
 });
 

@@ -2,9 +2,28 @@
 
 /// A rectangle of pixels; pixel (row, column) is `data[row * width + column]`.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "tape-file", serde(try_from = "Unchecked<T>"))]
 pub struct Picture<T> {
     width: usize,
     data: Vec<T>,
+}
+
+/// A picture from a file: its pixels may make no rows.
+#[cfg(feature = "tape-file")]
+#[derive(serde::Deserialize)]
+struct Unchecked<T> {
+    width: usize,
+    data: Vec<T>,
+}
+
+#[cfg(feature = "tape-file")]
+impl<T> TryFrom<Unchecked<T>> for Picture<T> {
+    type Error = NotRows;
+
+    fn try_from(given: Unchecked<T>) -> Result<Self, NotRows> {
+        Self::new(given.width, given.data)
+    }
 }
 
 /// A number of pixels that does not make whole rows.
@@ -58,6 +77,7 @@ impl<T> Picture<T> {
 /// Pinhole camera: pixel (u, v) looks along ((u - cx)/fx, (v - cy)/fy, 1) in the camera's frame (x right, y down, z out of
 /// the lens); pixel centres are whole numbers, (0, 0) is the first pixel of the first row.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub struct Intrinsics {
     /// Focal length along columns, in pixels.
     pub fx: f64,

@@ -79,6 +79,7 @@ fn feel<R: Rotary + ForceTorque + Clock + ?Sized>(
         rig.sleep_s(0.01).map_err(|e| e.kind())?;
     }
     rig.sleep_s(programme.settle_s).map_err(|e| e.kind())?;
+    rig.skip().map_err(|e| e.kind())?;
     let count = programme.readings.max(1);
     let (mut mean, mut squares) = ([0.0; 6], [0.0; 6]);
     for n in 1..=count {

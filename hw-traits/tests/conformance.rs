@@ -302,3 +302,21 @@ fn every_kind_of_error_says_what_can_be_done() {
         assert_eq!(kind.severity(), Severity::Fatal);
     }
 }
+
+/// Through a file, a recording still keeps its promises; a file that ends within an event holds those before it.
+#[cfg(feature = "tape-file")]
+#[test]
+fn a_tape_is_the_same_from_a_file_and_a_file_that_is_cut_holds_what_came_before() {
+    use hw_traits::tape::{TapeError, read_tape, write_event};
+    let (_, events) = recorded(Fault::Nothing);
+    let mut bytes = Vec::new();
+    events.iter().for_each(|event| write_event(event, &mut bytes).unwrap());
+    let tape = read_tape(&bytes[..]).unwrap();
+    // NaN (commands that were refused, depths that are missing) equals nothing, so words are compared.
+    assert_eq!(format!("{:?}", tape.events), format!("{events:?}"));
+    assert!(!tape.cut);
+    assert_eq!(contracts(&mut Playback::new(tape.events, 1e-9)), Ok(()));
+    let cut = read_tape(&bytes[..bytes.len() - 1]).unwrap();
+    assert!(cut.cut && cut.events.len() == events.len() - 1);
+    assert!(matches!(read_tape(&b"\x01"[..]), Err(TapeError::NoEvent { number: 0, .. })));
+}

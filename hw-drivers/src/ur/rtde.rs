@@ -95,6 +95,15 @@ pub struct Rtde {
     text: Option<String>,
 }
 
+/// A package: its length with the header, its kind, what it holds.
+fn packed(kind: u8, payload: &[u8]) -> Option<Vec<u8>> {
+    let length = u16::try_from(payload.len() + 3).ok()?;
+    let mut bytes = length.to_be_bytes().to_vec();
+    bytes.push(kind);
+    bytes.extend(payload);
+    Some(bytes)
+}
+
 impl Rtde {
     /// Connects (port 30004 unless it is forwarded) and agrees on version 2, or 1 where the controller knows no other, or on
     /// `only` that one.
@@ -216,20 +225,33 @@ impl Rtde {
         self.values(&payload)
     }
 
-    /// As [`Rtde::read`], and then whatever has come meanwhile, of which the last is returned.
+    /// As [`Rtde::read`], but of what has come the newest, whatever waits.
     ///
     /// # Errors
     /// As [`Rtde::read`].
     pub fn newest(&mut self) -> Result<Vec<Value>, DriverError> {
-        let mut payload = self.answer(b'U')?;
+        self.skim()?;
+        let payload = self.answer(b'U')?;
+        self.values(&payload)
+    }
+
+    /// Takes what has come, without waiting, and keeps the newest package of outputs alone.
+    pub(super) fn skim(&mut self) -> Result<(), DriverError> {
         self.take_what_is_there()?;
-        while let Some((kind, next)) = self.package()? {
+        let mut newest = None;
+        while let Some((kind, payload)) = self.package()? {
             match kind {
-                b'U' => payload = next,
-                _ => self.keep_text(kind, &next),
+                b'U' => newest = Some(payload),
+                _ => self.keep_text(kind, &payload),
             }
         }
-        self.values(&payload)
+        if let Some(payload) = newest {
+            // What follows is a piece of the next one.
+            let rest = std::mem::take(&mut self.received);
+            self.received = packed(b'U', &payload).unwrap_or_default();
+            self.received.extend(rest);
+        }
+        Ok(())
     }
 
     fn values(&self, payload: &[u8]) -> Result<Vec<Value>, DriverError> {
@@ -272,12 +294,8 @@ impl Rtde {
     }
 
     fn send(&mut self, kind: u8, payload: &[u8]) -> Result<(), DriverError> {
-        let length = u16::try_from(payload.len() + 3);
-        let length =
-            length.map_err(|_| self.garbled("a payload of 16 bits", format!("{} bytes", payload.len())))?;
-        let mut bytes = length.to_be_bytes().to_vec();
-        bytes.push(kind);
-        bytes.extend(payload);
+        let bytes = packed(kind, payload)
+            .ok_or_else(|| self.garbled("a payload of 16 bits", format!("{} bytes", payload.len())))?;
         let waited_s = self.timeout.as_secs_f64();
         let sent = self.stream.write_all(&bytes);
         sent.map_err(|e| DriverError::of_io(&self.device, "send", &e, waited_s))
@@ -318,7 +336,12 @@ impl Rtde {
     fn take_what_is_there(&mut self) -> Result<(), DriverError> {
         let failed = |device: &str, e: std::io::Error| DriverError::of_io(device, "receive", &e, 0.0);
         self.stream.set_nonblocking(true).map_err(|e| failed(&self.device, e))?;
-        let taken = self.receive();
+        let taken = loop {
+            match self.receive() {
+                Ok(()) => {}
+                ended => break ended,
+            }
+        };
         self.stream.set_nonblocking(false).map_err(|e| failed(&self.device, e))?;
         match taken {
             Err(DriverError::Late { .. }) => Ok(()),

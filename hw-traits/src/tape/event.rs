@@ -6,6 +6,7 @@ use crate::picture::{Intrinsics, Picture};
 
 /// One thing that happened at a device.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub enum Event {
     /// What a device is; it does not change.
     Fact(Fact),
@@ -29,6 +30,7 @@ pub enum Event {
 
 /// What a device is.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub enum Fact {
     /// Smallest and largest angle of a wrist, rad.
     LimitsRad(f64, f64),
@@ -42,6 +44,7 @@ pub enum Fact {
 
 /// A command, with the arguments of the trait's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub enum Command {
     /// [`Arm::move_to`](crate::arm::Arm::move_to).
     MoveTo(Pose, f64),
@@ -78,6 +81,7 @@ impl Command {
 
 /// An answer, with its time where the trait gives one.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub enum Reading {
     /// Force and torque.
     Wrench(Stamped<Wrench>),
@@ -101,6 +105,7 @@ pub enum Reading {
 
 /// What can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "tape-file", derive(serde::Serialize, serde::Deserialize))]
 pub enum Stream {
     /// Force and torque.
     Wrench,

@@ -4,9 +4,13 @@
 //! such events. A program that ran with the first runs with the second, as long as it gives the same commands.
 
 mod event;
+#[cfg(feature = "tape-file")]
+mod file;
 mod playback;
 mod recorder;
 
 pub use event::{Command, Event, Fact, Reading, Stream};
+#[cfg(feature = "tape-file")]
+pub use file::{Tape, TapeError, read_tape, write_event};
 pub use playback::Playback;
 pub use recorder::Recorder;

@@ -77,6 +77,11 @@ impl<D: ForceTorque, S: FnMut(Event)> ForceTorque for Recorder<D, S> {
         let answer = self.device.tare(readings);
         self.command(Command::Tare(readings), answer)
     }
+
+    /// What is left out is not on the tape.
+    fn skip(&mut self) -> Result<(), Self::Error> {
+        self.device.skip()
+    }
 }
 
 impl<D: Rotary, S: FnMut(Event)> Rotary for Recorder<D, S> {

@@ -102,10 +102,7 @@ impl FakeWrist {
         if !fine {
             return Err(ErrorKind::OutOfRange);
         }
-        let level = load.volume_m3 / (PI * load.radius_m * load.radius_m);
-        let slosh =
-            Slosh::new(load.radius_m, level, load.liquid_mass_kg, load.viscosity_m2_s, load.gravity_m_s2);
-        let table = (0..=TABLE).map(|k| lies(&load, PI * k as f64 / TABLE as f64)).collect();
+        let (slosh, table) = (slosh(&load), table(&load));
         Ok(Self {
             load,
             sensor,
@@ -121,6 +118,29 @@ impl FakeWrist {
             slosh,
             film: None,
         })
+    }
+
+    /// The container slides in the grip: from now on it is held `by_m` further from its bottom.
+    pub fn slip(&mut self, by_m: f64) {
+        self.load.grasp_height_m += by_m;
+    }
+
+    /// Liquid leaves: `stays_m3` of it (0 up to what there was) stay, and lie level at once.
+    pub fn spill(&mut self, stays_m3: f64) {
+        let share = (stays_m3 / self.load.volume_m3).clamp(0.0, 1.0);
+        if !(share < 1.0) {
+            return;
+        }
+        let load = &mut self.load;
+        load.liquid_mass_kg *= share;
+        load.volume_m3 *= share;
+        (self.table, self.slosh) = (table(load), slosh(load));
+        (self.last, self.film) = (None, None);
+    }
+
+    /// What it holds.
+    pub fn load(&self) -> &Load {
+        &self.load
     }
 
     fn thick(&self) -> bool {
@@ -217,6 +237,15 @@ impl FakeWrist {
 /// Where the liquid's centre of mass lies across and along the axis at rest, m.
 fn lies(load: &Load, tilt: f64) -> [f64; 2] {
     if load.volume_m3 > 0.0 { load.cavity.center(tilt, load.volume_m3) } else { [0.0; 2] }
+}
+
+fn table(load: &Load) -> Vec<[f64; 2]> {
+    (0..=TABLE).map(|k| lies(load, PI * k as f64 / TABLE as f64)).collect()
+}
+
+fn slosh(load: &Load) -> Slosh {
+    let level = load.volume_m3 / (PI * load.radius_m * load.radius_m);
+    Slosh::new(load.radius_m, level, load.liquid_mass_kg, load.viscosity_m2_s, load.gravity_m_s2)
 }
 
 impl ErrorType for FakeWrist {
