@@ -52,12 +52,29 @@ pub enum Air {
     Pressure(f64),
 }
 
-/// The modules on their line.
-pub struct Modules {
+/// A pressure sensor on its module.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaugeSettings {
+    /// Address and channel of the pressure sensor.
+    pub input: (u8, u8),
+    /// Volts of the sensor at no pressure and at its largest, and that pressure, Pa.
+    pub sensor: ([f64; 2], f64),
+    /// How long an answer may take, s.
+    pub timeout_s: f64,
+}
+
+/// A pressure sensor alone: nothing is set. Times are this computer's.
+pub struct Gauge {
     line: Line,
-    settings: PneumaticsSettings,
+    settings: GaugeSettings,
     begin: Instant,
     last_s: f64,
+}
+
+/// The modules on their line.
+pub struct Modules {
+    gauge: Gauge,
+    settings: PneumaticsSettings,
     closed: bool,
 }
 
@@ -66,22 +83,62 @@ pub struct Pneumatics {
     machine: DeadMan<Modules>,
 }
 
-impl Modules {
+impl Gauge {
+    /// Asks nothing yet.
+    ///
+    /// # Errors
+    /// [`DriverError::Limit`] for settings that are none.
+    pub fn new(open: Opener, settings: GaugeSettings) -> Result<Self, DriverError> {
+        let ([zero, full], most_pa) = settings.sensor;
+        within("scale of the sensor in V", (full - zero).abs(), 0.1, 20.0)?;
+        within("largest pressure of the sensor in Pa", most_pa, 1.0, 1e8)?;
+        let line = Line::new("DCON".into(), open, settings.timeout_s)?;
+        Ok(Self { line, settings, begin: Instant::now(), last_s: 0.0 })
+    }
+
     fn ask(&mut self, question: &str) -> Result<String, DriverError> {
         let whole = |bytes: &[u8]| bytes.iter().position(|b| *b == b'\r').map(|at| at + 1);
         let answer = self.line.ask(format!("{question}\r").as_bytes(), whole)?;
         Ok(String::from_utf8_lossy(&answer).trim().to_owned())
     }
 
-    /// A command whose answer is `!AA`.
-    fn done(&mut self, question: &str) -> Result<(), DriverError> {
-        let answer = self.ask(question)?;
-        if answer.starts_with('!') { Ok(()) } else { Err(self.refuse("! and the module's address", &answer)) }
-    }
-
     fn refuse(&mut self, expected: &'static str, answer: &str) -> DriverError {
         self.line.hang_up();
         self.line.garbled(expected, answer)
+    }
+}
+
+impl ErrorType for Gauge {
+    type Error = DriverError;
+}
+
+impl Pressure for Gauge {
+    fn pressure_pa(&mut self) -> Result<Stamped<f64>, DriverError> {
+        let (address, channel) = self.settings.input;
+        let answer = self.ask(&format!("#{address:02X}{channel:X}"))?;
+        let volts = answer.strip_prefix('>').and_then(|volts| volts.parse::<f64>().ok());
+        let Some(volts) = volts else { return Err(self.refuse("> and volts", &answer)) };
+        let ([zero, full], most_pa) = self.settings.sensor;
+        let share = (volts - zero) / (full - zero);
+        // Half a percent beyond its scale it still measures.
+        if !(-0.005..=1.005).contains(&share) {
+            return Err(DriverError::Saturated { device: self.line.device.clone(), status: 0 });
+        }
+        // Two readings of one time cannot be: the clock is finer than the line.
+        self.last_s = self.begin.elapsed().as_secs_f64().max(self.last_s + 1e-9);
+        Ok(Stamped { t_s: self.last_s, value: share * most_pa })
+    }
+}
+
+impl Modules {
+    /// A command whose answer is `!AA`.
+    fn done(&mut self, question: &str) -> Result<(), DriverError> {
+        let answer = self.gauge.ask(question)?;
+        if answer.starts_with('!') {
+            Ok(())
+        } else {
+            Err(self.gauge.refuse("! and the module's address", &answer))
+        }
     }
 
     /// The module's own watch, and its safe value, which is set in it beforehand (`~AA5`).
@@ -118,15 +175,15 @@ impl Modules {
 
     fn set(&mut self, command: &Air) -> Result<(), DriverError> {
         let ((address, channel), volts) = (self.settings.output, self.volts(command));
-        let answer = self.ask(&format!("#{address:02X}{channel:X}{volts:+07.3}"))?;
+        let answer = self.gauge.ask(&format!("#{address:02X}{channel:X}{volts:+07.3}"))?;
         match answer.chars().next() {
             Some('>') => Ok(()),
             Some('!') => {
                 self.watch()?;
                 let words = "the module's own watch has set the output to its safe value";
-                Err(DriverError::Device { device: self.line.device.clone(), words, code: 1 })
+                Err(DriverError::Device { device: self.gauge.line.device.clone(), words, code: 1 })
             }
-            _ => Err(self.refuse("> for an output that is set", &answer)),
+            _ => Err(self.gauge.refuse("> for an output that is set", &answer)),
         }
     }
 }
@@ -158,20 +215,8 @@ impl Machine for Modules {
     }
 
     fn look(&mut self) -> Result<(Stamped<f64>, bool), DriverError> {
-        self.line.tell(b"~**\r")?;
-        let (address, channel) = self.settings.input;
-        let answer = self.ask(&format!("#{address:02X}{channel:X}"))?;
-        let volts = answer.strip_prefix('>').and_then(|volts| volts.parse::<f64>().ok());
-        let Some(volts) = volts else { return Err(self.refuse("> and volts", &answer)) };
-        let ([zero, full], most_pa) = self.settings.sensor;
-        let share = (volts - zero) / (full - zero);
-        // Half a percent beyond its scale it still measures.
-        if !(-0.005..=1.005).contains(&share) {
-            return Err(DriverError::Saturated { device: self.line.device.clone(), status: 0 });
-        }
-        // Two readings of one time cannot be: the clock is finer than the line.
-        self.last_s = self.begin.elapsed().as_secs_f64().max(self.last_s + 1e-9);
-        Ok((Stamped { t_s: self.last_s, value: share * most_pa }, self.closed))
+        self.gauge.line.tell(b"~**\r")?;
+        self.gauge.pressure_pa().map(|pressure| (pressure, self.closed))
     }
 
     fn send(&mut self, command: &Air) -> Result<(), DriverError> {
@@ -191,10 +236,9 @@ impl Pneumatics {
     /// # Errors
     /// [`DriverError::Limit`] for settings that are none; the line's and the modules'.
     pub fn new(open: Opener, settings: PneumaticsSettings) -> Result<Self, DriverError> {
-        let ([zero, full], most_pa) = settings.sensor;
-        within("scale of the sensor in V", (full - zero).abs(), 0.1, 20.0)?;
-        within("largest pressure of the sensor in Pa", most_pa, 1.0, 1e8)?;
-        within("largest pressure in Pa", settings.largest_pa, 1.0, most_pa)?;
+        let PneumaticsSettings { input, sensor, timeout_s, .. } = settings;
+        let gauge = Gauge::new(open, GaugeSettings { input, sensor, timeout_s })?;
+        within("largest pressure in Pa", settings.largest_pa, 1.0, sensor.1)?;
         within("patience in s", settings.patience_s, 0.1, 10.0)?;
         let volts = match settings.outlet {
             Outlet::Valve(volts) => volts.to_vec(),
@@ -204,8 +248,7 @@ impl Pneumatics {
             }
         };
         volts.into_iter().try_for_each(|v| within("output in V", v, -10.0, 10.0))?;
-        let line = Line::new("DCON".into(), open, settings.timeout_s)?;
-        let mut modules = Modules { line, settings, begin: Instant::now(), last_s: 0.0, closed: true };
+        let mut modules = Modules { gauge, settings, closed: true };
         modules.watch()?;
         modules.stop()?;
         Ok(Self { machine: DeadMan::new(modules, settings.patience_s)? })

@@ -13,7 +13,7 @@ use hw_record::{record, source};
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 
-/// Records devices to a folder of CSV files, on one clock.
+/// Records devices to a folder of CSV, WAV and PNG files, or to an MCAP file, on one clock.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 struct Arguments {
@@ -25,10 +25,11 @@ struct Arguments {
 enum Task {
     /// Records until it is stopped (Ctrl-C), or for a time.
     Record {
-        /// Devices: ati=192.0.2.1:49152, ur=192.0.2.2:30004, robotiq=192.0.2.2:63352, with commas between.
+        /// Devices, with commas between: ati=192.0.2.1:49152, ur=192.0.2.2:30004, robotiq=192.0.2.2:63352, dynamixel=/dev/ttyUSB0@57600?id=1,
+        /// dcon=192.0.2.3:4001?module=1&pa=200000, depth=FOLDER?fx=600&fy=600&cx=320&cy=240, wav=FILE; NAME:KIND=... where two are of a kind.
         #[arg(long, value_delimiter = ',', required = true, value_name = "KIND=ADDRESS")]
         device: Vec<String>,
-        /// The folder to write to.
+        /// The folder to write to, or an MCAP file (NAME.mcap).
         #[arg(long)]
         out: PathBuf,
         /// Record for so long; until it is stopped without.
@@ -42,7 +43,7 @@ enum Task {
         /// How long.
         #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
         seconds: f64,
-        /// The folder to write to.
+        /// The folder or MCAP file to write to.
         #[arg(long)]
         out: PathBuf,
     },

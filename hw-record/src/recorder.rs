@@ -1,15 +1,14 @@
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-use hw_traits::{Error as _, Severity};
+use hw_traits::{ErrorKind, Severity};
 
-use crate::source::Source;
+use crate::source::{Reading, Source};
+use crate::store::{Bag, Folder, Store};
 use crate::tally::Tally;
 
 /// What is written within this time is on its way to the disk: a program that is killed loses no more.
@@ -36,38 +35,31 @@ pub enum RecordError {
     },
 }
 
-/// A reading on its way: the source's number, the arrival (s), and the device's time with the numbers, or its error.
-type Passed = (usize, f64, Result<(f64, Vec<f64>), String>);
+/// A reading on its way: the source's number, the arrival (s), and the reading or the device's error.
+type Passed = (usize, f64, Result<Reading, String>);
 
-/// Records sources to `FOLDER/NAME.csv` until `stop`, each row with its arrival on this computer's one clock (`arrival_s`, from zero) and its time on the
-/// device's (`t_s`).
+/// Records sources until `stop`, each reading with its arrival on this computer's one clock (from zero) and its time on the device's: to the MCAP file
+/// `out` where its name ends so, else to the folder `out`.
 ///
-/// A device that is late or whose link broke is asked again; one with a fatal error ends alone.
+/// A device that is late or whose link broke is asked again; one with a fatal error, or at its end, ends alone.
 ///
 /// # Errors
 /// [`RecordError`]; what was recorded until then is kept.
 pub fn record(
     sources: Vec<Source>,
-    folder: &Path,
+    out: &Path,
     stop: &Arc<AtomicBool>,
 ) -> Result<BTreeMap<String, Tally>, RecordError> {
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |error| RecordError::Io { path, error }
-    };
-    std::fs::create_dir_all(folder).map_err(failed(folder))?;
-    let mut files: Vec<(PathBuf, BufWriter<File>)> = Vec::new();
     let mut tallies: Vec<(String, Tally)> = Vec::new();
     for source in &sources {
         if tallies.iter().any(|(name, _)| *name == source.name) {
             return Err(RecordError::Twice { name: source.name.clone() });
         }
-        let path = folder.join(format!("{}.csv", source.name));
-        let mut file = BufWriter::new(File::create(&path).map_err(failed(&path))?);
-        writeln!(file, "arrival_s,t_s,{}", source.columns.join(",")).map_err(failed(&path))?;
-        files.push((path, file));
         tallies.push((source.name.clone(), Tally::default()));
     }
+    let bag = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+    let mut store: Box<dyn Store> =
+        if bag { Box::new(Bag::new(out, &sources)?) } else { Box::new(Folder::new(out, &sources)?) };
     let (sender, readings) = sync_channel::<Passed>(WAITING);
     let zero = Instant::now();
     for (number, source) in sources.into_iter().enumerate() {
@@ -78,13 +70,9 @@ pub fn record(
     let mut flushed = Instant::now();
     loop {
         match readings.recv_timeout(FLUSH) {
-            Ok((number, arrival_s, Ok((t_s, numbers)))) => {
-                let (path, file) = &mut files[number];
-                let row = numbers
-                    .iter()
-                    .fold(format!("{arrival_s:.6},{t_s:.6}"), |row, n| row + "," + &n.to_string());
-                writeln!(file, "{row}").map_err(failed(path))?;
-                tallies[number].1.count(arrival_s, t_s);
+            Ok((number, arrival_s, Ok(reading))) => {
+                store.put(number, arrival_s, &reading)?;
+                tallies[number].1.count(arrival_s, reading.t_s);
             }
             Ok((number, _, Err(error))) => tallies[number].1.fail(error),
             Err(RecvTimeoutError::Timeout) => {}
@@ -93,27 +81,26 @@ pub fn record(
         }
         if flushed.elapsed() >= FLUSH {
             flushed = Instant::now();
-            for (path, file) in &mut files {
-                file.flush().map_err(failed(path))?;
-            }
+            store.flush()?;
         }
     }
-    for (path, file) in &mut files {
-        file.flush().map_err(failed(path))?;
-    }
+    store.finish()?;
     Ok(tallies.into_iter().collect())
 }
 
 fn listen(number: usize, mut source: Source, zero: Instant, sender: &SyncSender<Passed>, stop: &AtomicBool) {
     while !stop.load(Ordering::Relaxed) {
         let answer = (source.next)();
-        let fatal = answer.as_ref().is_err_and(|e| e.kind().severity() == Severity::Fatal);
-        if answer.is_err() {
+        let kind = answer.as_ref().err().map(hw_traits::Error::kind);
+        if kind == Some(ErrorKind::EndOfRecording) {
+            return;
+        }
+        if kind.is_some() {
             // A line that is gone is not asked without a pause.
             std::thread::sleep(Duration::from_millis(5));
         }
         let passed = (number, zero.elapsed().as_secs_f64(), answer.map_err(|e| e.to_string()));
-        if sender.send(passed).is_err() || fatal {
+        if sender.send(passed).is_err() || kind.is_some_and(|k| k.severity() == Severity::Fatal) {
             return;
         }
     }

@@ -10,4 +10,4 @@ mod packet;
 mod servo;
 
 pub use packet::Bus;
-pub use servo::{Joint, Mode, Reading, Servo, ServoCommand, ServoSettings};
+pub use servo::{Joint, Mode, Reading, Servo, ServoCommand, ServoReader, ServoSettings};

@@ -100,7 +100,21 @@ pub struct Joint {
     goal: Option<f64>,
     stopped: bool,
     angle_rad: f64,
+    present: Present,
+}
+
+/// The servo's clock: its last tick (ms) and that tick's time, s.
+#[derive(Debug, Clone, Copy, Default)]
+struct Present {
     tick: Option<(i32, f64)>,
+}
+
+/// A servo that is read alone: nothing is set, and its torque stays as it is.
+pub struct ServoReader {
+    bus: Bus,
+    id: u8,
+    current_unit_a: f64,
+    present: Present,
 }
 
 /// A servo, under the dead-man's rule.
@@ -115,6 +129,49 @@ fn words<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
 
 fn goal_of(angle_rad: f64) -> i32 {
     (MIDDLE + angle_rad * COUNTS / TAU).round().clamp(0.0, COUNTS - 1.0) as i32
+}
+
+impl Present {
+    fn read(&mut self, bus: &mut Bus, id: u8, current_unit_a: f64) -> Result<Stamped<Reading>, DriverError> {
+        let bytes = bus.read(id, PRESENT, PRESENT_BYTES)?;
+        let read = || {
+            let tick = i32::from(u16::from_le_bytes(words(&bytes, 0)?));
+            let current = f64::from(i16::from_le_bytes(words(&bytes, 6)?)) * current_unit_a;
+            let speed = f64::from(i32::from_le_bytes(words(&bytes, 8)?)) * SPEED;
+            let angle = (f64::from(i32::from_le_bytes(words(&bytes, 12)?)) - MIDDLE) * TAU / COUNTS;
+            Some((tick, Reading { angle_rad: angle, speed_rad_s: speed, current_a: current }))
+        };
+        let Some((tick, value)) = read() else {
+            let (device, received) = (bus.device(), format!("{bytes:?}"));
+            return Err(DriverError::Garbled { device, expected: "16 bytes", received });
+        };
+        let t_s = match self.tick {
+            Some((before, t_s)) => t_s + f64::from((tick - before).rem_euclid(TICKS)) * 1e-3,
+            None => f64::from(tick) * 1e-3,
+        };
+        self.tick = Some((tick, t_s));
+        Ok(Stamped { t_s, value })
+    }
+}
+
+impl ServoReader {
+    /// A servo of a number on a line; a unit of its current is `current_unit_a` A.
+    ///
+    /// # Errors
+    /// [`DriverError::Limit`] for a number or unit that is none.
+    pub fn new(bus: Bus, id: u8, current_unit_a: f64) -> Result<Self, DriverError> {
+        within("number of the servo", f64::from(id), 0.0, 252.0)?;
+        within("unit of current in A", current_unit_a, f64::MIN_POSITIVE, 1.0)?;
+        Ok(Self { bus, id, current_unit_a, present: Present::default() })
+    }
+
+    /// Angle, speed and current.
+    ///
+    /// # Errors
+    /// The line's and the servo's.
+    pub fn reading(&mut self) -> Result<Stamped<Reading>, DriverError> {
+        self.present.read(&mut self.bus, self.id, self.current_unit_a)
+    }
 }
 
 impl Joint {
@@ -194,34 +251,15 @@ impl Machine for Joint {
     }
 
     fn look(&mut self) -> Result<(Stamped<Reading>, bool), DriverError> {
-        let bytes = self.bus.read(self.settings.id, PRESENT, PRESENT_BYTES)?;
-        let read = || {
-            let tick = i32::from(u16::from_le_bytes(words(&bytes, 0)?));
-            let current = f64::from(i16::from_le_bytes(words(&bytes, 6)?)) * self.settings.current_unit_a;
-            let speed = f64::from(i32::from_le_bytes(words(&bytes, 8)?)) * SPEED;
-            let angle = (f64::from(i32::from_le_bytes(words(&bytes, 12)?)) - MIDDLE) * TAU / COUNTS;
-            Some((tick, Reading { angle_rad: angle, speed_rad_s: speed, current_a: current }))
-        };
-        let Some((tick, value)) = read() else {
-            let device = self.bus.device();
-            return Err(DriverError::Garbled {
-                device,
-                expected: "16 bytes",
-                received: format!("{bytes:?}"),
-            });
-        };
-        let t_s = match self.tick {
-            Some((before, t_s)) => t_s + f64::from((tick - before).rem_euclid(TICKS)) * 1e-3,
-            None => f64::from(tick) * 1e-3,
-        };
-        self.tick = Some((tick, t_s));
+        let reading = self.present.read(&mut self.bus, self.settings.id, self.settings.current_unit_a)?;
+        let value = reading.value;
         self.angle_rad = value.angle_rad;
         let stands = value.speed_rad_s.abs() < 2.0 * SPEED;
         let there = match self.goal {
             Some(goal) => (value.angle_rad - goal).abs() <= self.settings.tolerance_rad,
             None => self.stopped,
         };
-        Ok((Stamped { t_s, value }, stands && there))
+        Ok((reading, stands && there))
     }
 
     fn send(&mut self, command: &ServoCommand) -> Result<(), DriverError> {
@@ -262,7 +300,8 @@ impl Servo {
         within("unit of current in A", settings.current_unit_a, f64::MIN_POSITIVE, 1.0)?;
         within("tolerance in rad", settings.tolerance_rad, TAU / COUNTS, 1.0)?;
         within("patience in s", settings.patience_s, WATCHDOG_S, 2.5)?;
-        let mut joint = Joint { bus, settings, goal: None, stopped: true, angle_rad: 0.0, tick: None };
+        let mut joint =
+            Joint { bus, settings, goal: None, stopped: true, angle_rad: 0.0, present: Present::default() };
         joint.begin()?;
         Ok(Self { machine: DeadMan::new(joint, settings.patience_s)?, settings })
     }

@@ -135,12 +135,11 @@ impl<L: FnMut(f64) -> [f64; 6]> Sensor<L> {
     }
 
     fn send(&mut self, faults: &AtiFaults, listener: SocketAddr) {
-        let t = self.power.elapsed().as_secs_f64();
-        let felt = (self.load)(t);
+        // A record's number says when it was sampled, so that times are even, whenever it is sent.
+        let t_s = self.begin.duration_since(self.power).as_secs_f64() + f64::from(self.rdt) / self.rate_hz;
+        let felt = (self.load)(t_s);
         *self.total.lock().unwrap_or_else(PoisonError::into_inner) += 1;
-        // The sample of this record: its number follows from the record's own, so that times are even.
-        let offset = self.begin.duration_since(self.power).as_secs_f64() * 7000.0;
-        let sample = (offset + f64::from(self.rdt) * 7000.0 / self.rate_hz) as u32;
+        let sample = (t_s * 7000.0) as u32;
         let mut bytes = [0; 36];
         bytes[0..4].copy_from_slice(&self.rdt.to_be_bytes());
         bytes[4..8].copy_from_slice(&sample.to_be_bytes());

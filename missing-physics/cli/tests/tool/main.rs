@@ -13,6 +13,7 @@ mod next_experiment;
 mod outputs;
 mod pages;
 mod prove;
+mod recorded;
 mod repair;
 mod report;
 mod templates;
