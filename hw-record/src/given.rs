@@ -1,6 +1,6 @@
 use std::net::SocketAddr;
 
-use crate::source::SourceError;
+use crate::error::SourceError;
 
 /// What is expected, in a line.
 const EXPECTED: &str = "[NAME:]KIND=ADDRESS[?KEY=VALUE&...] with a KIND of ati, ur, robotiq (HOST:PORT), dynamixel, dcon (HOST:PORT or \

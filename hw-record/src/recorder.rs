@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use hw_traits::{ErrorKind, Severity};
 
+use crate::error::RecordError;
 use crate::source::{Reading, Source};
 use crate::store::{Bag, Folder, Store};
 use crate::tally::Tally;
@@ -15,25 +16,6 @@ use crate::tally::Tally;
 const FLUSH: Duration = Duration::from_millis(250);
 /// Readings that may wait for the disk.
 const WAITING: usize = 1 << 16;
-
-/// Why nothing was recorded, or no more.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// A file cannot be written.
-    #[error("{}: {error}", .path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        error: std::io::Error,
-    },
-    /// Two sources have one name.
-    #[error("two devices are called {name}, expected a name for each")]
-    Twice {
-        /// The name.
-        name: String,
-    },
-}
 
 /// A reading on its way: the source's number, the arrival (s), and the reading or the device's error.
 type Passed = (usize, f64, Result<Reading, String>);

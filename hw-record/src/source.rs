@@ -17,6 +17,7 @@ use hw_traits::microphones::Microphones;
 use hw_traits::picture::{Intrinsics, Picture};
 use hw_traits::pneumatics::Pressure as _;
 
+use crate::error::SourceError;
 use crate::given::Given;
 
 /// How long a device on a line may take to answer, s.
@@ -78,22 +79,6 @@ pub struct Source {
     pub kind: Kind,
     /// Waits for a reading.
     pub next: Next,
-}
-
-/// Why there is no such source.
-#[derive(Debug, thiserror::Error)]
-pub enum SourceError {
-    /// It is not written as it should be.
-    #[error("{given:?}, expected {expected}")]
-    Words {
-        /// What was given.
-        given: String,
-        /// What was expected.
-        expected: String,
-    },
-    /// The device cannot be reached.
-    #[error(transparent)]
-    Device(#[from] DriverError),
 }
 
 fn words(of: &[&str]) -> Vec<String> {

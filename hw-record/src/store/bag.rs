@@ -10,8 +10,8 @@ use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 use serde_json::{Map, Value, json};
 
-use super::{Store, failed, png_of};
-use crate::recorder::RecordError;
+use super::keep::{Store, failed, png_of};
+use crate::error::RecordError;
 use crate::source::{Contents, Kind, Reading, Source};
 
 /// An MCAP file: a topic for each source, messages in JSON, the time of logging that of the arrival.

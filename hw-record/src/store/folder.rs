@@ -2,8 +2,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::{Store, failed, png_of};
-use crate::recorder::RecordError;
+use super::keep::{Store, failed, png_of};
+use crate::error::RecordError;
 use crate::source::{Contents, Kind, Reading, Source};
 
 /// `NAME.csv` for each source, beside it `NAME.wav` for sound and a folder `NAME` of PNG files for pictures.
