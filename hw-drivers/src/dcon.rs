@@ -5,7 +5,7 @@
 //! with `>` (data), `!` (done; of an output: the watch has ended it), `?` (refused). Frames end with a carriage return, and have no
 //! checksum unless the module is set to one.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use hw_traits::ErrorType;
 use hw_traits::clock::Stamped;
@@ -227,6 +227,18 @@ impl Machine for Modules {
     fn stop(&mut self) -> Result<(), DriverError> {
         self.closed = true;
         self.set(&self.shut())
+    }
+
+    /// The module's own watch goes on while the outlet is closed and nobody asks.
+    fn beat_every(&self) -> Option<Duration> {
+        Some(Duration::from_secs_f64(0.25 * self.settings.patience_s))
+    }
+
+    fn beat(&mut self) {
+        if self.gauge.line.is_open() {
+            // It has no answer; a line that broke shows at the next reading.
+            let _ = self.gauge.line.tell(b"~**\r");
+        }
     }
 }
 

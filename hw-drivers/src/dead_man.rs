@@ -22,8 +22,6 @@ pub trait Machine: Send + 'static {
     type State: Copy + Send;
     /// What it can be told.
     type Command: Copy + Send;
-    /// How often [`Machine::beat`] is called, for a device that watches its line also while it stands.
-    const BEAT: Option<Duration> = None;
 
     /// Whether a command is within the limits.
     ///
@@ -51,6 +49,11 @@ pub trait Machine: Send + 'static {
     /// # Errors
     /// The device's error.
     fn stop(&mut self) -> Result<(), DriverError>;
+
+    /// How often [`Machine::beat`] is called, for a device that watches its line also while it stands.
+    fn beat_every(&self) -> Option<Duration> {
+        None
+    }
 
     /// Tells the device that its program lives; nothing may move by it that was not commanded. What fails shows at the next reading.
     fn beat(&mut self) {}
@@ -105,7 +108,8 @@ fn keep<M: Machine>(shared: &Shared<M>) {
             return;
         }
         let age = watched.seen.map_or(shared.patience, |seen| seen.elapsed());
-        let mut rest = M::BEAT.map_or(shared.patience, |beat| beat.min(shared.patience));
+        let beat = watched.machine.beat_every();
+        let mut rest = beat.map_or(shared.patience, |beat| beat.min(shared.patience));
         if watched.moving && age >= shared.patience {
             let why = format!("it moved, and was not read for {:.3} s", age.as_secs_f64());
             // Tried again after the patience.
@@ -113,7 +117,7 @@ fn keep<M: Machine>(shared: &Shared<M>) {
         } else if watched.moving {
             rest = rest.min(shared.patience - age);
         }
-        if M::BEAT.is_some() {
+        if beat.is_some() {
             watched.machine.beat();
         }
         watched = shared.changed.wait_timeout(watched, rest).unwrap_or_else(PoisonError::into_inner).0;

@@ -105,6 +105,12 @@ impl Line {
         }
     }
 
+    /// Whether it is open: a beat is no reason to open it.
+    #[cfg(any(feature = "dcon", feature = "dynamixel"))]
+    pub(crate) fn is_open(&self) -> bool {
+        self.port.is_some()
+    }
+
     #[cfg(any(feature = "dcon", feature = "dynamixel", feature = "robotiq"))]
     /// Closes the line; the next question opens it.
     pub(crate) fn hang_up(&mut self) {

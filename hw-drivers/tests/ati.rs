@@ -153,3 +153,17 @@ fn the_sensors_pages_say_counts_and_rate_and_the_rate_can_be_set() {
     assert_eq!(settings_of(pages.address(), 1.0).unwrap().1, 1000.0);
     assert_eq!(set_rate(pages.address(), 0, 1.0).unwrap_err().kind(), ErrorKind::OutOfRange);
 }
+
+/// A program that waited wants to know how things are, not how they were.
+#[test]
+fn readings_that_waited_are_left_out_when_that_is_asked_for() {
+    let emulator = clocked();
+    let mut sensor = NetFt::connect(emulator.address(), NetFtSettings::default()).unwrap();
+    let before = sensor.read().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    sensor.skip().unwrap();
+    let after = sensor.read().unwrap();
+    assert!(after.t_s - before.t_s > 0.49 && after.value.force_n[0] - before.value.force_n[0] > 0.49);
+    // What was left out came, and what the computer had no room for is lost; nothing comes twice.
+    assert!(sensor.losses().late == 0 && sensor.read().unwrap().t_s > after.t_s);
+}

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use hw_drivers::dcon::{Outlet, Pneumatics, PneumaticsSettings};
+use hw_drivers::dcon::{Gauge, GaugeSettings, Outlet, Pneumatics, PneumaticsSettings};
 use hw_drivers::emulator::{DconEmulator, DconFaults};
 use hw_drivers::line::tcp;
 use hw_traits::pneumatics::{Pressure, Valve};
@@ -32,6 +32,14 @@ fn the_contracts_hold_whole_and_in_pieces() {
         let mut chamber = chamber(&emulator);
         conformance::pressure(&mut chamber, 5).unwrap();
         conformance::valve(&mut chamber, |c| assert!(c.pressure_pa().is_ok())).unwrap();
+        drop(chamber);
+        // The sensor alone, which sets nothing.
+        let (volts, _) = emulator.now();
+        let PneumaticsSettings { input, sensor, timeout_s, .. } = SETTINGS;
+        let alone = GaugeSettings { input, sensor, timeout_s };
+        let mut gauge = Gauge::new(tcp(emulator.address(), 0.1), alone).unwrap();
+        conformance::pressure(&mut gauge, 5).unwrap();
+        assert_eq!(emulator.now().0, volts);
     }
 }
 
@@ -68,6 +76,20 @@ fn the_modules_own_watch_closes_where_the_line_is_gone() {
     emulator.fail(DconFaults { cut: true, ..Default::default() });
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(emulator.now().0, 5.0);
+}
+
+/// The module's watch wants to hear from its host also while the valve is closed and nobody asks.
+#[test]
+fn a_chamber_that_rests_takes_the_next_command() {
+    let emulator = DconEmulator::start().unwrap();
+    let mut chamber = chamber(&emulator);
+    for _ in 0..2 {
+        std::thread::sleep(Duration::from_millis(500));
+        chamber.pressure_pa().unwrap();
+        chamber.open(0.1).unwrap();
+        chamber.open(0.0).unwrap();
+        chamber.pressure_pa().unwrap();
+    }
 }
 
 #[test]

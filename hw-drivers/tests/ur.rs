@@ -185,3 +185,22 @@ fn the_controllers_own_watch_is_told_of_a_register_that_is_written() {
     std::thread::sleep(Duration::from_millis(150));
     assert!(emulator.world().watch_stopped && emulator.world().speed == [0.0; 6]);
 }
+
+/// The controller's watch wants to hear ten times a second, and a stream that nobody reads piles up.
+#[test]
+fn an_arm_that_rests_is_not_stopped_by_its_own_watch_and_is_then_read_as_it_is() {
+    let emulator = UrEmulator::start(BEGIN).unwrap();
+    let mut arm = arm(&emulator);
+    for x in [0.35, 0.4] {
+        let before = arm.pose().unwrap().t_s;
+        arm.move_to(pose(x), 0.5).unwrap();
+        while !arm.settled().unwrap() {
+            sleep(&mut arm, 0.01);
+        }
+        sleep(&mut arm, 1.0);
+        assert!(!emulator.world().watch_stopped);
+        // A second of readings at 500 Hz was left out.
+        let reading = arm.pose().unwrap();
+        assert!(reading.t_s - before > 1.0 && (reading.value.position_m[0] - x).abs() < 1e-6, "{reading:?}");
+    }
+}

@@ -153,6 +153,8 @@ fn wrenches(given: &Given) -> Result<(Kind, Next), SourceError> {
     let settings = NetFtSettings {
         counts_per_n: given.number("counts_per_n", usual.counts_per_n)?,
         counts_per_nm: given.number("counts_per_nm", usual.counts_per_nm)?,
+        // A sensor that is asked again begins anew: what it would still have sent is lost.
+        timeout_s: TIMEOUT_S,
         ..usual
     };
     let mut sensor = NetFt::connect(given.socket()?, settings)?;

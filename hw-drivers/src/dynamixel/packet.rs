@@ -100,6 +100,10 @@ impl Bus {
         self.ask(id, WRITE, &parameters).map(drop)
     }
 
+    pub(super) fn is_open(&self) -> bool {
+        self.line.is_open()
+    }
+
     pub(super) fn device(&self) -> String {
         self.line.device.clone()
     }

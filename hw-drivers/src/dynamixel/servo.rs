@@ -1,4 +1,5 @@
 use std::f64::consts::{PI, TAU};
+use std::time::Duration;
 
 use hw_traits::ErrorType;
 use hw_traits::clock::Stamped;
@@ -283,6 +284,18 @@ impl Machine for Joint {
         self.hold(&command)?;
         (self.goal, self.stopped) = (None, true);
         Ok(())
+    }
+
+    /// The servo's own watch goes on while it stands and nobody asks; a servo that it has stopped is without torque for a moment.
+    fn beat_every(&self) -> Option<Duration> {
+        Some(Duration::from_secs_f64(0.25 * self.settings.patience_s))
+    }
+
+    fn beat(&mut self) {
+        if self.bus.is_open() {
+            // Any question is one that the watch hears.
+            let _ = self.bus.read(self.settings.id, BUS_WATCHDOG, 1);
+        }
     }
 }
 

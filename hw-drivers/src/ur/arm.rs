@@ -184,8 +184,6 @@ impl Controller {
 impl Machine for Controller {
     type State = State;
     type Command = Motion;
-    /// The controller's watch wants ten a second, also while the arm stands and nobody asks.
-    const BEAT: Option<Duration> = Some(Duration::from_millis(25));
 
     fn admissible(&self, command: &Motion) -> Result<(), DriverError> {
         let limits = &self.settings.limits;
@@ -250,6 +248,11 @@ impl Machine for Controller {
         self.number = self.number.wrapping_add(1).max(1);
         (self.registers, self.kind) = ([0.0; 8], 0.0);
         self.write()
+    }
+
+    /// The controller's watch wants ten a second, also while the arm stands and nobody asks.
+    fn beat_every(&self) -> Option<Duration> {
+        Some(Duration::from_millis(25))
     }
 
     /// No link is made for it; what the controller sent meanwhile does not pile up.
