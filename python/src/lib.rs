@@ -5,8 +5,12 @@ mod array;
 mod contact;
 mod errors;
 mod function;
+mod grains;
+mod hearing;
+mod liquid;
 mod posteriors;
 mod predict;
+mod proof;
 mod source;
 mod watch;
 
@@ -22,9 +26,17 @@ mod _engine {
     #[pymodule_export]
     use crate::function::Simulator;
     #[pymodule_export]
+    use crate::grains::{grain_statistics, infer_grains, pour_grains};
+    #[pymodule_export]
+    use crate::hearing::hear_impacts;
+    #[pymodule_export]
+    use crate::liquid::{liquid_pour, liquid_volume, liquid_wrench};
+    #[pymodule_export]
     use crate::posteriors::{Density, Prior};
     #[pymodule_export]
     use crate::predict::{domains, predict, unit_of, version};
+    #[pymodule_export]
+    use crate::proof::Proof;
     #[pymodule_export]
     use crate::source::Source;
 }

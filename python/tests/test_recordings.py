@@ -138,6 +138,12 @@ def test_progress_is_told_and_stops():
         mp.diagnose(domain="trajectory", runs=falls(), progress=stop)
 
 
+def test_a_bar_shows_progress(capsys):
+    pytest.importorskip("tqdm")
+    mp.diagnose(domain="trajectory", runs=falls(), progress=True)
+    assert "100 %" in capsys.readouterr().err
+
+
 def test_a_program_is_started_only_where_that_is_allowed(tmp_path):
     header = 'format = 1\ndomain = "custom"\ndata = "data.csv"\n[simulator]\ncommand = ["touch", "started"]\n'
     (tmp_path / "recording.toml").write_text(header, encoding="utf-8")

@@ -165,12 +165,27 @@ impl Repaired {
                 return Err(RepairedError::NotStarted { run: run.label.clone(), got, expected: unknown });
             }
         }
-        let shared: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let shared = self.shared(&problem);
         let still = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
         let nuisance = solve(&problem, &still, &noise, &shared, &problem.nuisance_start)?.nuisance;
         (0..recording.runs.len())
             .map(|run| self.predict_run(&problem, &selection, &noise, run, &shared, &nuisance[run]))
             .collect()
+    }
+
+    /// Values of the shared parameters. What only mechanisms that are off have is where it makes no difference in this recording, which need
+    /// not be where it made none in the recording that was diagnosed (a sensor's bounds lie beyond all readings).
+    fn shared(&self, problem: &Problem<'_>) -> Vec<f64> {
+        let spec = problem.spec();
+        let has = |on: bool, parameter: usize| {
+            let mut mechanisms = spec.mechanisms.iter().filter(|m| self.mechanisms.contains(&m.id) == on);
+            mechanisms.any(|m| m.parameters.contains(&parameter))
+        };
+        let value = |(&index, found): (&usize, &Shared)| {
+            let off = has(false, index) && !has(true, index);
+            if off { spec.parameters[index].start } else { found.value }
+        };
+        problem.shared.index.iter().zip(&self.parameters).map(value).collect()
     }
 
     fn predict_run(

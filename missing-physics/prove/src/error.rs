@@ -25,6 +25,12 @@ pub enum ProveError {
         /// The kind that was asked for.
         kind: String,
     },
+    /// A world that is none of the proof's.
+    #[error("no world {}, expected a domain and a number as trajectory/0003", quoted(.name))]
+    UnknownWorld {
+        /// The world that was asked for.
+        name: String,
+    },
     /// No world was asked for.
     #[error("0 worlds prove nothing, expected at least 1")]
     NoWorlds,

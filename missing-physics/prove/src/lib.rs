@@ -10,5 +10,5 @@ mod table;
 mod world;
 
 pub use error::ProveError;
-pub use proof::{ProveArguments, provable, prove};
+pub use proof::{ProveArguments, provable, prove, prove_world, seal_worlds};
 pub use score::{DomainScore, Part, Score};

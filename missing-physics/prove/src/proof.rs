@@ -7,7 +7,7 @@ use missing_physics::observer::{Observer, Progress};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-use worlds::concealed::{Maker, makers};
+use worlds::concealed::{Hidden, Maker, makers};
 
 use crate::error::ProveError;
 use crate::files::{make_folder, write_json, write_whole};
@@ -63,44 +63,7 @@ fn known() -> impl Iterator<Item = &'static dyn Maker> {
 /// # Errors
 /// [`ProveError`]: an unknown domain, another proof in the folder, a file that cannot be written, or a stop.
 pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<String, ProveError> {
-    let chosen: Vec<&'static dyn Maker> =
-        known().filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name())).collect();
-    if chosen.is_empty() {
-        let domain = arguments.domain.clone().unwrap_or_default();
-        return Err(ProveError::UnknownDomain { domain, known: provable() });
-    }
-    if arguments.worlds == 0 {
-        return Err(ProveError::NoWorlds);
-    }
-    let kind = match &arguments.kind {
-        Some(wanted) => {
-            Some(key::hidden(wanted).ok_or_else(|| ProveError::UnknownKind { kind: wanted.clone() })?)
-        }
-        None => None,
-    };
-    let threads = arguments.threads;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| ProveError::Threads { threads, error })?;
-    let worlds: Vec<World> = chosen
-        .iter()
-        .flat_map(|&maker| (0..arguments.worlds).map(move |number| (maker, number)))
-        .map(|(maker, number)| World::new(maker, number, kind, arguments.seed, &arguments.folder))
-        .collect();
-    report(observer, "drawing the worlds", 0.0)?;
-    let keys: Vec<String> =
-        pool.install(|| worlds.par_iter().map(|w| key::to_json(w.name(), &w.draw().key)).collect());
-    let plan = Plan {
-        format: 1,
-        version: env!("CARGO_PKG_VERSION").into(),
-        domains: chosen.iter().map(|m| m.name().to_owned()).collect(),
-        worlds: arguments.worlds,
-        kind: arguments.kind.clone(),
-        seed: arguments.seed,
-        seal: seal(&keys),
-    };
-    begin(&arguments.folder, &plan)?;
+    let Proof { worlds, keys, plan, pool } = Proof::begin(arguments, observer)?;
     each(&pool, &worlds, "diagnosing", observer, World::diagnose)?;
     // Only now are the answers opened.
     write_whole(&arguments.folder.join("keys.jsonl"), keys.concat())?;
@@ -118,6 +81,88 @@ pub fn prove(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Stri
         table::table(&score),
         folder.join("score.html").display()
     ))
+}
+
+/// Draws the worlds and seals their answers, as [`prove`] begins. Returns the worlds' names (`trajectory/0003`), for [`prove_world`].
+///
+/// # Errors
+/// As [`prove`].
+pub fn seal_worlds(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Vec<String>, ProveError> {
+    let proof = Proof::begin(arguments, observer)?;
+    Ok(proof.worlds.iter().map(|world| world.name().to_owned()).collect())
+}
+
+/// Diagnoses one world, wherever that is: its files lie in a folder of its name in the proof's, where [`prove`] of the same arguments finds
+/// its work done.
+///
+/// # Errors
+/// As [`prove`], and [`ProveError::UnknownWorld`].
+pub fn prove_world(arguments: &ProveArguments, name: &str) -> Result<(), ProveError> {
+    let (chosen, kind) = asked(arguments)?;
+    let unknown = || ProveError::UnknownWorld { name: name.to_owned() };
+    let (domain, number) = name.split_once('/').ok_or_else(unknown)?;
+    let number: usize = number.parse().map_err(|_| unknown())?;
+    let maker = chosen.into_iter().find(|maker| maker.name() == domain).ok_or_else(unknown)?;
+    if number >= arguments.worlds {
+        return Err(unknown());
+    }
+    let world = World::new(maker, number, kind, arguments.seed, &arguments.folder);
+    world.diagnose()?;
+    world.fit_oracle()
+}
+
+/// What makes the worlds that were asked for, and what they hide.
+fn asked(arguments: &ProveArguments) -> Result<(Vec<&'static dyn Maker>, Option<Hidden>), ProveError> {
+    let chosen: Vec<&'static dyn Maker> =
+        known().filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name())).collect();
+    if chosen.is_empty() {
+        let domain = arguments.domain.clone().unwrap_or_default();
+        return Err(ProveError::UnknownDomain { domain, known: provable() });
+    }
+    if arguments.worlds == 0 {
+        return Err(ProveError::NoWorlds);
+    }
+    let unknown = |kind: &String| ProveError::UnknownKind { kind: kind.clone() };
+    let hidden = |wanted: &String| key::hidden(wanted).ok_or_else(|| unknown(wanted));
+    Ok((chosen, arguments.kind.as_ref().map(hidden).transpose()?))
+}
+
+/// A proof that has begun: its worlds are drawn, their answers sealed, and the plan lies in its folder.
+struct Proof {
+    worlds: Vec<World>,
+    keys: Vec<String>,
+    plan: Plan,
+    pool: rayon::ThreadPool,
+}
+
+impl Proof {
+    fn begin(arguments: &ProveArguments, observer: &dyn Observer) -> Result<Self, ProveError> {
+        let (chosen, kind) = asked(arguments)?;
+        let threads = arguments.threads;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| ProveError::Threads { threads, error })?;
+        let worlds: Vec<World> = chosen
+            .iter()
+            .flat_map(|&maker| (0..arguments.worlds).map(move |number| (maker, number)))
+            .map(|(maker, number)| World::new(maker, number, kind, arguments.seed, &arguments.folder))
+            .collect();
+        report(observer, "drawing the worlds", 0.0)?;
+        let keys: Vec<String> =
+            pool.install(|| worlds.par_iter().map(|w| key::to_json(w.name(), &w.draw().key)).collect());
+        let plan = Plan {
+            format: 1,
+            version: env!("CARGO_PKG_VERSION").into(),
+            domains: chosen.iter().map(|m| m.name().to_owned()).collect(),
+            worlds: arguments.worlds,
+            kind: arguments.kind.clone(),
+            seed: arguments.seed,
+            seal: seal(&keys),
+        };
+        begin(&arguments.folder, &plan)?;
+        Ok(Self { worlds, keys, plan, pool })
+    }
 }
 
 fn seal(keys: &[String]) -> String {

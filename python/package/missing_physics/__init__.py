@@ -8,11 +8,12 @@
 
 from __future__ import annotations
 
-from . import bayes_sim, errors, hertz_contact
+from . import bayes_sim, bounce_audio, errors, granular_infer, hertz_contact, liquid_haptics, mujoco
 from ._diagnose import diagnose, domains
 from ._diagnosis import Diagnosis, Estimate, MechanismReport, Prediction, Repaired, RunCurves
 from ._engine import version as _version
 from ._model import Mechanism, Model, Parameter
+from ._prove import Proof, prove
 from .errors import MissingPhysicsError, NoPrediction
 
 __version__ = _version()
@@ -27,12 +28,18 @@ __all__ = [
     "NoPrediction",
     "Parameter",
     "Prediction",
+    "Proof",
     "Repaired",
     "RunCurves",
     "__version__",
     "bayes_sim",
+    "bounce_audio",
     "diagnose",
     "domains",
     "errors",
+    "granular_infer",
     "hertz_contact",
+    "liquid_haptics",
+    "mujoco",
+    "prove",
 ]

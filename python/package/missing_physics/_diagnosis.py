@@ -116,8 +116,17 @@ class Repaired:
         """The file that the command ``predict`` takes."""
         return self._json
 
+    def file(self, path: str | PathLike[str] | None = None) -> str:
+        """The simulator's own file (MJCF) with what was found in it; written to ``path`` as well, where one is given."""
+        if self._model is None or self._model.file is None:
+            raise RepairError("the model has no file of its own: json() is what the command predict takes")
+        text = self._model.file(self.parameters)
+        if path is not None:
+            Path(fspath(path)).write_text(text, encoding="utf-8")
+        return text
+
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes that file."""
+        """Writes what :meth:`json` says."""
         Path(fspath(path)).write_text(self._json, encoding="utf-8")
 
     @classmethod

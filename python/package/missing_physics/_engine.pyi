@@ -10,11 +10,19 @@ from numpy.typing import NDArray
 __all__ = [
     "Density",
     "Prior",
+    "Proof",
     "Simulator",
     "Source",
     "diagnose",
     "domains",
     "fit_contact",
+    "grain_statistics",
+    "hear_impacts",
+    "infer_grains",
+    "liquid_pour",
+    "liquid_volume",
+    "liquid_wrench",
+    "pour_grains",
     "predict",
     "unit_of",
     "version",
@@ -56,12 +64,64 @@ class Density:
     def log_prob(self, theta: Any, x: Any) -> list[float]: ...
     def save(self, path: str | PathLike[str]) -> None: ...
 
+@final
+class Proof:
+    def __new__(
+        cls,
+        folder: str | PathLike[str],
+        domain: str | None,
+        worlds: int,
+        kind: str | None,
+        seed: int,
+        threads: int,
+    ) -> Proof: ...
+    def prove(self, progress: Callable[[str, float], object] | None) -> str: ...
+    def seal(self) -> list[str]: ...
+    def world(self, name: str) -> None: ...
+
 def fit_contact(
     curves: Sequence[tuple[Any, Any]],
     shape: str,
     size: float,
     poisson_ratio: float,
 ) -> dict[str, Any]: ...
+def liquid_wrench(
+    sizes: tuple[float, float, float],
+    held: tuple[float, float, float, float, float],
+    tilt_rad: Any,
+    mass_kg: float,
+    volume_m3: float,
+) -> list[NDArray[np.float64]]: ...
+def liquid_volume(
+    sizes: tuple[float, float, float],
+    held: tuple[float, float, float, float, float],
+    poses: Sequence[tuple[str, Any]],
+    mass_kg: tuple[float, float] | None,
+    density_kg_m3: float | None,
+    sigma_nm: float | None,
+    steps: int,
+) -> dict[str, Any]: ...
+def liquid_pour(
+    sizes: tuple[float, float, float],
+    inside_m3: float,
+    wanted_m3: float,
+    bead_m: tuple[float, float],
+    steepest_rad: float,
+    flow_m3_s: float | None,
+) -> tuple[float, float, float, float, float | None]: ...
+def hear_impacts(
+    sound: Any,
+    rate_hz: float,
+    microphones_m: Sequence[Sequence[float]] | None,
+    speed_of_sound_m_s: float,
+) -> dict[str, Any]: ...
+def pour_grains(
+    grain: Sequence[float], height_m: float, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def infer_grains(
+    statistics: Any, count: int, seed: int
+) -> tuple[NDArray[np.float64], list[float], float]: ...
+def grain_statistics() -> list[str]: ...
 def diagnose(
     source: Source,
     simulator: Simulator | None,

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from . import _engine
 from ._recording import Run, Runs, Table, labelled, memory
 from .errors import DiagnosisError, RecordingError
@@ -20,22 +22,32 @@ class Parameter:
     """A number that the simulator needs and nobody knows exactly.
 
     ``start`` is where a fit begins; in a mechanism, the value at which it makes no difference. ``scale`` is a typical error of
-    ``start`` (a tenth of it, or 1, where nothing is said). ``per_run``: each run has its own (where it began). The unit is the
-    name's ending (``k_per_m``) unless ``unit`` says another.
+    ``start`` (a tenth of it, or 1, where nothing is said). ``per_run``: each run has its own (where it began), and ``start`` may then be
+    one number for each run, or ``"measured"``: the first reading of the channel with whose name the parameter's begins
+    (``angle_rad_at_start``). The unit is the name's ending (``k_per_m``) unless ``unit`` says another.
     """
 
     name: str
-    start: float = 0.0
+    start: float | str | Sequence[float] = 0.0
     lower: float = -math.inf
     upper: float = math.inf
     scale: float | None = None
     per_run: bool = False
     unit: str | None = None
 
+    def _first(self) -> float:
+        """A value to ask with before anything was measured."""
+        if isinstance(self.start, str):
+            return 0.0
+        return float(np.ravel(self.start)[0])
+
     def _header(self, start: str) -> dict[str, Any]:
         unit = _engine.unit_of(self.name) if self.unit is None else self.unit
-        scale = self.scale if self.scale is not None else abs(self.start) / 10 or 1.0
-        keys = {"name": self.name, "unit": unit, start: float(self.start), "scale": float(scale)}
+        begins = self.start if isinstance(self.start, str) or np.ndim(self.start) else float(self.start)  # type: ignore[arg-type]
+        scale = self.scale
+        if scale is None:
+            scale = abs(begins) / 10 or 1.0 if isinstance(begins, float) else 1.0
+        keys = {"name": self.name, "unit": unit, start: begins, "scale": float(scale)}
         bounds = {"lower": float(self.lower), "upper": float(self.upper)}
         return {**keys, **bounds, **({"per_run": True} if self.per_run else {})}
 
@@ -75,7 +87,8 @@ class Model:
 
     Which columns of the runs are ``inputs`` (known exactly; noise may be correlated along the first) and which are ``channels``
     (measured) is asked of ``predict`` where it is not said. ``step`` is that of derivatives, in scales of a parameter: well above
-    the simulator's own rounding. ``noise`` holds one sigma of a channel where there was a calibration.
+    the simulator's own rounding. ``noise`` holds one sigma of a channel where there was a calibration. ``file`` writes the simulator's
+    own file at given parameters, where it has one (MJCF), for :meth:`Repaired.file`.
     """
 
     predict: Predict
@@ -88,10 +101,11 @@ class Model:
     step: float = 1e-3
     noise: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    file: Callable[[dict[str, float]], str] | None = None
 
     def _starts(self) -> dict[str, float]:
         freed = [parameter for mechanism in self.mechanisms for parameter in mechanism.parameters]
-        return {parameter.name: float(parameter.start) for parameter in [*self.parameters, *freed]}
+        return {parameter.name: parameter._first() for parameter in [*self.parameters, *freed]}
 
     def _columns(self, table: Table, channels: Sequence[str]) -> tuple[list[str], list[str]]:
         """The inputs and the channels among a table's columns."""

@@ -7,13 +7,15 @@
     >>> theta, x = simulate_for_sbi(noise, prior, 500, seed=1)
     >>> inference = NPE(prior, density_estimator="mdrff")
     >>> posterior = inference.append_simulations(theta, x).train(max_num_epochs=40).build_posterior()
-    >>> draws = posterior.sample(1000, x=[0.5], seed=2)
+    >>> draws = posterior.sample((1000,), x=[0.5], seed=2)
     >>> draws.shape, bool(abs(np.median(draws) - 0.5) < 0.1)
     ((1000, 1), True)
 """
 
 from __future__ import annotations
 
+import inspect
+import math
 import os
 import tempfile
 from collections.abc import Callable
@@ -27,8 +29,11 @@ from . import _engine
 from .errors import PosteriorError
 
 Floats = NDArray[np.float64]
-#: ``simulator(theta, rng)``: parameters of shape (parameters,) and a generator of its own in, features of shape (features,) out.
-Simulator = Callable[[Floats, np.random.Generator], ArrayLike]
+#: ``simulator(theta)`` or ``simulator(theta, rng)``: parameters of shape (parameters,) and a generator of its own in, features of shape
+#: (features,) out. What has chance in it takes the generator, so that the same seed gives the same simulations.
+Simulator = Callable[..., ArrayLike]
+#: How many draws: a number, or a shape as sbi takes it.
+Shape = int | tuple[int, ...]
 
 
 class BoxUniform:
@@ -39,9 +44,10 @@ class BoxUniform:
         self.high = np.atleast_1d(np.asarray(high, dtype=np.float64))
         self._prior = _engine.Prior(self.low.tolist(), self.high.tolist())
 
-    def sample(self, count: int, *, seed: int = 1) -> Floats:
-        """Draws of shape (count, parameters)."""
-        return self._prior.sample(count, seed)
+    def sample(self, sample_shape: Shape = (), *, seed: int = 1) -> Floats:
+        """Draws of shape (*sample_shape, parameters)."""
+        count, shape = _counted(sample_shape)
+        return self._prior.sample(count, seed).reshape(*shape, -1)
 
     def log_prob(self, theta: ArrayLike) -> Floats:
         """The logarithm of the density, of shape (count,), of parameters of shape (count, parameters)."""
@@ -54,25 +60,46 @@ class BoxUniform:
         self.__init__(state["low"], state["high"])  # type: ignore[misc]
 
 
+def _counted(sample_shape: Shape) -> tuple[int, tuple[int, ...]]:
+    """How many draws a shape holds."""
+    shape = (int(sample_shape),) if np.ndim(sample_shape) == 0 else tuple(sample_shape)  # type: ignore[arg-type]
+    return math.prod(shape), shape
+
+
+def _takes_generator(simulator: Simulator) -> bool:
+    try:
+        parameters = inspect.signature(simulator).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    places = [each for each in parameters if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD, each.VAR_POSITIONAL)]
+    return sum(each.default is each.empty for each in places) > 1 or any(each.name == "rng" for each in places)
+
+
 def simulate_one(simulator: Simulator, theta: Floats, seed: int, index: int) -> Floats | None:
     """Simulation ``index`` of a campaign: its generator depends on nothing but the seed and its index. ``None`` where it fails."""
     rng = np.random.default_rng([seed, index])
-    features = np.atleast_1d(np.asarray(simulator(theta, rng), dtype=np.float64))
+    given = (theta, rng) if _takes_generator(simulator) else (theta,)
+    features = np.atleast_1d(np.asarray(simulator(*given), dtype=np.float64))
+    if features.ndim != 1:
+        raise PosteriorError(f"the simulator's features have the shape {features.shape}, expected (features,)")
     return features if np.isfinite(features).all() else None
 
 
-def simulate_for_sbi(simulator: Simulator, prior: BoxUniform, num_simulations: int, *, seed: int = 1) -> tuple[Floats, Floats]:
+def simulate_for_sbi(simulator: Simulator, proposal: BoxUniform, num_simulations: int, *, seed: int = 1) -> tuple[Floats, Floats]:
     """Parameters of shape (simulations, parameters) from the prior and what the simulator makes of each, (simulations, features).
 
     Simulations that are not finite are left out. The same seed gives the same numbers, here and over a cluster
     (:func:`missing_physics.campaigns.simulate`).
     """
-    theta = prior.sample(num_simulations, seed=seed)
+    theta = proposal.sample(num_simulations, seed=seed)
     return kept(theta, [simulate_one(simulator, row, seed, index) for index, row in enumerate(theta)])
 
 
 def kept(theta: Floats, features: list[Floats | None]) -> tuple[Floats, Floats]:
     """The simulations that gave something."""
+    lengths = {each.size for each in features if each is not None}
+    if len(lengths) > 1:
+        raise PosteriorError(f"the simulator gave {min(lengths)} features and {max(lengths)}, expected one number of them")
     sound = [index for index, each in enumerate(features) if each is not None]
     if not sound:
         raise PosteriorError("no simulation gave finite numbers")
@@ -126,9 +153,10 @@ class Posterior:
         """The same posterior at an observation of shape (features,)."""
         return Posterior(self._density, self._kind, x)
 
-    def sample(self, count: int, x: ArrayLike | None = None, *, seed: int = 1) -> Floats:
-        """Draws of shape (count, parameters)."""
-        return self._density.sample(self._at(x), count, seed)
+    def sample(self, sample_shape: Shape = (), x: ArrayLike | None = None, *, seed: int = 1) -> Floats:
+        """Draws of shape (*sample_shape, parameters)."""
+        count, shape = _counted(sample_shape)
+        return self._density.sample(self._at(x), count, seed).reshape(*shape, -1)
 
     def log_prob(self, theta: ArrayLike, x: ArrayLike | None = None) -> Floats:
         """The logarithm of the density, of shape (count,), of parameters of shape (count, parameters)."""

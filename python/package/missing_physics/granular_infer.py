@@ -1,0 +1,61 @@
+"""Grains that are poured through a funnel onto a cloth, and what a depth picture of the heap tells of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _engine
+
+Floats = NDArray[np.float64]
+
+#: Names of the 16 statistics of a depth picture, in their order.
+STATISTICS: tuple[str, ...] = tuple(_engine.grain_statistics())
+
+
+@dataclass(frozen=True)
+class Poured:
+    """Grains at rest: their centres in m, of shape (grains, 3), the outlet above x = y = 0; the statistics of a depth picture of them, (16,)."""
+
+    positions_m: Floats
+    statistics: Floats
+
+
+@dataclass(frozen=True)
+class Inferred:
+    """Draws of a posterior over sliding friction, rolling friction and restitution, of shape (draws, 3), and their mean, (3,).
+
+    ``p_value`` is the share of simulated pictures that are as unlike the others as this one: below 0.01 it resembles none.
+    """
+
+    draws: Floats
+    estimate: Floats
+    p_value: float
+
+
+def pour(
+    sliding_friction: float = 0.6687,
+    rolling_friction: float = 0.05,
+    restitution: float = 0.5,
+    *,
+    height_m: float = 0.12,
+    seed: int = 1,
+) -> Poured:
+    """Pours 600 grains of 4 mm (couscous, unless other coefficients are given) from an outlet ``height_m`` above the cloth and looks at them.
+
+    The same seed gives the same bits. Raises :class:`~missing_physics.errors.ChapterError` for coefficients outside physics, and where too
+    few grains are left in the picture.
+    """
+    grain = [float(sliding_friction), float(rolling_friction), float(restitution)]
+    return Poured(*_engine.pour_grains(grain, float(height_m), seed))
+
+
+def infer(statistics: ArrayLike, *, count: int = 4000, seed: int = 1) -> Inferred:
+    """What the statistics (16,) of a picture of a heap poured from 12 cm tell of its grains, by the posterior that is shipped.
+
+    Raises :class:`~missing_physics.errors.ChapterError`.
+    """
+    draws, estimate, p_value = _engine.infer_grains(np.asarray(statistics, dtype=np.float64), count, seed)
+    return Inferred(draws, np.array(estimate), p_value)

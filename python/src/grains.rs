@@ -1,0 +1,71 @@
+//! Grains that are poured, and what a picture of them tells.
+
+use bayes_sim::points::Points;
+use granular_infer::posterior::GrainPosterior;
+use granular_infer::scene::{Grain, Scene};
+use granular_infer::summary::{COUNT, NAMES};
+use granular_infer::view::View;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::array::{array, column};
+use crate::errors::Failed;
+
+fn refused(error: impl std::fmt::Display) -> PyErr {
+    Failed::new("ChapterError", error.to_string()).into()
+}
+
+/// Places of the grains after a pour (grains, 3), m, and the 16 statistics of a depth picture of them.
+type Poured<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// Pours once: sliding friction, rolling friction and restitution of the grains, the outlet's height above the cloth (m).
+#[pyfunction]
+pub(crate) fn pour_grains<'py>(
+    py: Python<'py>,
+    grain: [f64; 3],
+    height_m: f64,
+    seed: u64,
+) -> PyResult<Poured<'py>> {
+    let grain = Grain { sliding_friction: grain[0], rolling_friction: grain[1], restitution: grain[2] };
+    let (scene, view) = (Scene::default(), View::default());
+    let (places, statistics) = py
+        .detach(|| {
+            let grains = scene.grains(&grain, height_m, seed).map_err(|error| error.to_string())?;
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let statistics =
+                view.features(&grains, &scene.rig, &mut rng).map_err(|error| error.to_string())?;
+            let places: Vec<Vec<f64>> = grains.positions_m.iter().map(|p| vec![p[0], p[1], p[2]]).collect();
+            Ok::<_, String>((places, statistics))
+        })
+        .map_err(refused)?;
+    Ok((PyArray2::from_vec2(py, &places)?, array(py, &statistics)))
+}
+
+/// Draws of a posterior (draws, 3), its mean, and how many pictures in one are as unlike the others.
+type Inferred<'py> = (Bound<'py, PyArray2<f64>>, [f64; 3], f64);
+
+/// What statistics of a picture tell of the grains, by the posterior that is shipped.
+#[pyfunction]
+pub(crate) fn infer_grains<'py>(
+    py: Python<'py>,
+    statistics: &Bound<'py, PyAny>,
+    count: usize,
+    seed: u64,
+) -> PyResult<Inferred<'py>> {
+    let values = column(statistics, "statistics")?;
+    let got = values.len();
+    let statistics: [f64; COUNT] =
+        values.try_into().map_err(|_| refused(format!("{got} statistics, expected {COUNT}")))?;
+    let inferred = GrainPosterior::shipped().map_err(refused)?.infer(&statistics).map_err(refused)?;
+    let drawn: Points = inferred.posterior.sample(count, &mut ChaCha8Rng::seed_from_u64(seed)).theta;
+    let draws: Vec<Vec<f64>> = drawn.rows().map(<[f64]>::to_vec).collect();
+    Ok((PyArray2::from_vec2(py, &draws)?, inferred.estimate().theta(), inferred.resemblance.p_value))
+}
+
+/// Names of the statistics, in their order.
+#[pyfunction]
+pub(crate) fn grain_statistics() -> Vec<&'static str> {
+    NAMES.to_vec()
+}
