@@ -47,7 +47,7 @@ def prove(
     kind: str | None = None,
     seed: int = 1,
 ) -> Proof:
-    """As :func:`missing_physics.prove`, a world a task: the same diagnoses and the same score, but for the seconds that they took.
+    """As :func:`missing_physics.prove`, a world a task: the same diagnoses, reports and score, to the byte (each outcome says the seconds that it took).
 
     Answers are sealed here first. Workers need no common file system: a world's files come back, and lie in ``folder`` as soon as it is
     done, so that the same call goes on where one was stopped, whoever was stopped.
