@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p examples --example 19_hardware` starts emulators of an ATI Net F/T sensor and a Universal Robots arm on 127.0.0.1 (a minute; `--small`: fewer poses). `--fake` takes a simulated rig, `--replay FOLDER` the tape of an earlier run, and
 //! `--device ati=192.0.2.1,ur=192.0.2.2` devices (`--send-program`: the robot's controller is given `ur::SCRIPT`; it is started on its panel
-//! otherwise). `--out FOLDER` says where tape and recording go, `--seed N` draws another bottle.
+//! otherwise). `--emulate` starts the emulators alone, says their addresses, and ends with its input. `--out FOLDER` says where tape and recording go, `--seed N` draws another bottle.
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use std::fs::File;
@@ -52,8 +52,18 @@ fn main() -> Outcome<()> {
         println!("rig: {words}");
         let mut devices = Devices::connect(&Addresses::parse(words)?, given("--send-program"))?;
         let told = taped(&mut devices, &plan, &out)?;
-        println!("{} records of the sensor were lost", devices.lost());
+        println!(
+            "{} records of the sensor came while the programme waited and were not kept",
+            devices.lost()
+        );
         return say(&told, &recording(&told, &out)?, None);
+    }
+    if given("--emulate") {
+        let loopback = Loopback::start(seed)?;
+        println!("--device {}", loopback.addresses());
+        std::io::copy(&mut std::io::stdin(), &mut std::io::sink())?;
+        println!("{}", words_of(&loopback.truth()));
+        return Ok(());
     }
     println!("rig: an ATI Net F/T by RDT and a Universal Robots arm by RTDE, emulated on 127.0.0.1");
     let loopback = Loopback::start(seed)?;
@@ -96,16 +106,20 @@ fn say(told: &Told, found: &Diagnosed, truth: Option<Truth>) -> Outcome<()> {
         );
     }
     let Some(truth) = truth else { return Ok(()) };
-    println!(
-        "truth: {:.1} mL, then {:.1} mL; a slip of {:.2} mm at {:.1} degrees",
-        1e6 * truth.before_m3,
-        1e6 * truth.now_m3,
-        1e3 * truth.slip_m,
-        truth.slip_tilt_rad.to_degrees()
-    );
+    println!("{}", words_of(&truth));
     let (by_m, ..) = slip.ok_or("the grip's slip is not what the diagnosis chose")?;
     if (by_m - truth.slip_m).abs() > 1e-3 {
         return Err("the slip that was found is off by more than a millimetre".into());
     }
     Ok(())
+}
+
+fn words_of(truth: &Truth) -> String {
+    format!(
+        "truth: {:.1} mL, then {:.1} mL; a slip of {:.2} mm at {:.1} degrees",
+        1e6 * truth.before_m3,
+        1e6 * truth.now_m3,
+        1e3 * truth.slip_m,
+        truth.slip_tilt_rad.to_degrees()
+    )
 }

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
 use hw_traits::{ErrorKind, Severity};
@@ -14,6 +14,8 @@ use crate::tally::Tally;
 
 /// What is written within this time is on its way to the disk: a program that is killed loses no more.
 const FLUSH: Duration = Duration::from_millis(250);
+/// Readings are taken so often.
+const BATCH: Duration = Duration::from_millis(20);
 /// Readings that may wait for the disk.
 const WAITING: usize = 1 << 16;
 
@@ -50,17 +52,21 @@ pub fn record(
     }
     drop(sender);
     let mut flushed = Instant::now();
-    loop {
-        match readings.recv_timeout(FLUSH) {
-            Ok((number, arrival_s, Ok(reading))) => {
-                store.put(number, arrival_s, &reading)?;
-                tallies[number].1.count(arrival_s, reading.t_s);
+    let mut ended = false;
+    while !ended {
+        // Woken for each reading, this thread would take as long as those that read.
+        std::thread::sleep(BATCH);
+        ended = loop {
+            match readings.try_recv() {
+                Ok((number, arrival_s, Ok(reading))) => {
+                    store.put(number, arrival_s, &reading)?;
+                    tallies[number].1.count(arrival_s, reading.t_s);
+                }
+                Ok((number, _, Err(error))) => tallies[number].1.fail(error),
+                Err(TryRecvError::Empty) => break false,
+                Err(TryRecvError::Disconnected) => break true,
             }
-            Ok((number, _, Err(error))) => tallies[number].1.fail(error),
-            Err(RecvTimeoutError::Timeout) => {}
-            // All have ended.
-            Err(RecvTimeoutError::Disconnected) => break,
-        }
+        };
         if flushed.elapsed() >= FLUSH {
             flushed = Instant::now();
             store.flush()?;

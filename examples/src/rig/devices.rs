@@ -75,6 +75,13 @@ impl Addresses {
     }
 }
 
+/// As [`Addresses::parse`] reads them.
+impl std::fmt::Display for Addresses {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "ati={},ur={}", self.ati, self.ur)
+    }
+}
+
 /// A sensor at the wrist of an arm that turns its tool in its place, and this computer's clock.
 pub struct Devices {
     wrist: UrWrist,
