@@ -103,6 +103,27 @@ def test_what_a_simulator_does_wrong_is_said():
     wrong(lambda p, x: {"charge_v": np.zeros((1, 60))}, errors.SimulatorError, "1 rows of charge_v, expected", batched=True)
 
 
+def test_a_model_without_mechanisms_or_parameters_is_judged():
+    alone = mp.Model(lambda p, x: {"charge_v": leak({**p, "offset_v": 0.0}, x)["charge_v"]}, parameters=[RATE])
+    assert mp.diagnose(alone, decays()).verdict == "adequate"
+    fixed = mp.Model(lambda p, x: {"charge_v": leak({"rate_per_s": 0.4, "offset_v": 0.0}, x)["charge_v"]})
+    assert mp.diagnose(fixed, decays()).verdict == "adequate"
+    # What a sensor does is tried behind any simulator.
+    assert mp.diagnose(fixed, decays(offset=0.3)).chosen == ["sensor-offset"]
+
+
+def test_a_run_begins_where_it_was_measured():
+    def fall(p, x):
+        return {"z_m": p["z_m_at_start"] - 0.5 * p["g_m_s2"] * x["t_s"] ** 2}
+
+    t_s, rng = np.linspace(0, 1, 40), np.random.default_rng(4)
+    runs = [{"t_s": t_s, "z_m": height - 4.9 * t_s**2 + 1e-3 * rng.standard_normal(40)} for height in (900.0, 20.0)]
+    gravity = mp.Parameter("g_m_s2", start=9.0, scale=1.0)
+    for start in ("measured", [900.0, 20.0]):
+        begun = mp.Parameter("z_m_at_start", start=start, scale=0.1, per_run=True)
+        assert mp.diagnose(mp.Model(fall, parameters=[gravity, begun]), runs).verdict == "adequate"
+
+
 def test_no_prediction_at_some_parameters_is_no_failure():
     def careful(parameters, inputs):
         if parameters["rate_per_s"] > 0.6:

@@ -181,11 +181,12 @@ impl Repaired {
             let mut mechanisms = spec.mechanisms.iter().filter(|m| self.mechanisms.contains(&m.id) == on);
             mechanisms.any(|m| m.parameters.contains(&parameter))
         };
-        let value = |(&index, found): (&usize, &Shared)| {
-            let off = has(false, index) && !has(true, index);
+        let value = |(slot, (&index, found)): (usize, (&usize, &Shared))| {
+            // What was freed beside the mechanisms that are on (a companion) was found as well.
+            let off = has(false, index) && !has(true, index) && !self.fitted.contains(&slot);
             if off { spec.parameters[index].start } else { found.value }
         };
-        problem.shared.index.iter().zip(&self.parameters).map(value).collect()
+        problem.shared.index.iter().zip(&self.parameters).enumerate().map(value).collect()
     }
 
     fn predict_run(

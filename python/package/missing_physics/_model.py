@@ -135,9 +135,11 @@ class Model:
             "input": [self._quantity(name) for name in inputs],
             "channel": [self._quantity(name) for name in channels],
             "simulator": {"step": float(self.step)},
-            "parameter": [parameter._header("start") for parameter in self.parameters],
-            "mechanism": [mechanism._header() for mechanism in self.mechanisms],
         }
+        if self.parameters:
+            header["parameter"] = [parameter._header("start") for parameter in self.parameters]
+        if self.mechanisms:
+            header["mechanism"] = [mechanism._header() for mechanism in self.mechanisms]
         if self.noise:
             header["noise"] = {name: float(sigma) for name, sigma in self.noise.items()}
         if self.baseline:
