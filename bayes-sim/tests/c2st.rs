@@ -63,8 +63,8 @@ fn agrees_with_scikit_learn() {
 }
 
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_agrees_with_scikit_learn() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_agrees_with_scikit_learn() {
     agrees_with_scikit_learn_on(&common::slcp(), 3, &["same", "shifted", "third", "unpaired"]);
 }
 

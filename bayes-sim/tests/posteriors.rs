@@ -52,8 +52,8 @@ fn long_every_density_does_as_well_as_published() {
 }
 
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_a_thousand_simulations_do_as_well_as_published_in_ten_dimensions() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_a_thousand_simulations_do_as_well_as_published_in_ten_dimensions() {
     // The others take minutes in ten dimensions: `06_posteriors`.
     as_well_as_published(&common::gaussian_linear(), 0.6945, 1, &["mdn"]);
 }

@@ -158,6 +158,15 @@ impl<M: Machine> DeadMan<M> {
         Ok((state, settled))
     }
 
+    /// Reads, and says whether the last command has been carried out.
+    ///
+    /// # Errors
+    /// As [`DeadMan::look`], and [`DriverError::Stopped`] where it never will be: the rule stopped the device on its way.
+    pub fn settled(&mut self) -> Result<bool, DriverError> {
+        let (_, settled) = self.look()?;
+        self.stopped().map_or(Ok(settled), |why| Err(DriverError::Stopped { why }))
+    }
+
     /// Commands.
     ///
     /// # Errors

@@ -37,7 +37,8 @@ fn the_contract_holds_in_both_versions_and_in_pieces() {
     for (version, pieces) in [(Some(1), 0), (Some(2), 0), (None, 7)] {
         let emulator = UrEmulator::start(BEGIN).unwrap();
         emulator.fail(UrFaults { pieces, text_every: 5, ..UrFaults::default() });
-        let mut arm = UrArm::connect(emulator.address(), UrSettings { version, ..SETTINGS }).unwrap();
+        let mut arm =
+            UrArm::connect(emulator.address(), UrSettings { version, patience_s: 2.0, ..SETTINGS }).unwrap();
         assert_eq!(arm.version(), version.or(Some(2)));
         let turned = Pose { rotation_xyzw: [0.0, 0.0, 0.2f64.sin(), 0.2f64.cos()], ..pose(0.2) };
         conformance::arm(&mut arm, &[pose(0.4), turned, pose(0.3)], 0.3, 1e-6, sleep).unwrap();
@@ -96,6 +97,7 @@ fn a_time_out_stops_and_wants_to_be_cleared() {
         "{there:?}"
     );
     assert!(arm.stopped().is_some());
+    assert_eq!(arm.settled().unwrap_err().kind(), ErrorKind::Stopped);
     arm.pose().unwrap();
     let error = arm.move_to(pose(0.4), 1.0).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Stopped, "{error}");

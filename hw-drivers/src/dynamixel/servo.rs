@@ -373,6 +373,6 @@ impl Rotary for Servo {
     }
 
     fn settled(&mut self) -> Result<bool, DriverError> {
-        self.machine.look().map(|(_, settled)| settled)
+        self.machine.settled()
     }
 }

@@ -293,6 +293,6 @@ impl Gripper for Robotiq {
     }
 
     fn settled(&mut self) -> Result<bool, DriverError> {
-        self.machine.look().map(|(_, settled)| settled)
+        self.machine.settled()
     }
 }

@@ -394,7 +394,7 @@ impl Arm for UrArm {
     }
 
     fn settled(&mut self) -> Result<bool, DriverError> {
-        self.machine.look().map(|(_, settled)| settled)
+        self.machine.settled()
     }
 }
 

@@ -166,14 +166,14 @@ fn shared_practice_curves() {
 }
 
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_practice_waves() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_practice_waves() {
     shared_practice("slosh");
 }
 
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_practice_bounces() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_practice_bounces() {
     shared_practice("bounce");
 }
 
@@ -192,8 +192,8 @@ fn shared_long_practice_machines() {
 /// Where the response is half the learned one (c05), the right mechanism is closest, its factor is right, and it is not said to
 /// explain: something of the width is left.
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_practice_doughs() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_practice_doughs() {
     shared_practice("dough-roll");
 }
 
@@ -284,8 +284,8 @@ fn the_author_s_times_of_the_same_ball() {
 /// Simulated recordings with an effect of the list and a smaller one beside it that is not: the former is named, the latter is said. With
 /// an effect that is not on the list, of which the best of the list takes away four fifths, nothing is named.
 #[test]
-#[ignore = "needs ../shared"]
-fn shared_leftovers_are_said_beside_the_main_cause() {
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_leftovers_are_said_beside_the_main_cause() {
     let (mut leftovers, mut imitated, mut named) = (0, 0, Vec::new());
     for domain in ["indentation", "liquid-tilt", "slosh", "trajectory", "dough-roll"] {
         for entry in std::fs::read_dir(shared("practice/leftover").join(domain)).unwrap() {
