@@ -264,26 +264,53 @@ fn a_simulation_that_is_right_is_left_alone() {
     assert_eq!(answer["verdict"], "adequate", "{}", answer["p_value"]);
 }
 
-/// A damped swing with noise of 2 mrad beside what a simulator says of it, which a sensor then reads.
-fn swing_read(read: impl Fn(f64) -> f64) -> Value {
-    let folder = tempfile::tempdir().unwrap();
-    missing_physics_cli::commands::new("custom", &folder.path().join("swing")).unwrap();
+/// Writes a damped swing of 0.3 rad and more with noise of 2 mrad, as a sensor reads it, beside what a simulator says of it.
+fn swing(folder: &Path, larger: f64, read: impl Fn(f64) -> f64) {
+    missing_physics_cli::commands::new("custom", folder).unwrap();
     let mut state = 2024u64;
     let mut csv = String::from("run,t_s,angle_rad,sim_angle_rad\n");
     for run in 0..3 {
         for row in 0..150 {
             let t = 0.02 * f64::from(row);
-            let angle = (0.3 + 0.1 * f64::from(run)) * (5.0 * t + f64::from(run)).cos() * (-0.1 * t).exp();
+            let swing = (0.3 + 0.1 * f64::from(run)) * (5.0 * t + f64::from(run)).cos() * (-0.1 * t).exp();
             let mut error = -6.0;
             for _ in 0..12 {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 error += (state >> 33) as f64 / (1u64 << 31) as f64;
             }
+            let angle = larger * swing;
             csv.push_str(&format!("{run},{t:.2},{:.6},{angle:.8}\n", read(angle) + 0.002 * error));
         }
     }
-    std::fs::write(folder.path().join("swing/data.csv"), csv).unwrap();
-    diagnose(&folder.path().join("swing")).unwrap()
+    std::fs::write(folder.join("data.csv"), csv).unwrap();
+}
+
+/// What the tool says of a swing as a sensor reads it.
+fn swing_read(read: impl Fn(f64) -> f64) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("swing");
+    swing(&recording, 1.0, read);
+    diagnose(&recording).unwrap()
+}
+
+/// A sensor's bounds lie beyond all readings where it has none, and so they do in what is predicted of wider swings.
+#[test]
+fn a_sensor_that_was_not_at_its_bounds_has_none_in_a_prediction() {
+    let folder = tempfile::tempdir().unwrap();
+    let [learned, wider, model] = ["learned", "wider", "model.json"].map(|name| folder.path().join(name));
+    swing(&learned, 1.0, |angle| 1.05 * angle);
+    swing(&wider, 3.0, |angle| 1.05 * angle);
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output = Command::new(tool).arg("diagnose").arg(&learned).arg("--write-model").arg(&model).output();
+    assert!(output.unwrap().status.success());
+    let output = Command::new(tool).arg("predict").arg(&model).arg(&wider).output().unwrap();
+    let table = String::from_utf8(output.stdout).unwrap();
+    let mut lines = table.lines().map(|line| line.split(','));
+    let angle = lines.next().unwrap().position(|name| name == "angle_rad").unwrap();
+    let predicted = lines.map(|mut row| row.nth(angle).unwrap().parse::<f64>().unwrap());
+    // Three times half a radian, read 5 % too large.
+    let widest = predicted.fold(0.0, |widest: f64, angle| widest.max(angle.abs()));
+    assert!(widest > 1.4, "{widest} rad");
 }
 
 /// What a sensor does is named without a word, where the data are clear; a little of it, which much else could be, is not, nor is a law

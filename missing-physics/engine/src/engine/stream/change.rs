@@ -47,12 +47,12 @@ pub(super) fn directions(problem: &Problem<'_>, wide: &Selection, shared: &[f64]
         }
     }
     for (m, mechanism) in spec.mechanisms.iter().enumerate() {
-        let own = problem.select(&[m], &[]);
+        let with = problem.select(&[m], &[]);
         // What each run has of its own says nothing of a change.
-        if own.added_nuisance.contains(&true) {
+        if with.added_nuisance.contains(&true) {
             continue;
         }
-        let added = own.shared.iter().zip(&own.added_shared).filter(|(_, added)| **added);
+        let added = with.shared.iter().zip(&with.added_shared).filter(|(_, added)| **added);
         let columns: Vec<usize> = added.filter_map(|(slot, _)| place(*slot)).collect();
         let what = What::Mechanism { id: mechanism.id.clone(), name: mechanism.name.clone() };
         all.push((what, Direction { columns }));

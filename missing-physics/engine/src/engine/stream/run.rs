@@ -31,12 +31,12 @@ pub(super) struct Setting<'a> {
 impl<'a> Setting<'a> {
     /// The setting, and what may change.
     pub(super) fn new(problem: Problem<'a>, fit: &Fit) -> (Self, Vec<What>, Vec<Direction>) {
-        let own = problem.select(&[], &[]);
+        let without = problem.select(&[], &[]);
         let all: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
         let freed = problem.select(&all, &[]);
-        let wide = Selection { nuisance: own.nuisance, added_nuisance: own.added_nuisance, ..freed };
+        let wide = Selection { nuisance: without.nuisance, added_nuisance: without.added_nuisance, ..freed };
         let baseline =
-            own.shared.iter().filter_map(|slot| wide.shared.iter().position(|s| s == slot)).collect();
+            without.shared.iter().filter_map(|slot| wide.shared.iter().position(|s| s == slot)).collect();
         let (names, found) = directions(&problem, &wide, &fit.shared).into_iter().unzip();
         let (shared, nuisance, noise) = (fit.shared.clone(), fit.nuisance.clone(), fit.noise.clone());
         (Self { problem, wide, baseline, shared, nuisance, noise }, names, found)
@@ -54,7 +54,7 @@ impl<'a> Setting<'a> {
         self.of(&self.problem, run, &self.nuisance[run])
     }
 
-    /// A run that has come: its own parameters are fitted to it alone.
+    /// A run that has come: its nuisance parameters are fitted to it alone.
     pub(super) fn gram(&self, run: &Run) -> Result<RunGram, DiagnoseError> {
         let mut recording = self.problem.recording.clone();
         recording.runs = vec![run.clone()];
@@ -62,22 +62,22 @@ impl<'a> Setting<'a> {
         let problem = self.problem.with(recording);
         let alone = Selection { shared: Vec::new(), added_shared: Vec::new(), ..self.wide.clone() };
         let fit = solve(&problem, &alone, &self.noise, &self.shared, &problem.nuisance_start)?;
-        let own = fit.nuisance.first().map_or(&[][..], Vec::as_slice);
-        Ok(self.of(&problem, 0, own)?)
+        let nuisance = fit.nuisance.first().map_or(&[][..], Vec::as_slice);
+        Ok(self.of(&problem, 0, nuisance)?)
     }
 
     fn of(&self, problem: &Problem<'_>, run: usize, nuisance: &[f64]) -> Result<RunGram, PredictError> {
         let mut columns = whitened_columns(problem, &self.wide, &self.noise, run, &self.shared, nuisance)?;
         let residual = columns.pop().unwrap_or_default();
-        let own = self.wide.nuisance.len();
-        let of_wide = columns.split_off(own);
+        let nuisances = self.wide.nuisance.len();
+        let of_wide = columns.split_off(nuisances);
         let mut all = columns;
         all.extend(self.baseline.iter().map(|k| of_wide[*k].clone()));
         all.extend(of_wide);
         all.extend(self.curves(problem, run));
         let rows = residual.len() as f64;
         all.push(residual);
-        let (gram, rank) = eliminate(&gram(&all), own);
+        let (gram, rank) = eliminate(&gram(&all), nuisances);
         Ok(RunGram { gram, freedom: rows - rank as f64 })
     }
 
@@ -104,20 +104,20 @@ impl<'a> Setting<'a> {
     }
 }
 
-/// What is left of a Gram matrix once its first `own` columns have been projected away, and their rank.
-fn eliminate(gram: &DMatrix<f64>, own: usize) -> (DMatrix<f64>, usize) {
-    let rest = gram.nrows() - own;
-    let factor = SemiCholesky::new(gram.view((0, 0), (own, own)).into_owned(), rank::DETERMINED);
+/// What is left of a Gram matrix once its `first` leading columns have been projected away, and their rank.
+fn eliminate(gram: &DMatrix<f64>, first: usize) -> (DMatrix<f64>, usize) {
+    let rest = gram.nrows() - first;
+    let factor = SemiCholesky::new(gram.view((0, 0), (first, first)).into_owned(), rank::DETERMINED);
     let mut half = vec![Vec::new(); rest];
     for (j, column) in half.iter_mut().enumerate() {
-        *column = (0..own).map(|i| gram[(i, own + j)]).collect::<Vec<f64>>();
+        *column = (0..first).map(|i| gram[(i, first + j)]).collect::<Vec<f64>>();
         factor.forward(column);
     }
     let left = DMatrix::from_fn(rest, rest, |i, j| {
         let explained: f64 = half[i].iter().zip(&half[j]).map(|(a, b)| a * b).sum();
-        let value = gram[(own + i, own + j)] - explained;
-        // A column that the run's own parameters make is left with rounding alone.
-        if i == j && value <= 1e-10 * gram[(own + i, own + i)] { 0.0 } else { value }
+        let value = gram[(first + i, first + j)] - explained;
+        // A column that the run's nuisance parameters make is left with rounding alone.
+        if i == j && value <= 1e-10 * gram[(first + i, first + i)] { 0.0 } else { value }
     });
     (left, factor.rank())
 }
