@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::column;
-use crate::errors::Failed;
+use crate::errors::refused;
 
 /// Fits one Young's modulus to curves; `shape` is `sphere` or `cylinder` with its radius in m, or `cone` with its angle in rad.
 #[pyfunction]
@@ -17,7 +17,6 @@ pub(crate) fn fit_contact<'py>(
     size: f64,
     poisson_ratio: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let refused = |why: String| PyErr::from(Failed::new("ChapterError", why));
     let indenter = match shape {
         "sphere" => Indenter::Sphere { radius_m: size },
         "cylinder" => Indenter::Cylinder { radius_m: size },
@@ -37,7 +36,7 @@ pub(crate) fn fit_contact<'py>(
         .map(|(depth, force)| Curve { indentation_m: depth, force_n: force, sigma_n: None })
         .collect();
     let fit = Fit::new(indenter, poisson_ratio);
-    let report = py.detach(|| fit.run(&curves, &mut Workspace::new())).map_err(|e| refused(e.to_string()))?;
+    let report = py.detach(|| fit.run(&curves, &mut Workspace::new())).map_err(refused)?;
     let said = PyDict::new(py);
     said.set_item("modulus_pa", report.modulus_pa)?;
     said.set_item("modulus_interval_pa", report.modulus_interval_pa)?;

@@ -20,6 +20,11 @@ impl Failed {
     }
 }
 
+/// What a chapter's crate refuses, as `ChapterError`.
+pub(crate) fn refused(error: impl std::fmt::Display) -> PyErr {
+    Failed::new("ChapterError", error.to_string()).into()
+}
+
 impl From<ReadError> for Failed {
     fn from(error: ReadError) -> Self {
         Self::new("RecordingError", error.to_string())

@@ -11,11 +11,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::array::{array, column};
-use crate::errors::Failed;
-
-fn refused(error: impl std::fmt::Display) -> PyErr {
-    Failed::new("ChapterError", error.to_string()).into()
-}
+use crate::errors::refused;
 
 /// Places of the grains after a pour (grains, 3), m, and the 16 statistics of a depth picture of them.
 type Poured<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::rows;
-use crate::errors::Failed;
+use crate::errors::refused;
 
 /// The impacts in a sound, rows of samples (channels, samples) at a rate (Hz): when each was, and where on the table, where the places of
 /// the microphones (microphones, 3), m, are given; and sounds that were none, with why.
@@ -26,7 +26,7 @@ pub(crate) fn hear_impacts<'py>(
             Some(places) => hear(&sound, places, speed_of_sound_m_s, &settings),
             None => hear_times(&sound, &settings),
         })
-        .map_err(|error| PyErr::from(Failed::new("ChapterError", error.to_string())))?;
+        .map_err(refused)?;
     let impacts = heard.impacts.into_iter().map(|impact| {
         let place = impact.location.map(|l| ((l.x_m, l.y_m), l.covariance_m2));
         (impact.t_s, impact.t_sigma_s, place, impact.arrivals_s, impact.amplitude_sigmas)

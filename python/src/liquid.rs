@@ -10,16 +10,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{array, column};
-use crate::errors::Failed;
+use crate::errors::refused;
 
 /// Outer radius, outer length and wall, m.
 type Sizes = (f64, f64, f64);
 /// Masses of container and gripper (kg), heights of the grasp and of the shell's centre (m), gravity (m/s^2).
 type Held = (f64, f64, f64, f64, f64);
-
-fn refused(error: impl std::fmt::Display) -> PyErr {
-    Failed::new("ChapterError", error.to_string()).into()
-}
 
 fn cylinder((radius_m, length_m, wall_m): Sizes) -> PyResult<Cylinder> {
     Cylinder::new(radius_m, length_m, wall_m).map_err(refused)

@@ -45,6 +45,17 @@ pub struct Setup {
     pub channel: Channel,
 }
 
+/// A glass of water whose torque is read, for tests.
+#[cfg(test)]
+pub(super) const GLASS: Setup = Setup {
+    radius_m: 0.035,
+    length_m: None,
+    volume_m3: 2e-4,
+    density_kg_m3: 997.0,
+    gravity_m_s2: 9.81,
+    channel: Channel::Torque,
+};
+
 /// The cylinder with a share of the recorded volume in it.
 pub(super) fn cylinder(setup: &Setup, share: f64) -> Result<UprightCylinder, SloshError> {
     let depth = share * setup.volume_m3 / (std::f64::consts::PI * setup.radius_m * setup.radius_m);

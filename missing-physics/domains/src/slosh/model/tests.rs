@@ -3,25 +3,18 @@
 
 use missing_physics::fit::finite_differences;
 
+use super::super::setup::GLASS;
 use super::*;
 
 /// Derivatives, in closed form or of a part of the reading, are those of all of it: everything off, and everything on, so that the first
 /// mode is no longer proportional to its start.
 #[test]
 fn derivatives_agree_with_differences() {
-    let setup = Setup {
-        radius_m: 0.035,
-        length_m: None,
-        volume_m3: 2e-4,
-        density_kg_m3: 997.0,
-        gravity_m_s2: 9.81,
-        channel: Channel::Torque,
-    };
     let times: Vec<f64> = (0..60).map(|i| 0.02 * f64::from(i)).collect();
     let rows = times.len();
     let wave: Vec<f64> = times.iter().map(|t| 1e-3 * (-0.1 * t).exp() * (22.0 * t).cos()).collect();
     let run = Run { label: "1".into(), inputs: vec![times], outputs: vec![wave], kind: 1 };
-    let model = SloshModel::new(setup, std::slice::from_ref(&run)).unwrap();
+    let model = SloshModel::new(GLASS, std::slice::from_ref(&run)).unwrap();
     let of = |scope| -> Vec<&missing_physics::model::Parameter> {
         model.spec().parameters.iter().filter(|p| p.scope == scope).collect()
     };

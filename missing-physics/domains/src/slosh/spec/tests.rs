@@ -2,22 +2,14 @@
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 use missing_physics::model::Scope;
 
-use super::super::setup::Channel;
+use super::super::setup::GLASS;
 use super::*;
 
 /// A first-order lag shows a wave of omega at 1 / sqrt(1 + (omega tau)^2) of its height, and the reading at which it sticks likewise.
 #[test]
 fn friction_and_eddies_are_those_of_the_wave_and_not_of_a_reading_that_lags() {
-    let setup = Setup {
-        radius_m: 0.035,
-        length_m: None,
-        volume_m3: 2e-4,
-        density_kg_m3: 997.0,
-        gravity_m_s2: 9.81,
-        channel: Channel::Torque,
-    };
     let cylinder = UprightCylinder::new(0.035, 0.05, 9.81).unwrap();
-    let (spec, p) = build(&setup, &cylinder, 1e-3, 1e-6);
+    let (spec, p) = build(&GLASS, &cylinder, 1e-3, 1e-6);
     let mut shared: Vec<f64> =
         spec.parameters.iter().filter(|q| q.scope == Scope::Shared).map(|q| q.start).collect();
     (shared[p.friction.slot], shared[p.quadratic.slot]) = (2e-5, 30.0);
