@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 fn prove(folder: &Path, worlds: &str, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_missing-physics"));
-    command.args(["prove", "--domain", "trajectory", "--worlds", worlds, "--out"]).arg(folder).args(more);
+    command.args(["prove", "--domain", "indentation", "--worlds", worlds, "--out"]).arg(folder).args(more);
     command
 }
 
@@ -27,17 +27,17 @@ fn a_proof_that_was_killed_goes_on_to_the_same_score() {
     let mut child = prove(&cut, "3", &["--threads", "1"]).spawn().unwrap();
     let begin = Instant::now();
     // Killed as soon as one world is done.
-    while !cut.join("trajectory/0000/outcome.json").exists() && begin.elapsed() < Duration::from_secs(120) {
+    while !cut.join("indentation/0000/outcome.json").exists() && begin.elapsed() < Duration::from_secs(120) {
         std::thread::sleep(Duration::from_millis(20));
     }
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(!cut.join("score.json").exists() && !cut.join("keys.jsonl").exists());
     // A file that the kill left half written is no outcome.
-    std::fs::create_dir_all(cut.join("trajectory/0002")).unwrap();
-    std::fs::write(cut.join("trajectory/0002/outcome.json"), "{\"verdict\": \"adeq").unwrap();
+    std::fs::create_dir_all(cut.join("indentation/0002")).unwrap();
+    std::fs::write(cut.join("indentation/0002/outcome.json"), "{\"verdict\": \"adeq").unwrap();
     ran(prove(&cut, "3", &["--threads", "1"]));
-    for file in ["score.json", "keys.jsonl", "plan.json", "trajectory/0001/answer.json"] {
+    for file in ["score.json", "keys.jsonl", "plan.json", "indentation/0001/answer.json"] {
         let read = |proof: &Path| std::fs::read_to_string(proof.join(file)).unwrap();
         assert_eq!(read(&whole), read(&cut), "{file}");
     }
