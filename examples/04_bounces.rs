@@ -1,6 +1,7 @@
 //! What the tool says of drops in which something is hidden, and how often it doubts drops in which nothing is.
 //!
-//! `cargo run --release -p examples --example 04_bounces` (60 null recordings of each kind and 20 of each effect; `--small`: one of every third kind)
+//! `cargo run --release -p examples --example 04_bounces` (60 null recordings of each kind and 20 of each effect;
+//! `--small`: one of every third kind)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 use missing_physics::diagnosis::{Diagnosis, Verdict};

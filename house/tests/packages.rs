@@ -85,7 +85,7 @@ fn published_crates_need_published_ones() {
     assert!(seen > 0);
 }
 
-/// The gate lints every crate with its default features alone, and those that have any without.
+/// `.ci/run --long` lints every crate with its default features alone, and those that have any without.
 #[test]
 fn the_gate_lints_crates_without_their_default_features() {
     let gate = read_to_string(root().join(".ci/run")).unwrap();
