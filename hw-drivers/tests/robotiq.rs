@@ -26,16 +26,22 @@ fn connect(emulator: &RobotiqEmulator, protocol: P) -> Robotiq {
 
 #[test]
 fn the_contract_holds_on_each_line_whole_and_in_pieces() {
-    for protocol in ALL {
-        for in_pieces in [false, true] {
-            let emulator = RobotiqEmulator::start(protocol).unwrap();
-            emulator.fail(RobotiqFaults { in_pieces, ..Default::default() });
-            let mut gripper = connect(&emulator, protocol);
-            let sleep = |_: &mut Robotiq, s| std::thread::sleep(Duration::from_secs_f64(s));
-            // A count is 0.37 mm.
-            conformance::gripper(&mut gripper, &[0.04, 0.0, 0.085], 0.15, 3.8e-4, sleep).unwrap();
+    let holds = |protocol, in_pieces| {
+        let emulator = RobotiqEmulator::start(protocol).unwrap();
+        emulator.fail(RobotiqFaults { in_pieces, ..Default::default() });
+        let mut gripper = connect(&emulator, protocol);
+        let sleep = |_: &mut Robotiq, s| std::thread::sleep(Duration::from_secs_f64(s));
+        // A count is 0.37 mm.
+        conformance::gripper(&mut gripper, &[0.04, 0.0, 0.085], 0.15, 3.8e-4, sleep).unwrap();
+    };
+    // Fingers take their time: all of them at once.
+    std::thread::scope(|scope| {
+        for protocol in ALL {
+            for in_pieces in [false, true] {
+                scope.spawn(move || holds(protocol, in_pieces));
+            }
         }
-    }
+    });
 }
 
 #[test]

@@ -38,20 +38,21 @@ fn dot_four(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
 }
 
 /// Dot products of columns with each other; those that are zero all through cost nothing.
-pub(crate) fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
+pub(crate) fn gram<C: AsRef<[f64]>>(columns: &[C]) -> DMatrix<f64> {
+    let columns: Vec<&[f64]> = columns.iter().map(AsRef::as_ref).collect();
     let n = columns.len();
     let mut gram = DMatrix::zeros(n, n);
     let full: Vec<usize> = (0..n).filter(|&i| columns[i].iter().any(|v| *v != 0.0)).collect();
     for (k, &i) in full.iter().enumerate() {
         let before = &full[..=k];
         for four in before.chunks_exact(4) {
-            let dots = dot_four(&columns[i], [0, 1, 2, 3].map(|j| &columns[four[j]][..]));
+            let dots = dot_four(columns[i], [0, 1, 2, 3].map(|j| columns[four[j]]));
             for (&j, dot) in four.iter().zip(dots) {
                 (gram[(i, j)], gram[(j, i)]) = (dot, dot);
             }
         }
         for &j in before.chunks_exact(4).remainder() {
-            let dot = dot(&columns[i], &columns[j]);
+            let dot = dot(columns[i], columns[j]);
             (gram[(i, j)], gram[(j, i)]) = (dot, dot);
         }
     }

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use crate::data::{Recording, Run};
 use crate::model::{Model, Scope, Spec};
 use crate::noise::family::Family;
@@ -158,6 +160,19 @@ impl<'a> Problem<'a> {
 
     pub(crate) fn spec(&self) -> &Spec {
         self.model.spec()
+    }
+
+    /// What is asked of each run, by run: runs at the same time where that takes long enough to be worth it.
+    pub(crate) fn by_run<T: Send, E: Send>(
+        &self,
+        of_run: impl Fn(usize) -> Result<T, E> + Sync + Send,
+    ) -> Result<Vec<T>, E> {
+        let runs = 0..self.rows.len();
+        if self.knows_many() && runs.len() > 1 {
+            runs.into_par_iter().map(of_run).collect()
+        } else {
+            runs.map(of_run).collect()
+        }
     }
 
     /// Whether the model knows so many mechanisms that what is tried for them has to be cheap.

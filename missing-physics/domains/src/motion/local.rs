@@ -83,6 +83,26 @@ impl MotionModel {
         .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
         Ok(all)
     }
+
+    /// What an amount at each row, added to a state's derivative, does to the outputs, channel after channel.
+    fn deviation(&self, run: &Run, linear: &[Linear], acted_on: usize, amounts: &[f64]) -> Vec<f64> {
+        let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
+        let n = run.len();
+        let mut out = vec![0.0; outputs * n];
+        let Some(first) = amounts.iter().position(|a| *a != 0.0) else { return out };
+        let mut deviation = DVector::zeros(states);
+        for row in first.max(1)..linear.len() {
+            let half_s = 0.5 * (run.inputs[0][row] - run.inputs[0][row - 1]);
+            for k in [row - 1, row] {
+                moved(&mut deviation, &linear[k].rates, (acted_on, amounts[k]), half_s);
+            }
+            let read = &linear[row].outputs * &deviation;
+            for (c, value) in read.iter().enumerate() {
+                out[c * n + row] = *value;
+            }
+        }
+        out
+    }
 }
 
 /// How a deviation moves on over a time under constant rates of change of it.
@@ -127,33 +147,35 @@ impl LocalCauses for MotionModel {
 
     fn response(
         &self,
-        (_, component): (usize, usize),
+        of: (usize, usize),
         runs: &[Run],
         shared: &[f64],
         nuisance: &[Vec<f64>],
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError> {
+        let mut all = self.responses(of, runs, shared, nuisance, &[amounts.to_vec()])?;
+        Ok(all.pop().unwrap_or_default())
+    }
+
+    fn responses(
+        &self,
+        (_, component): (usize, usize),
+        runs: &[Run],
+        shared: &[f64],
+        nuisance: &[Vec<f64>],
+        amounts: &[Vec<Vec<f64>>],
+    ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
         let acted_on = self.acted_on()[component].1;
-        let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
-        let of_run = |((run, nuisance), amounts): ((&Run, &Vec<f64>), &Vec<f64>)| {
-            let n = run.len();
-            let mut out = vec![0.0; outputs * n];
-            let Some(first) = amounts.iter().position(|a| *a != 0.0) else { return Ok(out) };
-            let linear = self.linear(run, shared, nuisance)?;
-            let mut deviation = DVector::zeros(states);
-            for row in first.max(1)..linear.len() {
-                let half_s = 0.5 * (run.inputs[0][row] - run.inputs[0][row - 1]);
-                for k in [row - 1, row] {
-                    moved(&mut deviation, &linear[k].rates, (acted_on, amounts[k]), half_s);
-                }
-                let read = &linear[row].outputs * &deviation;
-                for (c, value) in read.iter().enumerate() {
-                    out[c * n + row] = *value;
-                }
+        let mut all = vec![Vec::with_capacity(runs.len()); amounts.len()];
+        for (k, (run, nuisance)) in runs.iter().zip(nuisance).enumerate() {
+            let of_run: Vec<&Vec<f64>> = amounts.iter().map(|choice| &choice[k]).collect();
+            let acts = of_run.iter().any(|amounts| amounts.iter().any(|a| *a != 0.0));
+            let linear = if acts { self.linear(run, shared, nuisance)? } else { Vec::new() };
+            for (all, amounts) in all.iter_mut().zip(of_run) {
+                all.push(self.deviation(run, &linear, acted_on, amounts));
             }
-            Ok(out)
-        };
-        runs.iter().zip(nuisance).zip(amounts).map(of_run).collect()
+        }
+        Ok(all)
     }
 
     fn states(&self) -> Vec<Quantity> {

@@ -485,8 +485,12 @@ impl Model for MotionModel {
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
         let of_run = nuisance_free.iter().enumerate().map(|(k, &s)| (shared_free.len() + k, false, s));
-        let free: Vec<(usize, bool, usize)> =
-            shared_free.iter().enumerate().map(|(k, &s)| (k, true, s)).chain(of_run).collect();
+        // What is of another run than this window's has no effect here.
+        let here =
+            |slot: usize| !matches!(self.roles[slot], Role::OfRun(_, of) if of != windows::of_run(run));
+        let shared_free = shared_free.iter().enumerate().filter(|(_, slot)| here(**slot));
+        let free: Vec<(usize, bool, usize)> = shared_free.map(|(k, &s)| (k, true, s)).chain(of_run).collect();
+        jacobian.fill(0.0);
         if free.is_empty() {
             return self.predict(run, shared, nuisance, out);
         }

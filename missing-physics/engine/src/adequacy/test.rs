@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::adequacy::linearised::{Linearised, Reading};
+use crate::adequacy::linearised::Linearised;
 use crate::adequacy::null::draw;
 use crate::adequacy::omnibus::{omnibus, omnibus_tests};
 use crate::adequacy::tail::Tail;
@@ -113,11 +113,11 @@ fn chosen_shapes(
     observed: &[Vec<Vec<f64>>],
     world: impl Fn(u64) -> Vec<Vec<Vec<f64>>> + Sync,
 ) -> Vec<usize> {
-    let mut readings: Vec<Reading> =
-        (0..PILOTS).into_par_iter().map(|k| linearised.read(&world(k))).collect();
-    readings.push(linearised.read(observed));
+    let mut noises: Vec<Vec<(usize, f64)>> =
+        (0..PILOTS).into_par_iter().map(|k| linearised.noise(&world(k))).collect();
+    noises.push(linearised.noise(observed));
     let in_play = linearised.in_play();
-    readings.iter().flat_map(|reading| &reading.noise).map(|&(shape, _)| in_play[shape]).collect()
+    noises.iter().flatten().map(|&(shape, _)| in_play[shape]).collect()
 }
 
 /// Numbers in order, each once.

@@ -32,14 +32,9 @@ pub(crate) fn linearise(
     shared: &[f64],
     nuisance: &[Vec<f64>],
 ) -> Result<NormalEquations, PredictError> {
-    let mut normals = Vec::with_capacity(nuisance.len());
-    let mut chi2 = 0.0;
-    for (run, values) in nuisance.iter().enumerate() {
-        let gram = normal_of_run(problem, selection, noise, run, shared, values)?;
-        let last = gram.nrows() - 1;
-        chi2 += gram[(last, last)];
-        normals.push(gram);
-    }
+    let of_run = |run: usize| normal_of_run(problem, selection, noise, run, shared, &nuisance[run]);
+    let normals = problem.by_run(of_run)?;
+    let chi2 = normals.iter().map(|gram| gram[(gram.nrows() - 1, gram.nrows() - 1)]).sum();
     Ok(NormalEquations { normals, chi2 })
 }
 
@@ -52,13 +47,12 @@ fn sum_of_squares(
     nuisance: &[Vec<f64>],
 ) -> Result<f64, PredictError> {
     let nothing = Selection::default();
-    let mut chi2 = 0.0;
-    for (run, values) in nuisance.iter().enumerate() {
-        let mut residual = whitened_columns(problem, &nothing, noise, run, shared, values)?;
+    let of_run = |run: usize| {
+        let mut residual = whitened_columns(problem, &nothing, noise, run, shared, &nuisance[run])?;
         let residual = residual.pop().unwrap_or_default();
-        chi2 += dot(&residual, &residual) + nuisance_departure(problem, selection, run, values);
-    }
-    Ok(chi2)
+        Ok(dot(&residual, &residual) + nuisance_departure(problem, selection, run, &nuisance[run]))
+    };
+    Ok(problem.by_run(of_run)?.into_iter().sum())
 }
 
 /// Fits the free parameters for a given noise, from a given start.

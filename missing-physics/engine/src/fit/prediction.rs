@@ -6,36 +6,25 @@ use crate::problem::Problem;
 
 /// Predictions of a fit, `[run][channel][row]`.
 pub(crate) fn predictions(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
-    problem
-        .recording
-        .runs
-        .iter()
-        .zip(&fit.nuisance)
-        .map(|(run, nuisance)| {
-            let n = run.len();
-            let mut out = vec![0.0; n * problem.channels()];
-            problem.model.predict(run, &fit.shared, nuisance, &mut out)?;
-            Ok((0..problem.channels()).map(|c| out[c * n..(c + 1) * n].to_vec()).collect())
-        })
-        .collect()
+    problem.by_run(|run| {
+        let data = &problem.recording.runs[run];
+        let n = data.len();
+        let mut out = vec![0.0; n * problem.channels()];
+        problem.model.predict(data, &fit.shared, &fit.nuisance[run], &mut out)?;
+        Ok((0..problem.channels()).map(|c| out[c * n..(c + 1) * n].to_vec()).collect())
+    })
 }
 
 /// Measured less predicted, `[run][channel]`, measured rows only.
 pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
-    problem
-        .recording
-        .runs
-        .iter()
-        .enumerate()
-        .map(|(run, data)| {
-            let n = data.len();
-            let mut out = vec![0.0; n * problem.channels()];
-            problem.model.predict(data, &fit.shared, &fit.nuisance[run], &mut out)?;
-            Ok((0..problem.channels())
-                .map(|c| {
-                    problem.rows[run].valid[c].iter().map(|&i| data.outputs[c][i] - out[c * n + i]).collect()
-                })
-                .collect())
-        })
-        .collect()
+    problem.by_run(|run| {
+        let data = &problem.recording.runs[run];
+        let n = data.len();
+        let mut out = vec![0.0; n * problem.channels()];
+        problem.model.predict(data, &fit.shared, &fit.nuisance[run], &mut out)?;
+        let of_channel = |c: usize| {
+            problem.rows[run].valid[c].iter().map(|&i| data.outputs[c][i] - out[c * n + i]).collect()
+        };
+        Ok((0..problem.channels()).map(of_channel).collect())
+    })
 }

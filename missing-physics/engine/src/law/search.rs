@@ -1,5 +1,7 @@
 //! The search for a law, the simplest kind first.
 
+use rayon::prelude::*;
+
 use crate::law::describe::extended;
 use crate::law::extended::Extended;
 use crate::law::found::{Found, LEAST_GAIN};
@@ -17,33 +19,29 @@ pub(crate) fn find(
     start: &Candidate,
     seen: &HeldOut,
 ) -> Result<Option<Found>, PredictError> {
-    let mut best: Option<Found> = None;
-    let mut consider = |found: Option<Found>| {
-        if let Some(found) = found
-            // A more general kind must be clearly better than a simpler one.
-            && best.as_ref().is_none_or(|b| found.held_out.log_score > b.held_out.log_score + LEAST_GAIN)
-        {
-            best = Some(found);
-        }
-    };
-    consider(sparse(problem, rule, start, seen)?);
     let places = || {
         let variables = 0..problem.recording.variables.len();
         (0..problem.channels())
             .flat_map(move |channel| variables.clone().map(move |variable| (channel, variable)))
     };
-    for (channel, variable) in places() {
-        if let Some(power) = Extended::power(problem, channel, variable) {
-            consider(extended(problem, rule, start, seen, &power)?);
-        }
-    }
-    if let Some(periodic) = Extended::periodic(problem, &start.fit)? {
-        consider(extended(problem, rule, start, seen, &periodic)?);
-    }
-    for (channel, variable) in places() {
-        if let Some(smooth) = Extended::smooth(problem, channel, variable) {
-            consider(extended(problem, rule, start, seen, &smooth)?);
-        }
+    let mut terms: Vec<Extended<'_>> =
+        places().filter_map(|(channel, variable)| Extended::power(problem, channel, variable)).collect();
+    terms.extend(Extended::periodic(problem, &start.fit)?);
+    terms.extend(places().filter_map(|(channel, variable)| Extended::smooth(problem, channel, variable)));
+    let (of_terms, extended) = rayon::join(
+        || sparse(problem, rule, start, seen),
+        || -> Vec<_> { terms.par_iter().map(|term| extended(problem, rule, start, seen, term)).collect() },
+    );
+    let mut best: Option<Found> = None;
+    for found in std::iter::once(of_terms).chain(extended) {
+        // A more general kind must be clearly better than a simpler one.
+        best = match (best, found?) {
+            (Some(best), Some(found)) => {
+                let better = found.held_out.log_score > best.held_out.log_score + LEAST_GAIN;
+                Some(if better { found } else { best })
+            }
+            (best, found) => best.or(found),
+        };
     }
     Ok(best)
 }

@@ -64,19 +64,19 @@ fn normals(
     nuisance: &[Vec<f64>],
 ) -> Result<Normals, PredictError> {
     let (n_nuisance, n_shared) = (selection.nuisance.len(), selection.shared.len());
-    let mut runs = Vec::with_capacity(nuisance.len());
-    let mut precisions = Vec::new();
-    for (run, values) in nuisance.iter().enumerate() {
+    let of_run = |run: usize| {
+        let values = &nuisance[run];
         let mut columns = whitened_columns(problem, selection, &process.noise, run, shared, values)?;
         let residual = columns.pop().unwrap_or_default();
         let (left, variances) = process.columns(problem, curves, run);
-        precisions = variances.iter().map(|v| 1.0 / v).collect();
         columns.extend(left);
         columns.push(residual);
         let mut normal = gram(&columns);
         add_nuisance_prior(problem, selection, &mut normal, run, values);
-        runs.push(normal);
-    }
+        Ok((normal, variances))
+    };
+    let (runs, variances): (Vec<_>, Vec<_>) = problem.by_run(of_run)?.into_iter().unzip();
+    let precisions: Vec<f64> = variances.last().into_iter().flatten().map(|v| 1.0 / v).collect();
     let n_left = precisions.len();
     let mut prior = DMatrix::zeros(n_shared + n_left, n_shared + n_left);
     precisions.iter().enumerate().for_each(|(i, p)| prior[(n_shared + i, n_shared + i)] = *p);

@@ -171,7 +171,7 @@ impl Asked<'_> {
             let size = |x: f64| weights.iter().rev().fold(0.0, |sum, weight| sum * x + weight);
             let all = amounts(self.along, self.bins, size, within);
             let sum: f64 = all.iter().flatten().sum();
-            let moved = self.unknown.response(self.problem, self.fit, self.sigma, self.component, &all)?;
+            let moved = self.unknown.response(self.problem, self.fit, self.sigma, self.component, all)?;
             Ok(Column { moved, mean: sum / rows.max(1.0) })
         };
         form.weights(self.bins, interval)[..form.sizes()].iter().map(of_size).collect()
@@ -186,16 +186,15 @@ impl Responses {
         let mut columns: Vec<Vec<Vec<f64>>> = vec![Vec::with_capacity(POWERS * edges); runs];
         for power in 0..POWERS {
             let mut sums: Vec<Vec<f64>> = projection.residual.iter().map(|r| vec![0.0; r.len()]).collect();
-            for bin in 0..=bins.len() {
-                columns.iter_mut().zip(&sums).for_each(|(all, sum)| all.push(sum.clone()));
-                if bin == bins.len() {
-                    break;
-                }
-                let only = amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
-                let moved = unknown.response(problem, fit, sigma, component, &only)?;
+            let only = |bin: usize| amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
+            let all_bins: Vec<Vec<Vec<f64>>> = (0..bins.len()).map(only).collect();
+            let by_bin = unknown.responses(problem, fit, sigma, component, &all_bins)?;
+            columns.iter_mut().zip(&sums).for_each(|(all, sum)| all.push(sum.clone()));
+            for moved in by_bin {
                 for (run, (sum, mut moved)) in sums.iter_mut().zip(moved).enumerate() {
                     projection.beside_nuisance(run, &mut moved);
                     sum.iter_mut().zip(moved).for_each(|(s, m)| *s += m);
+                    columns[run].push(sum.clone());
                 }
             }
         }

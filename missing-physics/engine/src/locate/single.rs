@@ -73,7 +73,7 @@ fn columns(
     for row in 0..longest {
         let only = |n: usize| (0..n).map(|i| f64::from(u8::from(i == row))).collect();
         let amounts: Vec<Vec<f64>> = runs.iter().map(|run| only(run.len())).collect();
-        let moved = unknown.response(problem, fit, sigma, component, &amounts)?;
+        let moved = unknown.response(problem, fit, sigma, component, amounts)?;
         for ((all, moved), run) in columns.iter_mut().zip(moved).zip(runs) {
             if row < run.len() {
                 all.push(moved);

@@ -39,12 +39,25 @@ impl Unknown<'_> {
         fit: &Fit,
         sigma: &[f64],
         component: usize,
-        amounts: &[Vec<f64>],
+        amounts: Vec<Vec<f64>>,
     ) -> Result<Vec<Vec<f64>>, PredictError> {
+        let mut all = self.responses(problem, fit, sigma, component, &[amounts])?;
+        Ok(all.pop().unwrap_or_default())
+    }
+
+    /// [`Self::response`] to several choices of sizes, `[choice][run][row]`.
+    pub(crate) fn responses(
+        &self,
+        problem: &Problem<'_>,
+        fit: &Fit,
+        sigma: &[f64],
+        component: usize,
+        amounts: &[Vec<Vec<f64>>],
+    ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
         let runs = &problem.recording.runs;
         let moved = match self.model {
             Some((causes, unknown)) => {
-                causes.response((unknown, component), runs, &fit.shared, &fit.nuisance, amounts)?
+                causes.responses((unknown, component), runs, &fit.shared, &fit.nuisance, amounts)?
             }
             None => {
                 let of_run = |amounts: &Vec<f64>| {
@@ -53,7 +66,7 @@ impl Unknown<'_> {
                     moved[component * n..(component + 1) * n].copy_from_slice(amounts);
                     moved
                 };
-                amounts.iter().map(of_run).collect()
+                amounts.iter().map(|amounts| amounts.iter().map(of_run).collect()).collect()
             }
         };
         let white = |(run, moved): (usize, &Vec<f64>)| -> Vec<f64> {
@@ -63,6 +76,6 @@ impl Unknown<'_> {
             };
             (0..problem.channels()).flat_map(channel).collect()
         };
-        Ok(moved.iter().enumerate().map(white).collect())
+        Ok(moved.iter().map(|moved| moved.iter().enumerate().map(white).collect()).collect())
     }
 }

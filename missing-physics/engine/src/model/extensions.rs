@@ -120,6 +120,22 @@ pub trait LocalCauses: Sync {
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError>;
 
+    /// [`LocalCauses::response`] to several choices of amounts, `amounts[choice][run][row]`: for models to which much of the work is the
+    /// same whatever the amounts. One after the other by default.
+    ///
+    /// # Errors
+    /// As [`Model::predict`](super::Model::predict).
+    fn responses(
+        &self,
+        of: (usize, usize),
+        runs: &[Run],
+        shared: &[f64],
+        nuisance: &[Vec<f64>],
+        amounts: &[Vec<Vec<f64>>],
+    ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
+        amounts.iter().map(|amounts| self.response(of, runs, shared, nuisance, amounts)).collect()
+    }
+
     /// Whether what acts in a run shows in that run alone (the default).
     fn runs_are_alone(&self) -> bool {
         true

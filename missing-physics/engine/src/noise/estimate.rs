@@ -90,11 +90,8 @@ impl Leftovers {
     ) -> Result<Self, PredictError> {
         let channels = problem.channels();
         let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
-        let raw = nuisance
-            .iter()
-            .enumerate()
-            .map(|(run, values)| whitened_columns(problem, selection, &white, run, shared, values))
-            .collect::<Result<Vec<_>, _>>()?;
+        let raw = problem
+            .by_run(|run| whitened_columns(problem, selection, &white, run, shared, &nuisance[run]))?;
         let nuisance_columns = (0..nuisance.len())
             .map(|run| channel_columns(problem, run, &raw[run][..selection.nuisance.len()]))
             .collect();

@@ -1,5 +1,7 @@
 //! How well a fit predicts what it has not seen.
 
+use rayon::prelude::*;
+
 use crate::fit::gauss_newton::solve;
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
@@ -62,14 +64,19 @@ impl LeavingOut<'_> {
             let nuisance = ids.iter().map(|&r| candidate.fit.nuisance[r].clone()).collect();
             (problem.of_runs(&ids), nuisance)
         };
-        for fold in 0..folds {
+        let of_fold = |fold: usize| -> Result<_, PredictError> {
             let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);
             let (seen, nuisance) = part(train);
             let trained = solve(&seen, &candidate.selection, noise, &candidate.fit.shared, &nuisance)?;
             let (unseen, nuisance) = part(test);
             let tested = solve(&unseen, &self.known, noise, &trained.shared, &nuisance)?;
-            self.log_score += whole - bounded_marginal(&seen, &candidate.selection, &trained);
-            self.add(&residuals(&unseen, &tested)?, |_, _| true);
+            let score = whole - bounded_marginal(&seen, &candidate.selection, &trained);
+            Ok((score, residuals(&unseen, &tested)?))
+        };
+        let of_folds: Vec<_> = (0..folds).into_par_iter().map(of_fold).collect::<Result<_, _>>()?;
+        for (score, left) in of_folds {
+            self.log_score += score;
+            self.add(&left, |_, _| true);
         }
         Ok(())
     }

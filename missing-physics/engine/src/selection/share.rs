@@ -1,5 +1,7 @@
 //! What part of the misfit a set of mechanisms takes away on data that it has not seen.
 
+use rayon::prelude::*;
+
 use crate::fit::gauss_newton::solve_again;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
@@ -20,30 +22,24 @@ pub(crate) fn unseen_misfit(
     fit: &Fit,
     white: &NoiseState,
 ) -> Result<f64, PredictError> {
-    let mut misfit = 0.0;
-    let mut add = |residual: &[Vec<Vec<f64>>]| {
-        for (sigma, column) in residual.iter().flat_map(|run| white.sigma.iter().zip(run)) {
-            misfit += column.iter().map(|v| (v / sigma).powi(2) - 1.0).sum::<f64>();
-        }
+    let miss = |residual: Vec<Vec<Vec<f64>>>| -> f64 {
+        let columns = residual.iter().flat_map(|run| white.sigma.iter().zip(run));
+        columns.map(|(sigma, column)| column.iter().map(|v| (v / sigma).powi(2) - 1.0).sum::<f64>()).sum()
     };
     let runs = problem.recording.runs.len();
-    if runs > 1 {
-        let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
-        let folds = runs.min(FOLDS);
-        for fold in 0..folds {
-            let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);
-            let nuisance =
-                |ids: &[usize]| -> Vec<Vec<f64>> { ids.iter().map(|&r| fit.nuisance[r].clone()).collect() };
-            let seen = problem.of_runs(&train);
-            let trained = solve_again(&seen, selection, white, &fit.shared, &nuisance(&train))?;
-            let unseen = problem.of_runs(&test);
-            let tested = solve_again(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
-            add(&residuals(&unseen, &tested)?);
-        }
-        return Ok(misfit.max(0.0));
-    }
-    let rows = problem.recording.runs[0].len();
-    for fold in 0..FOLDS {
+    let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+    let of_runs = |fold: usize, folds: usize| -> Result<f64, PredictError> {
+        let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);
+        let nuisance =
+            |ids: &[usize]| -> Vec<Vec<f64>> { ids.iter().map(|&r| fit.nuisance[r].clone()).collect() };
+        let seen = problem.of_runs(&train);
+        let trained = solve_again(&seen, selection, white, &fit.shared, &nuisance(&train))?;
+        let unseen = problem.of_runs(&test);
+        let tested = solve_again(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
+        Ok(miss(residuals(&unseen, &tested)?))
+    };
+    let of_rows = |fold: usize| -> Result<f64, PredictError> {
+        let rows = problem.recording.runs[0].len();
         let block = rows * fold / FOLDS..rows * (fold + 1) / FOLDS;
         let without = |inside: bool| {
             let mut recording = problem.recording.clone();
@@ -54,7 +50,10 @@ pub(crate) fn unseen_misfit(
             problem.with(recording)
         };
         let trained = solve_again(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
-        add(&residuals(&without(false), &trained)?);
-    }
-    Ok(misfit.max(0.0))
+        Ok(miss(residuals(&without(false), &trained)?))
+    };
+    let folds = if runs > 1 { runs.min(FOLDS) } else { FOLDS };
+    let of_fold = |fold: usize| if runs > 1 { of_runs(fold, folds) } else { of_rows(fold) };
+    let misfits: Vec<f64> = (0..folds).into_par_iter().map(of_fold).collect::<Result<_, _>>()?;
+    Ok(misfits.into_iter().sum::<f64>().max(0.0))
 }

@@ -7,6 +7,7 @@
 
 mod build;
 pub(crate) mod curves;
+mod gram;
 mod outliers;
 mod plane;
 mod read;
@@ -14,4 +15,4 @@ mod shapes;
 mod solve;
 
 pub(crate) use curves::DEGREE;
-pub(crate) use plane::{Linearised, Reading};
+pub(crate) use plane::Linearised;

@@ -69,7 +69,7 @@ impl<'a> Fitted<'a> {
                 for (j, &c) in ids.iter().enumerate().take(i + 1) {
                     let channels = row.iter().zip(&noise);
                     normal[(i, j)] = channels
-                        .map(|(block, &(shape, sigma))| block.shapes[shape].gram[(a, c)] / (sigma * sigma))
+                        .map(|(block, &(shape, sigma))| block.shapes[shape].gram.of(a, c) / (sigma * sigma))
                         .sum();
                 }
             }

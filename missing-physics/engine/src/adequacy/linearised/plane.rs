@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use super::gram::Gram;
 use crate::fit::bordered::Eliminated;
-use crate::linalg::{gram, rank};
+use crate::linalg::rank;
 use crate::noise::process::Whitener;
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
@@ -33,7 +34,7 @@ pub(super) struct Block {
 /// Columns under one shape of noise.
 pub(super) struct Whitened {
     pub(super) columns: Vec<Vec<f64>>,
-    pub(super) gram: DMatrix<f64>,
+    pub(super) gram: Gram,
     /// The nuisance columns that the channel determines, eliminated from every column.
     pub(super) eliminated: Eliminated,
     /// Log determinant of the noise and of the nuisance columns.
@@ -90,12 +91,13 @@ impl Block {
     /// The columns whitened, the nuisance columns eliminated.
     fn whitened(&self, whitener: &Whitener) -> Whitened {
         let mut columns = self.raw.clone();
-        columns.iter_mut().for_each(|c| whitener.whiten(c));
-        let gram = gram(&columns);
+        columns.iter_mut().filter(|c| c.iter().any(|v| *v != 0.0)).for_each(|c| whitener.whiten(c));
+        let mut gram = Gram::new(&columns);
         let mine = &self.mine;
-        let block = DMatrix::from_fn(mine.len(), mine.len(), |i, j| gram[(mine[i], mine[j])]);
-        let beside = (0..columns.len()).map(|j| mine.iter().map(|&i| gram[(i, j)]).collect());
+        let block = DMatrix::from_fn(mine.len(), mine.len(), |i, j| gram.of(mine[i], mine[j]));
+        let beside = (0..columns.len()).map(|j| mine.iter().map(|&i| gram.of(i, j)).collect());
         let eliminated = Eliminated::new(block, rank::CHANNEL, beside);
+        gram.eliminate(&eliminated.borders);
         let log_determinant = whitener.log_determinant + eliminated.log_determinant();
         Whitened { columns, gram, eliminated, log_determinant }
     }

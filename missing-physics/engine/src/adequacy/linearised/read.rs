@@ -14,6 +14,13 @@ impl Linearised<'_> {
         Reading { score, gains, noise, coefficients }
     }
 
+    /// Shape in play and sigma of the noise that the model alone leaves of a data vector, by channel.
+    pub(crate) fn noise(&self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
+        let products = self.products(data);
+        let (nuisance, shared) = self.columns_with(0);
+        self.alternate(&products, &nuisance, &shared, &self.white_start(&products), 8).1
+    }
+
     /// By how much an alternative lowers the sum of squares that the model alone leaves, in units of the noise that is left beside the
     /// alternative; nothing where its coefficient has the wrong sign, or where it leaves no noise to measure it by.
     fn gain(

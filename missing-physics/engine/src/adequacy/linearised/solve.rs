@@ -15,7 +15,10 @@ impl Linearised<'_> {
                 .map(|(whitened, &shape)| {
                     let mut y = data[run][channel].clone();
                     self.problem.whitener(run, channel, shape).whiten(&mut y);
-                    let with: Vec<f64> = whitened.columns.iter().map(|c| dot(c, &y)).collect();
+                    let with = |(i, column): (usize, &Vec<f64>)| {
+                        if whitened.gram.acts(i) { dot(column, &y) } else { 0.0 }
+                    };
+                    let with: Vec<f64> = whitened.columns.iter().enumerate().map(with).collect();
                     let mine = &self.blocks[run][channel].mine;
                     let mut nuisance: Vec<f64> = mine.iter().map(|&i| with[i]).collect();
                     whitened.eliminated.forward(&mut nuisance);
@@ -47,7 +50,7 @@ impl Linearised<'_> {
                 for (i, &a) in ids.iter().enumerate() {
                     normal[(last, i)] += weight * value[shape].with[a];
                     for (j, &c) in ids.iter().enumerate().take(i + 1) {
-                        normal[(i, j)] += weight * gram[(a, c)];
+                        normal[(i, j)] += weight * gram.of(a, c);
                     }
                 }
             }
@@ -66,7 +69,7 @@ impl Linearised<'_> {
                 self.blocks
                     .iter()
                     .flat_map(|row| row.iter().zip(noise))
-                    .map(|(block, &(shape, sigma))| block.shapes[shape].gram[(a, a)] / (sigma * sigma))
+                    .map(|(block, &(shape, sigma))| block.shapes[shape].gram.of(a, a) / (sigma * sigma))
                     .sum()
             })
             .collect()
@@ -89,15 +92,14 @@ impl Linearised<'_> {
             let borders = &block.eliminated.borders;
             let product = &values[channel][shape];
             let mine = &row[channel].mine;
-            let acts = |(a, _): &(usize, f64)| !mine.contains(a) && block.gram[(*a, *a)] > 0.0;
+            let acts = |(a, _): &(usize, f64)| !mine.contains(a) && block.gram.of(*a, *a) > 0.0;
             others.clear();
             others.extend(ids.iter().copied().zip(x.iter().copied()).filter(acts));
             let mut form = product.left;
             for (k, &(a, xa)) in others.iter().enumerate() {
-                let column = block.gram.column(a);
-                let left = |c: usize| column[c] - dot(&borders[a], &borders[c]);
-                let mut inner = -2.0 * (product.with[a] - dot(&borders[a], &product.nuisance)) + left(a) * xa;
-                let pairs: f64 = others[..k].iter().map(|&(c, xc)| left(c) * xc).sum();
+                let left = product.with[a] - dot(&borders[a], &product.nuisance);
+                let mut inner = -2.0 * left + block.gram.beside(a, a) * xa;
+                let pairs: f64 = others[..k].iter().map(|&(c, xc)| block.gram.beside(a, c) * xc).sum();
                 inner += 2.0 * pairs;
                 form += xa * inner;
             }
