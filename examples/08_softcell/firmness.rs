@@ -7,7 +7,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use softcell::fake::{Air, Bench, Dome, Touch};
 use softcell::flow::{Tracker, TrackerSettings};
-use softcell::modulus::{Pair, State, Stiffness, effective, smallest_indentation_m};
+use softcell::modulus::{POISSON_RATIO, Pair, State, Stiffness, effective, smallest_indentation_m};
 
 use super::{Outcome, PROBE_M};
 
@@ -17,10 +17,10 @@ const NOISE_N: f64 = 2e-3;
 
 /// Figure 5.5: force over depth under the ball (a) and a plate (c), and the moduli behind them (d).
 pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
-    println!("Effective modulus (figure 5.5 d; [Matl 2021]: 4.4 to 46.1 kPa over its pressures)");
+    println!("Effective modulus (figure 5.5 d; [Matl 2021]: E* of 4.4 to 46.1 kPa from 0 to 6.14 kPa)");
     println!(
-        "{:>9} {:>9} {:>19} {:>8} {:>11}",
-        "p (kPa)", "E (kPa)", "95 % interval", "misfit", "plate (kPa)"
+        "{:>9} {:>9} {:>19} {:>8} {:>11} {:>9}",
+        "p (kPa)", "E (kPa)", "95 % interval", "misfit", "plate (kPa)", "E* (kPa)"
     );
     let mut rng = ChaCha8Rng::seed_from_u64(55);
     let mut moduli = Panel::new("5.5 d: effective modulus (kPa)", "pressure (kPa)", "");
@@ -40,13 +40,15 @@ pub(crate) fn curves(panels: &mut Vec<Panel>) -> Outcome<Stiffness> {
         }
         let (low, high) = found[0].interval_pa;
         println!(
-            "{:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>8} {:>11.2}",
+            "{:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>8} {:>11.2} {:>9.2}",
             1e-3 * p,
             1e-3 * found[0].modulus_pa,
             1e-3 * low,
             1e-3 * high,
             found[0].misfit,
-            1e-3 * found[1].modulus_pa
+            1e-3 * found[1].modulus_pa,
+            // Equation 5.2 of [Matl 2021] has 1 - nu where Hertz's law has 1 - nu^2.
+            1e-3 * found[0].modulus_pa / (1.0 + POISSON_RATIO)
         );
         moduli.line([low, high].map(|e| [1e-3 * p, 1e-3 * e]), "steelblue");
         moduli.dots([[1e-3 * p, 1e-3 * found[0].modulus_pa]], "steelblue");

@@ -33,6 +33,8 @@ use rayon::prelude::*;
 const HEIGHT_M: f64 = 0.12;
 /// One pour in so many is held out.
 const HELD_OUT: usize = 10;
+/// Heaps that [Matl 2021] measures on.
+const HEAPS: usize = 50;
 /// The posterior is measured on so many unseen pours or more.
 const LEAST: usize = 50;
 /// Unseen heaps that are poured again with what was inferred.
@@ -95,12 +97,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     calibration(&posterior, &tests)?;
     ship(&posterior, out)?;
     println!(
-        "\nmean and spread of what is inferred less the truth, root mean square, over {} unseen pours",
+        "\nwhat is inferred less the truth: mean, spread and the mean's 95 % interval, over {} unseen pours",
         tests.len()
     );
-    row("[Matl 2021]", &[(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148)]);
-    row("here", &errors(&posterior, &tests)?);
-    row("of the prior", &of_prior(&posterior, &tests));
+    // What [Matl 2021] prints behind +- are intervals of a mean, as its chapter 2 says of its own.
+    let printed = [(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148)];
+    row("[Matl 2021]", &printed.map(|(mean, interval)| (mean, interval / of_mean(1.0, HEAPS))), HEAPS);
+    row("here", &errors(&posterior, &tests)?, tests.len());
+    row("of the prior", &of_prior(&posterior, &tests), tests.len());
     again(&posterior, &scene, &view, &tests)?;
     shapes(&posterior, &scene, &view, &tests)?;
 
@@ -115,7 +119,7 @@ fn fewer(prior: &Prior, simulations: &Simulations, tests: &Simulations) -> Resul
         let rows: Vec<usize> = (0..simulations.len() / share).collect();
         let few = Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))?;
         let less = GrainPosterior::train(prior, &few, &settings(), 1)?;
-        row(&format!("{}", few.len()), &errors(&less, tests)?);
+        row(&format!("{}", few.len()), &errors(&less, tests)?, tests.len());
     }
     Ok(())
 }
@@ -238,11 +242,18 @@ fn mean_sd(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, (values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
 }
 
-fn row(name: &str, errors: &[(f64, f64)]) {
+/// Half of the 95 % interval of the mean of `count` values of a spread.
+fn of_mean(sd: f64, count: usize) -> f64 {
+    1.96 * sd / (count as f64).sqrt()
+}
+
+fn row(name: &str, errors: &[(f64, f64)], count: usize) {
     let text: Vec<String> = ["mu_s", "ln mu_r", "e"]
         .iter()
         .zip(errors)
-        .map(|(name, (mean, sd))| format!("{name} {mean:+.4} +- {sd:.4}"))
+        .map(|(name, (mean, sd))| {
+            format!("{name} {mean:+.4} +- {sd:.4} (the mean +- {:.4})", of_mean(*sd, count))
+        })
         .collect();
     println!("{name:14} {}", text.join("   "));
 }
@@ -288,10 +299,12 @@ fn again(
     let found: Vec<(f64, f64)> = both.into_iter().flatten().collect();
     let (inferred, truth) = (mean_sd(found.iter().map(|d| d.0)), mean_sd(found.iter().map(|d| d.1)));
     println!(
-        "L2 of statistics over {} heaps: {:.3} +- {:.3} poured again as inferred ([Matl 2021]: 1.582 +- 0.336), {:.3} +- {:.3} with the truth and another seed",
+        "L2 of statistics over {} heaps: {:.3} +- {:.3} (the mean +- {:.3}) poured again as inferred ([Matl 2021]: 1.582 +- {:.3}, the mean +- 0.336), {:.3} +- {:.3} with the truth and another seed",
         found.len(),
         inferred.0,
         inferred.1,
+        of_mean(inferred.1, found.len()),
+        0.336 / of_mean(1.0, HEAPS),
         truth.0,
         truth.1
     );
@@ -329,7 +342,7 @@ fn shapes(
         };
         let found: Vec<_> = (0..SHAPED.min(tests.len())).into_par_iter().filter_map(one).collect();
         let errors: Vec<_> = (0..3).map(|j| mean_sd(found.iter().map(|f| f.0[j]))).collect();
-        row(name, &errors);
+        row(name, &errors, found.len());
         println!("{:14} {} of {} pictures doubted", "", found.iter().filter(|f| f.1).count(), found.len());
     }
     Ok(())
@@ -345,7 +358,7 @@ fn sensitivity(
     match seen(unseen, scene, view, 1) {
         Ok(seen) => {
             let mean = expected_coverage(posterior, &seen.simulations, 200, 3)?.mean_error();
-            row(name, &errors(posterior, &seen.simulations)?);
+            row(name, &errors(posterior, &seen.simulations)?, seen.simulations.len());
             println!("{:14} {} pictures, coverage less level {mean:+.3}", "", seen.simulations.len());
         }
         Err(error) => println!("{name:14} {error}"),
