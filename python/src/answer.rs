@@ -48,6 +48,7 @@ pub(crate) fn diagnose<'py>(
     let (domain, found, context) = watched(py, threads, progress.as_ref(), function.as_ref(), |observer| {
         let (domain, loaded) = load(source, function.as_ref(), false)?;
         let found = loaded.diagnose(&options, observer)?;
+        let figures = loaded.figures(&found);
         let context = ReportContext {
             domain: domain.id().into(),
             recording: source.name(),
@@ -55,6 +56,7 @@ pub(crate) fn diagnose<'py>(
             citations: vec![THESIS.into()],
             words: domain.words(),
             additions: loaded.additions,
+            figures,
             provenance: provenance(source, &options),
         };
         Ok((domain, found, context))

@@ -45,7 +45,20 @@ fn answer(folder: &Path, threads: &str) -> Value {
     assert!(page.ends_with("</body></html>\n") && !written.contains("NaN") && !curves.0.contains("NaN"));
     let curves: Value = serde_json::from_str(curves.0).unwrap();
     assert!(!curves["runs"].as_array().unwrap().is_empty());
-    serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap()
+    let answer: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    let panels = page.matches("<svg viewBox=\"0 0 3").count();
+    let figures: &[&str] = match answer["domain"].as_str().unwrap() {
+        "grain-pour" => &["<h2>The heap of run", "<h2>What the pictures show", "class=\"level after\""],
+        "liquid-tilt" => &["<h2>The container at its tilts", "<polygon class=\"area"],
+        "bounce" if answer["impacts"].is_array() => &["<h2>The sound", "<h2>The table from above"],
+        _ => &[],
+    };
+    assert!(
+        figures.iter().all(|part| page.contains(part)) && panels >= figures.len(),
+        "{}",
+        folder.display()
+    );
+    answer
 }
 
 fn ids(value: &Value) -> Vec<String> {

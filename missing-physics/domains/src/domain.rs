@@ -1,12 +1,14 @@
 //! What a domain is, and what it makes of a recording.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{DiagnoseError, Options, diagnose};
 use missing_physics::model::{Experiment, Model, Quantity, Spec};
 use missing_physics::observer::Observer;
+use missing_physics_report::Figure;
 
 use crate::recording::{Column, ColumnContents, Header, ReadError};
 
@@ -174,7 +176,7 @@ pub struct Loaded {
     /// The data.
     pub recording: Recording,
     /// The full model.
-    pub model: Box<dyn Model + Send>,
+    pub model: Arc<dyn Model + Send>,
     /// What the rig could do next.
     pub experiments: Vec<Experiment>,
     /// What such data cannot determine, one sentence each.
@@ -183,7 +185,11 @@ pub struct Loaded {
     pub hints: Vec<String>,
     /// What the domain adds to the answer (impacts that were heard in sound), by the key it has there.
     pub additions: serde_json::Map<String, serde_json::Value>,
+    draw: Option<Draw>,
 }
+
+/// Draws what the domain's people look at.
+type Draw = Box<dyn Fn(&Diagnosis) -> Vec<Figure> + Send + Sync>;
 
 impl Loaded {
     /// A recording with its model, to whose answer the domain adds nothing.
@@ -194,11 +200,29 @@ impl Loaded {
         undetermined: Vec<String>,
     ) -> Self {
         let (hints, additions) = (Vec::new(), serde_json::Map::new());
-        Self { recording, model: Box::new(model), experiments, undetermined, hints, additions }
+        let model = Arc::new(model);
+        Self { recording, model, experiments, undetermined, hints, additions, draw: None }
     }
-}
 
-impl Loaded {
+    /// As [`Loaded::new`], with pictures that are drawn from the model and its diagnosis.
+    pub fn drawn<M: Model + Send + 'static>(
+        recording: Recording,
+        model: M,
+        experiments: Vec<Experiment>,
+        undetermined: Vec<String>,
+        draw: impl Fn(&M, &Diagnosis) -> Vec<Figure> + Send + Sync + 'static,
+    ) -> Self {
+        let (hints, additions) = (Vec::new(), serde_json::Map::new());
+        let model = Arc::new(model);
+        let shown = Arc::clone(&model);
+        let draw: Option<Draw> = Some(Box::new(move |diagnosis| draw(&shown, diagnosis)));
+        Self { recording, model, experiments, undetermined, hints, additions, draw }
+    }
+
+    /// The pictures that the domain's people look at, for a report: drawn from the recording and the fitted model.
+    pub fn figures(&self, diagnosis: &Diagnosis) -> Vec<Figure> {
+        self.draw.as_ref().map_or_else(Vec::new, |draw| draw(diagnosis))
+    }
     /// Diagnoses the recording: what the engine finds, beside what the domain knows of such data and of this recording's units.
     ///
     /// # Errors

@@ -8,6 +8,8 @@ mod domain;
 pub mod dough_roll;
 #[cfg(any(feature = "indentation", feature = "trajectory"))]
 mod dual;
+#[cfg(any(feature = "bounce", feature = "grain-pour", feature = "liquid-tilt"))]
+mod figures;
 #[cfg(feature = "grain-pour")]
 pub mod grain_pour;
 #[cfg(feature = "indentation")]

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::figure::Figure;
+
 /// What a report says of the recording beside the diagnosis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReportContext {
@@ -17,6 +19,8 @@ pub struct ReportContext {
     pub words: BTreeMap<String, String>,
     /// What the domain adds to the answer, by the key it has there.
     pub additions: serde_json::Map<String, serde_json::Value>,
+    /// Pictures of the domain, for the page.
+    pub figures: Vec<Figure>,
     /// What the answer was made from: version, seed, alpha, and the SHA-256 of the files; null where nobody says.
     pub provenance: serde_json::Value,
 }

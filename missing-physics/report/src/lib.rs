@@ -2,6 +2,7 @@
 mod context;
 mod corner;
 mod explore;
+mod figure;
 mod html;
 mod json;
 mod number;
@@ -19,8 +20,10 @@ pub mod page {
 }
 
 pub use context::ReportContext;
+pub use figure::{Colour, Figure, Map, Mark, Panel, Plane, Scale, Shape};
 pub use html::{Entry, html, index};
 pub use json::json;
 pub use plots::picture;
+pub use runs::shown;
 pub use text::text;
 pub use write::write_whole;

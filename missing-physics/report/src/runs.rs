@@ -103,6 +103,14 @@ pub(super) fn along(curves: &Curves, variable: usize) -> Vec<f64> {
     curves.inputs.get(variable).cloned().unwrap_or_else(rows)
 }
 
+/// Numbers of the runs in which a report shows them: the one that misses most where it misses most, then the others, those that miss
+/// most first.
+pub fn shown(d: &Diagnosis) -> Vec<usize> {
+    let first = worst(d);
+    let others = by_misfit(d).into_iter().map(|m| m.run).filter(|run| Some(*run) != first);
+    first.into_iter().chain(others).collect()
+}
+
 /// The run that misses most in the channel that misses most, of those that the place names.
 pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
     let &c = channels(d).first()?;

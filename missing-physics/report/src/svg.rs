@@ -212,7 +212,7 @@ fn wrapped(text: &str, longest: usize) -> Vec<String> {
 }
 
 /// A range that is not empty, with some room.
-fn widened((low, high): (f64, f64), room: f64) -> (f64, f64) {
+pub(crate) fn widened((low, high): (f64, f64), room: f64) -> (f64, f64) {
     if !(low.is_finite() && high.is_finite()) {
         return (0.0, 1.0);
     }
@@ -225,7 +225,7 @@ fn widened((low, high): (f64, f64), room: f64) -> (f64, f64) {
 }
 
 /// Ticks at round numbers, with their labels.
-fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+pub(crate) fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let raw = (high - low) / 5.0;
     let power = 10f64.powf(raw.log10().floor());
     let step =

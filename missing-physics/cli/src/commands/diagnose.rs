@@ -63,6 +63,8 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
         return Err(RepairError::NoChannels { domain: domain.id() }.into());
     }
     let diagnosis = pool.install(|| loaded.diagnose(&arguments.options, observer))?;
+    // Pictures may take simulations of their own.
+    let figures = if html.is_some() { pool.install(|| loaded.figures(&diagnosis)) } else { Vec::new() };
     let context = ReportContext {
         domain: domain.id().to_owned(),
         recording: arguments.folder.display().to_string(),
@@ -73,6 +75,7 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
         citations: vec![domains::THESIS.into()],
         words: domain.words(),
         additions: loaded.additions,
+        figures,
         provenance: provenance(&arguments.folder, &arguments.options),
     };
     let mut said = Said::from(report::text(&diagnosis, &context));

@@ -115,6 +115,41 @@ fn browser_explores_a_report() {
     browser.picture("still");
 }
 
+/// The pictures of domains are seen, wide and narrow, light and dark.
+#[test]
+#[ignore = "needs chromium, long: .ci/run --long"]
+fn browser_shows_what_the_people_of_a_domain_look_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("a.html");
+    let mut browser = Browser::start();
+    for (recording, panels, name) in
+        [("liquid-tilt/c02", 6, "bottle"), ("bounce-audio/c04", 7, "sound"), ("grain-pour/c06", 12, "heap")]
+    {
+        page_of(&bundled("practice").join(recording), &page);
+        for (width, scheme) in [(1000, "light"), (400, "dark")] {
+            browser.width(width);
+            browser.media("screen", scheme);
+            browser.open(&page);
+            browser.settle();
+            // As wide as the page allows, and letters of eight pixels and more.
+            let sizes = browser.value(
+                "[...document.querySelectorAll('.panels svg')].map((s) => [s.getBoundingClientRect().width, 11 * s.getBoundingClientRect().width / s.viewBox.baseVal.width])",
+            );
+            let sizes = sizes.as_array().unwrap().clone();
+            assert_eq!(sizes.len(), panels, "{recording}");
+            let fits = |s: &serde_json::Value| {
+                s[0].as_f64().unwrap() < f64::from(width) && s[1].as_f64().unwrap() > 8.0
+            };
+            assert!(sizes.iter().all(fits), "{recording}, {width}: {sizes:?}");
+            let wide = browser.value("document.documentElement.scrollWidth").as_u64().unwrap();
+            assert!(wide <= u64::from(width), "{recording}: {wide}");
+            browser.value("document.querySelector('.panels').scrollIntoView()");
+            browser.picture(&format!("{name}-{scheme}"));
+        }
+    }
+    browser.quiet();
+}
+
 /// Labels of a recording that are markup stay text, and nothing that they name is asked for.
 #[test]
 #[ignore = "needs chromium, long: .ci/run --long"]

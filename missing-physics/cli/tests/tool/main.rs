@@ -6,6 +6,7 @@ mod chromium;
 mod clock;
 mod custom;
 mod drops;
+mod figures;
 mod import;
 mod located;
 mod machines;

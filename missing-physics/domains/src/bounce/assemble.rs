@@ -2,16 +2,18 @@
 
 use bounce_audio::missed::{typical_restitution, unheard};
 use missing_physics::data::Recording;
-use missing_physics::model::Quantity;
+use missing_physics::model::{Model as _, Quantity};
 
 use super::array::Microphones;
 use super::drop::Drop;
 use super::effects::Effects;
 use super::experiments::{experiments, of_times};
+use super::figure::{Shown, figures};
 use super::model::{BounceModel, COPIES};
 use super::read::{Heard, Rig};
 use super::rows::Rows;
 use super::setup::Setup;
+use super::sound::Wave;
 use super::spec::build;
 use super::spread::{Calibration, judge, released};
 use super::times::{TimesModel, build_times};
@@ -29,6 +31,8 @@ pub(super) struct Drops {
     microphones: Microphones,
     setup: Setup,
     restitution: f64,
+    /// What each drop sounded like, where it was heard.
+    waves: Vec<Wave>,
 }
 
 impl Drops {
@@ -49,7 +53,13 @@ impl Drops {
             unheard: [missed, heard.len()],
             microphones: microphones.places_m.len(),
         };
-        Self { heard, rig, calibration, microphones, setup, restitution }
+        let waves = Vec::new();
+        Self { heard, rig, calibration, microphones, setup, restitution, waves }
+    }
+
+    /// The same drops with what they sounded like.
+    pub(super) fn sounding(self, waves: Vec<Wave>) -> Self {
+        Self { waves, ..self }
     }
 
     /// What the recording holds.
@@ -81,12 +91,12 @@ impl Drops {
     }
 
     /// The recording with its model; on failure the row of the drop that makes no sense, and what was expected.
-    pub(super) fn assemble(&self) -> Result<Loaded, (usize, String)> {
+    pub(super) fn assemble(self) -> Result<Loaded, (usize, String)> {
         if self.setup.placed { self.placed() } else { Ok(self.timed()) }
     }
 
     /// Times and places: impact by impact.
-    fn placed(&self) -> Result<Loaded, (usize, String)> {
+    fn placed(self) -> Result<Loaded, (usize, String)> {
         let mut nominal = Effects::none(self.setup.gravity_m_s2, self.restitution);
         let mut drops: Vec<Drop> = self.heard.iter().map(|h| h.drop.clone()).collect();
         expect_first(&mut drops, &mut nominal);
@@ -132,11 +142,14 @@ impl Drops {
             undetermined.push(UNTIED.into());
         }
         let experiments = experiments(&mut model);
-        Ok(Loaded::new(recording, model, experiments, undetermined))
+        let shown = Shown::new(&self.heard, drops, self.microphones.places_m, self.waves);
+        Ok(Loaded::drawn(recording, model, experiments, undetermined, move |model, d| {
+            figures(&shown, model.spec(), &|shared| model.effects(shared), d)
+        }))
     }
 
     /// Times alone.
-    fn timed(&self) -> Loaded {
+    fn timed(self) -> Loaded {
         let mut model = TimesModel::new(
             self.setup,
             self.restitution,
@@ -172,7 +185,11 @@ impl Drops {
             );
         }
         let experiments = of_times(&model, self.restitution, self.setup.gravity_m_s2);
-        Loaded::new(recording, model, experiments, undetermined)
+        let drops = self.heard.iter().map(|h| h.drop.clone()).collect();
+        let shown = Shown::new(&self.heard, drops, self.microphones.places_m, self.waves);
+        Loaded::drawn(recording, model, experiments, undetermined, move |model, d| {
+            figures(&shown, model.spec(), &|shared| model.effects(shared), d)
+        })
     }
 }
 

@@ -250,6 +250,18 @@ impl Drop {
         self.unheard.get(flight + 1).copied().unwrap_or(0)
     }
 
+    /// How many impacts went unheard after an impact, as far as the effects take that for what it is.
+    pub(super) fn between(&self, impact: usize, effects: &Effects) -> usize {
+        let (found, known) = (&self.unheard, &self.known);
+        let counted = if effects.unheard > 0.5 { found } else { known };
+        counted.get(impact + 1).copied().unwrap_or(0)
+    }
+
+    /// Velocity at which the ball lands after a flight.
+    pub(super) fn lands(&self, flight: usize, effects: &Effects) -> Velocity {
+        self.flight(flight, effects, self.between(flight, effects), Part::Last).1
+    }
+
     /// Speed at which the ball leaves the first impact, m/s.
     pub(super) fn leaves_m_s(&self, effects: &Effects) -> f64 {
         speed(&self.flight(0, effects, self.hidden(0), Part::First).0)

@@ -8,7 +8,9 @@ mod assemble;
 mod chance;
 mod drop;
 mod effects;
+mod expected;
 mod experiments;
+mod figure;
 mod local;
 mod model;
 mod read;
@@ -108,7 +110,8 @@ impl Domain for Bounce {
             let calibration = Calibration { estimated: listened.estimated, ..calibration };
             let impacts = sound::impacts(&listened.heard);
             let ambiguous_array = listened.microphones.places_m.len() == 3;
-            let drops = Drops::new(listened.heard, rig, calibration, listened.microphones);
+            let drops =
+                Drops::new(listened.heard, rig, calibration, listened.microphones).sounding(listened.waves);
             return Ok(CheckedRecording::new(drops.contents(), move || {
                 let mut loaded = drops.assemble().map_err(|(_, expected)| ReadError::Value {
                     file,

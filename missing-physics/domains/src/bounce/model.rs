@@ -185,7 +185,7 @@ impl BounceModel {
         moved.collect::<Option<_>>().unwrap_or_default()
     }
 
-    fn effects(&self, shared: &[f64]) -> Effects {
+    pub(super) fn effects(&self, shared: &[f64]) -> Effects {
         let p = &self.layout;
         let at = |at: Option<ParameterRef>| at.map_or(0.0, |at| shared[at.slot]);
         Effects {

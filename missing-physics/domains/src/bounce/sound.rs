@@ -19,6 +19,30 @@ pub(super) struct Listened {
     pub(super) estimated: Option<[f64; 2]>,
     /// How many sounds were taken for none of the ball's, and which, in words.
     pub(super) strays: Vec<String>,
+    /// What each run sounded like.
+    pub(super) waves: Vec<Wave>,
+}
+
+/// What a run sounded like, to be drawn.
+pub(super) struct Wave {
+    /// The first channel's lowest and highest samples in equal parts of its time, each with the middle of that, s.
+    pub(super) envelope: Vec<(f64, [f64; 2])>,
+    /// When sounds were heard that were taken for none of the ball's, s.
+    pub(super) strays_s: Vec<f64>,
+}
+
+/// Parts of a sound that are told apart in a picture.
+const PARTS: usize = 500;
+
+/// The lowest and highest samples of the parts of a sound.
+fn envelope(sound: &Sound) -> Vec<(f64, [f64; 2])> {
+    let Some(samples) = sound.channels.first() else { return Vec::new() };
+    let long = samples.len().div_ceil(PARTS).max(1);
+    let ends = |part: &[f64]| {
+        part.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+    };
+    let middle = |k: usize| (k as f64 + 0.5) * long as f64 / sound.rate_hz;
+    samples.chunks(long).enumerate().map(|(k, part)| (middle(k), ends(part))).collect()
 }
 
 /// What was heard in one file.
@@ -26,6 +50,7 @@ struct Run {
     impacts: Vec<Impact>,
     /// When sounds were heard that were no impacts, s.
     strays: Vec<f64>,
+    envelope: Vec<(f64, [f64; 2])>,
 }
 
 /// Listens to the files of a recording; `None` where it has no sound.
@@ -45,12 +70,13 @@ pub(super) fn listen(header: &Header, rig: &Rig) -> Result<Option<Listened>, Rea
         all.push(impacts_in(&file, microphones.as_deref(), speed, rig)?);
     }
     let strays = take_out(&mut all);
-    let all: Vec<Vec<Impact>> = all.into_iter().map(|run| run.impacts).collect();
+    let of_run = |run: Run| (run.impacts, Wave { envelope: run.envelope, strays_s: run.strays });
+    let (all, waves): (Vec<Vec<Impact>>, Vec<Wave>) = all.into_iter().map(of_run).unzip();
     let mut heard: Vec<Heard> =
         all.iter().enumerate().map(|(run, impacts)| drop_of(run, impacts, rig)).collect();
     let microphones = Microphones { places_m: microphones.unwrap_or_default(), speed_of_sound_m_s: speed };
     let estimated = weigh(&mut heard, &all);
-    Ok(Some(Listened { heard, microphones, estimated, strays }))
+    Ok(Some(Listened { heard, microphones, estimated, strays, waves }))
 }
 
 /// The impacts in a file, in the order of time.
@@ -80,7 +106,7 @@ fn impacts_in(
             expected: format!("at least {fewest} impacts"),
         });
     }
-    Ok(Run { impacts, strays })
+    Ok(Run { impacts, strays, envelope: envelope(&sound) })
 }
 
 /// Takes out sounds that fit no bounce, and says which.

@@ -14,6 +14,7 @@ use bounce_audio::impact::{rebound, speed_after_drop};
 use bounce_audio::missed::parts;
 
 use super::drop::Drop;
+use super::effects::Effects;
 use super::setup::Setup;
 use super::spec::{Layout, build};
 
@@ -99,6 +100,21 @@ impl TimesModel {
             nuisance[at.slot] = leaves_m_s;
         }
         nuisance
+    }
+
+    /// What changes a bounce, at some values of the shared parameters.
+    pub(super) fn effects(&self, shared: &[f64]) -> Effects {
+        let p = &self.layout;
+        let none = Effects::none(self.setup.gravity_m_s2, shared[p.restitution.slot]);
+        let at = |at: Option<ParameterRef>| at.map_or(0.0, |at| shared[at.slot]);
+        Effects {
+            slope_s_m: shared[p.slope.slot],
+            drag_per_m: shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0),
+            clock_rate: at(p.clock),
+            unheard: at(p.unheard),
+            terms: [0.0, 0.0, shared[p.squared.slot]],
+            ..none
+        }
     }
 
     /// Times of the impacts that are heard, of all that there are.

@@ -86,7 +86,7 @@ impl Campaign {
 }
 
 /// A rig as it is poured: with the bundled grains, and to 10 um, so that recordings of one rig share their pours.
-fn at_scale(rig: &Rig, length: f64) -> Rig {
+pub(super) fn at_scale(rig: &Rig, length: f64) -> Rig {
     let to = |v: f64| (v / length * 1e5).round() / 1e5;
     Rig {
         diameter_m: BUNDLED_RIG.diameter_m,

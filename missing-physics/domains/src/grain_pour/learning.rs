@@ -74,7 +74,8 @@ pub(super) fn in_sight(samples: Vec<Sample>, seen: &[[f64; COUNT]], count: usize
     samples.into_iter().filter(|s| volume_in_sight(&s.statistics, count) >= IN_SIGHT * least).collect()
 }
 
-fn scaled(grains: &Grains, scale: f64) -> Grains {
+/// Grains at another scale.
+pub(super) fn scaled(grains: &Grains, scale: f64) -> Grains {
     Grains {
         positions_m: grains.positions_m.iter().map(|p| p.map(|v| scale * v)).collect(),
         radii_m: grains.radii_m.iter().map(|r| scale * r).collect(),

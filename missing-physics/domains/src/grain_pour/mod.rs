@@ -9,11 +9,13 @@ mod cache;
 mod campaign;
 mod discrepancy;
 mod excess;
+mod figure;
 mod law;
 mod learning;
 mod model;
 mod read;
 mod spec;
+mod statistic;
 
 use granular_infer::statistics::{COUNT, STATISTICS};
 use missing_physics::data::{Recording, Run};
@@ -130,7 +132,9 @@ fn prepare(read: Read, file: String) -> Result<Loaded, ReadError> {
         "grains that are not spheres are rods in the model: cubes and flakes are told as rods of some length, or unexplained".into(),
     ];
     undetermined.extend(excess::words(&read, &model.baseline(&read, &campaign)));
-    Ok(Loaded::new(recording, model, experiments.into(), undetermined))
+    Ok(Loaded::drawn(recording, model, experiments.into(), undetermined, move |model, d| {
+        figure::figures(&read, model, d)
+    }))
 }
 
 /// A run of one row.

@@ -31,6 +31,8 @@ pub(super) struct PourModel {
     layout: Layout,
     pub(super) scale: Scale,
     runs: HashMap<String, WhitenedRun>,
+    /// Where statistics spread as they do in the recording.
+    near: View,
 }
 
 impl PourModel {
@@ -49,17 +51,23 @@ impl PourModel {
         let start = [c.sliding_friction, c.rolling_friction, c.restitution, c.rolling_damping];
         let [lowest, highest] = read.heights_m();
         let (spec, layout) = build(&scale.up(ranges), start, lowest, highest);
-        let mut model = Self { law, spec, layout, scale, runs: HashMap::new() };
+        let mut model = Self { law, spec, layout, scale, runs: HashMap::new(), near };
         for (label, height) in read.pictures.iter().map(|p| (p.label.clone(), p.height_m)) {
-            model.add(label, height, &near);
+            model.add(label, height);
         }
         Ok(model)
     }
 
-    /// Adds a run at a height in m; the spread is that of `near`.
-    fn add(&mut self, label: String, height_m: f64, near: &View) {
-        let mut view = *near;
+    /// A view near which pictures like the recording's are poured, from a height in m.
+    fn view(&self, height_m: f64) -> View {
+        let mut view = self.near;
         view.conditions.height_m = height_m / self.scale.length;
+        view
+    }
+
+    /// Adds a run at a height in m.
+    fn add(&mut self, label: String, height_m: f64) {
+        let view = self.view(height_m);
         let (centre, factor) = (self.law.mean(&view), self.law.factor(&view));
         self.runs.insert(label, WhitenedRun { height_m, centre, factor });
     }
@@ -101,11 +109,23 @@ impl PourModel {
         }
     }
 
-    /// Mean statistics of a picture at shared parameters.
-    fn mean(&self, height_m: f64, shared: &[f64]) -> [f64; COUNT] {
+    /// One sigma of each statistic of a picture from a height in m, as the engine weighs it.
+    pub(super) fn sigma(&self, height_m: f64) -> [f64; COUNT] {
+        let factor = self.law.factor(&self.view(height_m));
+        std::array::from_fn(|k| factor.row(k).norm())
+    }
+
+    /// Under which conditions a picture is poured from a height in m, in the campaign's lengths, and how much it is blurred (px^2).
+    pub(super) fn poured(&self, height_m: f64, shared: &[f64]) -> View {
+        let conditions = self.scale.down(&self.conditions(height_m, shared));
+        View { conditions, blur_px2: shared[self.layout.blur_px2.slot] }
+    }
+
+    /// Under which conditions a picture is poured from a height in m.
+    fn conditions(&self, height_m: f64, shared: &[f64]) -> Conditions {
         let p = &self.layout;
         let at = |place: missing_physics::model::ParameterRef| shared[place.slot];
-        let conditions = Conditions {
+        Conditions {
             sliding_friction: at(p.friction),
             rolling_friction: at(p.rolling),
             restitution: at(p.restitution),
@@ -117,8 +137,15 @@ impl PourModel {
             tilt_rad: p.tilt.map(at),
             drag_per_m: at(p.drag),
             aspect_ratio: at(p.aspect),
-        };
-        let mut mean = self.law.emulator.mean(&self.scale.down(&conditions), at(p.blur_px2));
+        }
+    }
+
+    /// Mean statistics of a picture at shared parameters.
+    pub(super) fn mean(&self, height_m: f64, shared: &[f64]) -> [f64; COUNT] {
+        let p = &self.layout;
+        let at = |place: missing_physics::model::ParameterRef| shared[place.slot];
+        let View { conditions, blur_px2 } = self.poured(height_m, shared);
+        let mut mean = self.law.emulator.mean(&conditions, blur_px2);
         mean[0] += at(p.depth_offset) / self.law.diameter_m;
         for (k, (name, _)) in STATISTICS.iter().enumerate() {
             match name.as_str() {

@@ -1,8 +1,10 @@
 //! The domain `liquid-tilt`: a closed container of liquid, tilted slowly and felt at the wrist.
 
 mod experiments;
+mod figure;
 mod local;
 mod model;
+mod section;
 mod setup;
 mod spec;
 
@@ -145,7 +147,10 @@ impl Domain for LiquidTilt {
                 "mass and volume are free in each run: a known liquid (density_kg_m3) or measured volumes (volume_m3) would tell more mechanisms apart".into(),
             );
         }
-        let loaded = Loaded::new(recording, model, experiments, undetermined);
+        let shown = std::sync::Arc::new(recording.clone());
+        let loaded = Loaded::drawn(recording, model, experiments, undetermined, move |model, d| {
+            figure::figures(model, &shown, d)
+        });
         Ok(CheckedRecording::from(loaded).with_hints(hint))
     }
 }

@@ -21,6 +21,41 @@ pub struct LiquidTiltModel {
     slip: usize,
 }
 
+/// A run's load, and all that is not as stated in each of its poses.
+pub(super) struct Loaded {
+    pub(super) mass_kg: f64,
+    pub(super) volume_m3: f64,
+    pub(super) wall_m: f64,
+    pub(super) cavity: Cavity,
+    pub(super) departures: Vec<Departures>,
+}
+
+/// Where a function of a number from 0 to `most` is least: the best of a grid, then by the golden section.
+fn least(of: &mut dyn FnMut(f64) -> f64, most: f64) -> f64 {
+    const GRID: u32 = 60;
+    const ROUNDS: u32 = 40;
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let step = most / f64::from(GRID);
+    let at = |k: u32| step * f64::from(k);
+    let mut best = (f64::INFINITY, 0);
+    for k in 0..=GRID {
+        let value = of(at(k));
+        if value < best.0 {
+            best = (value, k);
+        }
+    }
+    let (mut low, mut high) = (at(best.1.saturating_sub(1)), at((best.1 + 1).min(GRID)));
+    for _ in 0..ROUNDS {
+        let [a, b] = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+        if of(a) < of(b) {
+            high = b;
+        } else {
+            low = a;
+        }
+    }
+    0.5 * (low + high)
+}
+
 impl std::fmt::Debug for LiquidTiltModel {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("LiquidTiltModel").field("setup", &self.setup).finish_non_exhaustive()
@@ -72,6 +107,47 @@ impl LiquidTiltModel {
         (mass.unwrap_or_else(|| volume * self.setup.density_kg_m3.unwrap_or(0.0)), volume)
     }
 
+    /// What else is as it is not stated, in a pose of a run.
+    fn departures(&self, row: &[f64], shared: &[f64], at: usize) -> Departures {
+        let p = &self.layout;
+        let slip_row = shared[p.slip_row.slot];
+        let slipped = if row[at] >= slip_row && row.contains(&slip_row) { shared[p.slip.slot] } else { 0.0 };
+        Departures {
+            force_gain: shared[p.gain.slot],
+            torque_offset_nm: shared[p.torque.slot] + shared[p.drift.slot] * row[at],
+            angle_offset_rad: shared[p.angle.slot],
+            grasp_offset_m: shared[p.grasp.slot] + slipped,
+            shell_shift_m: shared[p.shift.slot],
+            surface_lag_rad: shared[p.lag.slot],
+        }
+    }
+
+    /// The load with which the model's channels in a run are those of a fit: its mass by the weight, and its volume, where that is not
+    /// known, by the torque.
+    pub(super) fn loaded(&self, run: &Run, shared: &[f64], channels: &[Vec<f64>]) -> Option<Loaded> {
+        let [_, row, ..] = run.inputs.as_slice() else { return None };
+        let grasp = &self.setup.grasp;
+        let felt = -channels.get(1)?.iter().sum::<f64>() / run.len() as f64;
+        let weight = felt / grasp.gravity_m_s2 / (1.0 + shared[self.layout.gain.slot]);
+        let mass_kg = (weight - grasp.container_mass_kg - grasp.gripper_mass_kg).max(0.0);
+        let torque = channels.get(2)?;
+        let mut out = vec![0.0; 3 * run.len()];
+        let mut misfit = |volume: f64| {
+            if self.wrenches(run, shared, &self.nuisance(mass_kg, volume), &mut out).is_err() {
+                return f64::INFINITY;
+            }
+            out[2 * run.len()..].iter().zip(torque).map(|(p, m)| (p - m).powi(2)).sum::<f64>()
+        };
+        let wall_m = shared[self.layout.thickness.slot];
+        let cavity = self.cavity(wall_m).ok()?;
+        let capacity = cavity.capacity_m3();
+        let unknown = if self.layout.volume.is_some() { least(&mut misfit, capacity) } else { 0.0 };
+        let (mass_kg, volume) = self.load(run, &self.nuisance(mass_kg, unknown));
+        let volume_m3 = volume.clamp(0.0, capacity);
+        let departures = (0..run.len()).map(|at| self.departures(row, shared, at)).collect();
+        Some(Loaded { mass_kg, volume_m3, wall_m, cavity, departures })
+    }
+
     /// What the wrist feels in each pose of a run.
     fn wrenches(&self, run: &Run, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
         let n = run.len();
@@ -99,16 +175,8 @@ impl LiquidTiltModel {
         let (mass, volume) = self.load(run, nuisance);
         let (mass, volume) = (mass * (1.0 + off.liquid), volume * (1.0 + off.liquid));
         let volume = volume.clamp(0.0, cavity.capacity_m3());
-        let slip_row = shared[p.slip_row.slot];
-        let slipped = if row[at] >= slip_row && row.contains(&slip_row) { shared[p.slip.slot] } else { 0.0 };
-        let departures = Departures {
-            force_gain: shared[p.gain.slot],
-            torque_offset_nm: shared[p.torque.slot] + shared[p.drift.slot] * row[at],
-            angle_offset_rad: shared[p.angle.slot],
-            grasp_offset_m: shared[p.grasp.slot] + slipped + off.grasp_m,
-            shell_shift_m: shared[p.shift.slot],
-            surface_lag_rad: shared[p.lag.slot],
-        };
+        let mut departures = self.departures(row, shared, at);
+        departures.grasp_offset_m += off.grasp_m;
         let angle = theta[at] + off.angle_rad;
         let felt =
             self.setup.grasp.wrench(&*cavity, angle, mass, volume, &departures).map_err(|e| e.to_string())?;

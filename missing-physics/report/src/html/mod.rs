@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use missing_physics::diagnosis::{Diagnosis, Law, NextExperiment, Verdict};
 
 use super::context::ReportContext;
+use super::figure::FIGURE_STYLE;
 use super::number::{estimate, listed, p_value, significant};
 use super::svg::{CHART_STYLE, escape};
 use super::text::{
@@ -36,6 +37,9 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
     let mut page = String::with_capacity(128 * 1024);
     page.push_str(&head(d, context));
     page.push_str(&explore::section(d, context, &format!("{}{CURVES_KEY}", plots::still(d, context))));
+    for figure in &context.figures {
+        section(&mut page, &figure.title, &figure.html());
+    }
     let wrong = d.verdict != Verdict::Adequate;
     if wrong {
         section(&mut page, "What was left out", &mechanisms::parameters(d, &context.citations));
@@ -85,7 +89,7 @@ fn head(d: &Diagnosis, context: &ReportContext) -> String {
 /// A page from its beginning to its body.
 fn opening(title: &str) -> String {
     format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">{POLICY}<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{CHART_STYLE}{STYLE}{REPORT_STYLE}</style></head><body>",
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">{POLICY}<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{CHART_STYLE}{STYLE}{REPORT_STYLE}{FIGURE_STYLE}</style></head><body>",
         escape(title)
     )
 }
