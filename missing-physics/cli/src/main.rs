@@ -60,6 +60,9 @@ enum Command {
         /// Start the program that the recording names (`custom`): recordings are passed on, and it may do anything.
         #[arg(long)]
         allow_command: bool,
+        /// The most memory that it may take, GB; what is free without.
+        #[arg(long, value_name = "GB")]
+        memory: Option<f64>,
     },
     /// Makes a recording of a laboratory's files: CSV, MCAP and ROS 2 bags, Parquet, NumPy, MATLAB, WAV.
     Import {
@@ -169,15 +172,36 @@ enum Command {
 
 fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
     match command {
-        Command::Diagnose { folders, json, html, svg, write_model, seed, threads, alpha, allow_command } => {
+        Command::Diagnose {
+            folders,
+            json,
+            html,
+            svg,
+            write_model,
+            seed,
+            threads,
+            alpha,
+            allow_command,
+            memory,
+        } => {
             folders.iter().try_for_each(|folder| permit(folder, allow_command))?;
             on_interrupt("nothing was written".into());
             let options = Options { seed, ..Options::with_alpha(alpha) };
             let threads = useful(threads);
             let many = commands::into_folders(&folders, html.as_deref());
             let folder = folders.first().cloned().unwrap_or_default();
-            let arguments =
-                DiagnoseArguments { folder, json, html, svg, model: write_model, options, threads };
+            let arguments = DiagnoseArguments {
+                folder,
+                json,
+                html,
+                svg,
+                model: write_model,
+                options,
+                threads,
+                memory: memory.map(|gigabytes| (1e9 * gigabytes) as u64),
+                say: (loudness != Loudness::Quiet).then_some(progress::line),
+                verbose: loudness == Loudness::Verbose,
+            };
             let steps = Steps::new(loudness);
             if many {
                 commands::diagnose_many(&folders, &arguments, &steps)
@@ -207,7 +231,12 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
         }
         Command::Watch { folder, reference, alpha, settle, end_after, pipe, allow_command } => {
             permit(&folder, allow_command)?;
-            on_interrupt("nothing was written".into());
+            let kept = if pipe {
+                format!("rows that came are kept in {}", folder.join("data.csv").display())
+            } else {
+                "nothing was written".into()
+            };
+            on_interrupt(kept);
             let options = Options::with_alpha(alpha);
             let arguments =
                 WatchArguments { folder, reference, options, settle_s: settle, end_after_s: end_after, pipe };
@@ -320,5 +349,18 @@ fn main() -> ExitCode {
             let _ = writeln!(std::io::stderr(), "missing-physics: {}", shown(&error, true));
             ExitCode::from(2)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown;
+
+    /// A terminal would set its title, clear its screen or go back to the line's beginning; lines and tables stay.
+    #[test]
+    fn a_terminal_obeys_no_name() {
+        let hostile = "a\u{1b}]0;x\u{7}\rb\u{9b}2J\tc\n";
+        assert_eq!(shown(hostile, false), hostile);
+        assert_eq!(shown(hostile, true), "a\\u{1b}]0;x\\u{7}\\rb\\u{9b}2J\tc\n");
     }
 }

@@ -1,7 +1,9 @@
 //! How far the work is: a bar on a terminal, a line every some seconds elsewhere.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::sync::{Mutex, PoisonError};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,6 +11,10 @@ use missing_physics::observer::{Observer, Progress};
 
 /// Time between two lines.
 const EVERY: Duration = Duration::from_secs(10);
+/// Time between two looks of a bar.
+const TICK: Duration = Duration::from_millis(200);
+/// What is done before the first step is told.
+const FIRST: &str = "reading";
 
 /// How much is said of the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,28 +32,60 @@ pub(crate) struct Steps {
     loudness: Loudness,
     bar: Option<ProgressBar>,
     begin: Instant,
-    state: Mutex<State>,
+    state: Arc<Mutex<State>>,
+    /// Where there is no terminal: a thread that says a line now and then, whatever a step takes, and what ends it.
+    lines: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 struct State {
-    said: Instant,
     step: String,
+    done: f64,
     step_begin: Instant,
+}
+
+impl State {
+    fn said(&self) -> String {
+        format!("{}{}", self.step, far(self.done, self.step_begin.elapsed().as_secs_f64()))
+    }
 }
 
 impl Steps {
     pub(crate) fn new(loudness: Loudness) -> Self {
         let begin = Instant::now();
-        let bar = (loudness == Loudness::Usual && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::new(100);
+        let (usual, terminal) = (loudness == Loudness::Usual, std::io::stderr().is_terminal());
+        let bar = (usual && terminal).then(|| {
+            let bar = ProgressBar::new(100).with_message(FIRST);
             if let Ok(style) = ProgressStyle::with_template("{bar:30} {msg}") {
                 bar.set_style(style);
             }
+            bar.enable_steady_tick(TICK);
             bar
         });
-        let state = State { said: begin, step: String::new(), step_begin: begin };
-        Self { loudness, bar, begin, state: Mutex::new(state) }
+        let state = State { step: FIRST.into(), done: 0.0, step_begin: begin };
+        let state = Arc::new(Mutex::new(state));
+        let lines = (usual && !terminal).then(|| said_now_and_then(&state, begin));
+        if loudness == Loudness::Verbose {
+            line(&format!("{FIRST} …"));
+        }
+        Self { loudness, bar, begin, state, lines }
     }
+
+    fn end_of_step(state: &State) {
+        line(&format!("{}: {:.2} s", state.step, state.step_begin.elapsed().as_secs_f64()));
+    }
+}
+
+/// Says every ten seconds how far the work is.
+fn said_now_and_then(state: &Arc<Mutex<State>>, begin: Instant) -> (Sender<()>, JoinHandle<()>) {
+    let (end, ended) = channel();
+    let state = Arc::clone(state);
+    let told = std::thread::spawn(move || {
+        while ended.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
+            let said = state.lock().unwrap_or_else(PoisonError::into_inner).said();
+            line(&format!("{:.0} s so far, {said}", begin.elapsed().as_secs_f64()));
+        }
+    });
+    (end, told)
 }
 
 /// How far a step is that began `spent` seconds ago, and what of it is expected to remain; nothing where its share is not known.
@@ -65,7 +103,8 @@ fn far(done: f64, spent: f64) -> String {
 }
 
 /// A line on standard error; that it cannot be written changes nothing.
-fn line(text: &str) {
+pub(crate) fn line(text: &str) {
+    let text = crate::shown(text, std::io::stderr().is_terminal());
     let _ = writeln!(std::io::stderr(), "missing-physics: {text}");
 }
 
@@ -74,22 +113,16 @@ impl Observer for Steps {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.step != progress.stage {
             if self.loudness == Loudness::Verbose {
-                if !state.step.is_empty() {
-                    line(&format!("{}: {:.2} s", state.step, state.step_begin.elapsed().as_secs_f64()));
-                }
+                Self::end_of_step(&state);
                 line(&format!("{} …", progress.stage));
             }
             state.step = progress.stage.to_owned();
             state.step_begin = Instant::now();
         }
-        let said =
-            format!("{}{}", progress.stage, far(progress.done, state.step_begin.elapsed().as_secs_f64()));
+        state.done = progress.done;
         if let Some(bar) = &self.bar {
-            bar.set_message(said);
+            bar.set_message(state.said());
             bar.set_position((100.0 * progress.done) as u64);
-        } else if self.loudness != Loudness::Quiet && state.said.elapsed() >= EVERY {
-            state.said = Instant::now();
-            line(&format!("{:.0} s so far, {said}", self.begin.elapsed().as_secs_f64()));
         }
         true
     }
@@ -100,12 +133,17 @@ impl Drop for Steps {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+        if let Some((end, told)) = self.lines.take() {
+            drop(end);
+            // It says lines and nothing else: there is nothing to hear from it.
+            let _ = told.join();
+        }
         if self.loudness == Loudness::Verbose {
-            let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
-            if !state.step.is_empty() {
-                line(&format!("{}: {:.2} s", state.step, state.step_begin.elapsed().as_secs_f64()));
-            }
-            line(&format!("{:.2} s in all", self.begin.elapsed().as_secs_f64()));
+            Self::end_of_step(&self.state.lock().unwrap_or_else(PoisonError::into_inner));
+            let memory = missing_physics_cli::commands::most_memory();
+            let memory =
+                memory.map_or_else(String::new, |bytes| format!(", {} MB of memory at most", bytes >> 20));
+            line(&format!("{:.2} s in all{memory}", self.begin.elapsed().as_secs_f64()));
         }
     }
 }

@@ -7,7 +7,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{DiagnoseError, Options, diagnose};
 use missing_physics::model::{Experiment, Model, Quantity, Spec};
-use missing_physics::observer::Observer;
+use missing_physics::observer::{Observer, Silent};
 use missing_physics_report::Figure;
 
 use crate::recording::{Column, ColumnContents, Header, ReadError};
@@ -82,14 +82,25 @@ pub struct CheckedRecording {
     pub hints: Vec<String>,
     /// The columns of the table that hold numbers.
     pub columns: Vec<ColumnContents>,
-    prepare: Box<dyn FnOnce() -> Result<Loaded, ReadError> + Send>,
+    prepare: Box<Prepare>,
 }
+
+/// What is still to be done for a recording, watched as it goes on.
+type Prepare = dyn FnOnce(&dyn Observer) -> Result<Loaded, ReadError> + Send;
 
 impl CheckedRecording {
     /// A recording whose model takes some work, done by `prepare`.
     pub fn new(
         contents: Contents,
         prepare: impl FnOnce() -> Result<Loaded, ReadError> + Send + 'static,
+    ) -> Self {
+        Self::long(contents, move |_| prepare())
+    }
+
+    /// As [`CheckedRecording::new`], where the work is long: it tells how far it is.
+    pub fn long(
+        contents: Contents,
+        prepare: impl FnOnce(&dyn Observer) -> Result<Loaded, ReadError> + Send + 'static,
     ) -> Self {
         Self { contents, hints: Vec::new(), columns: Vec::new(), prepare: Box::new(prepare) }
     }
@@ -105,7 +116,15 @@ impl CheckedRecording {
     /// # Errors
     /// [`ReadError::Unfit`] where that cannot be done with this recording, or what is wrong with its rows.
     pub fn prepare(self) -> Result<Loaded, ReadError> {
-        let mut loaded = (self.prepare)()?;
+        self.prepare_watched(&Silent)
+    }
+
+    /// As [`CheckedRecording::prepare`], watched.
+    ///
+    /// # Errors
+    /// As [`CheckedRecording::prepare`], and [`ReadError::Unfit`] where the observer stops long work.
+    pub fn prepare_watched(self, observer: &dyn Observer) -> Result<Loaded, ReadError> {
+        let mut loaded = (self.prepare)(observer)?;
         loaded.hints = self.hints;
         Ok(loaded)
     }

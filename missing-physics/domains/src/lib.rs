@@ -51,4 +51,6 @@ pub mod slosh;
 pub mod trajectory;
 
 pub use domain::{CheckedRecording, Contents, Domain, Loaded, RunContents, THESIS, Template};
-pub use registry::{UnknownDomain, all, check, check_source, find, load, load_source, load_with_gaps};
+pub use registry::{
+    UnknownDomain, all, check, check_source, find, load, load_source, load_watched, load_with_gaps,
+};

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use missing_physics::observer::Observer;
+
 use crate::domain::{CheckedRecording, Domain, Loaded};
 use crate::recording::{Header, ReadError, Source, quoted};
 
@@ -70,6 +72,18 @@ pub fn check_source(source: &Source) -> Result<(&'static dyn Domain, CheckedReco
 /// [`ReadError`].
 pub fn load(folder: &Path) -> Result<(&'static dyn Domain, Loaded), ReadError> {
     load_source(&Source::folder(folder))
+}
+
+/// As [`load`], watched where that takes long.
+///
+/// # Errors
+/// As [`CheckedRecording::prepare_watched`].
+pub fn load_watched(
+    folder: &Path,
+    observer: &dyn Observer,
+) -> Result<(&'static dyn Domain, Loaded), ReadError> {
+    let (domain, checked) = check(folder)?;
+    Ok((domain, checked.prepare_watched(observer)?))
 }
 
 /// As [`load`], for a recording in a folder or in memory.

@@ -25,5 +25,5 @@ pub use html::{Entry, html, index};
 pub use json::json;
 pub use plots::picture;
 pub use runs::shown;
-pub use text::text;
+pub use text::{text, tried};
 pub use write::write_whole;

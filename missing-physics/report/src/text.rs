@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Law, Location, MechanismReport, RunSpread, Verdict};
+use missing_physics::diagnosis::{Diagnosis, Law, Location, MechanismReport, RunSpread, SetReport, Verdict};
 
 use super::context::ReportContext;
 use super::number::{estimate, listed, p_value, probability, significant};
@@ -74,6 +74,26 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
         page.entry("next", &line);
     }
     page.0
+}
+
+/// The sets of mechanisms that lead, a line each: how probable they are, whether they are adequate, what they gain on unseen data.
+pub fn tried(d: &Diagnosis) -> Vec<String> {
+    let line = |set: &SetReport| {
+        let name = if set.ids.is_empty() { "nothing".to_owned() } else { set.ids.join(" + ") };
+        let mut said = format!("tried {name}: probability {}", probability(set.probability));
+        // Writing to a string cannot fail.
+        if let Some(p) = set.p_value {
+            let _ = write!(said, ", adequate at p = {}", significant(p, 2));
+        }
+        if let Some(gain) = set.heldout_log_score_gain {
+            let _ = write!(said, ", gains {} in log score on unseen data", significant(gain, 3));
+        }
+        if let Some(why) = &set.ruled_out {
+            let _ = write!(said, ", ruled out: {why}");
+        }
+        said
+    };
+    d.sets.iter().map(line).collect()
 }
 
 /// The verdict in one sentence.

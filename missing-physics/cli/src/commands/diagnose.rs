@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::Options;
-use missing_physics::observer::Observer;
+use missing_physics::observer::{Observer, Progress};
 
 use super::error::CommandError;
+use super::memory;
 use super::output::{Said, places};
 use super::provenance::provenance;
 use missing_physics_domains as domains;
@@ -30,6 +31,12 @@ pub struct DiagnoseArguments {
     pub options: Options,
     /// Number of threads; 0 for all cores.
     pub threads: usize,
+    /// The most memory that it may take, bytes; what is free without.
+    pub memory: Option<u64>,
+    /// Whom to tell what is known before the work and, where [`DiagnoseArguments::verbose`] is set, what was tried.
+    pub say: Option<fn(&str)>,
+    /// Whether all is told.
+    pub verbose: bool,
 }
 
 /// Diagnoses a recording, and returns the text with the files that are to be written after it.
@@ -58,13 +65,29 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
         .num_threads(threads)
         .build()
         .map_err(|error| CommandError::Threads { threads, error })?;
-    let (domain, loaded) = pool.install(|| domains::load(&arguments.folder))?;
+    let (domain, loaded) = pool.install(|| domains::load_watched(&arguments.folder, observer))?;
     if arguments.model.is_some() && !domain.predicts() {
         return Err(RepairError::NoChannels { domain: domain.id() }.into());
     }
+    let tell = |line: String| {
+        if let Some(say) = arguments.say {
+            say(&format!("{}: {line}", arguments.folder.display()));
+        }
+    };
+    let needed = memory::needed(&loaded.recording);
+    let said = memory::checked(needed, arguments.memory)?;
+    said.or_else(|| arguments.verbose.then(|| memory::said(needed))).into_iter().for_each(tell);
     let diagnosis = pool.install(|| loaded.diagnose(&arguments.options, observer))?;
+    if arguments.verbose {
+        report::tried(&diagnosis).into_iter().for_each(tell);
+    }
     // Pictures may take simulations of their own.
-    let figures = if html.is_some() { pool.install(|| loaded.figures(&diagnosis)) } else { Vec::new() };
+    let drawing = Progress { stage: "drawing", done: 0.0 };
+    let figures = if html.is_some() && observer.progress(drawing) {
+        pool.install(|| loaded.figures(&diagnosis))
+    } else {
+        Vec::new()
+    };
     let context = ReportContext {
         domain: domain.id().to_owned(),
         recording: arguments.folder.display().to_string(),

@@ -87,6 +87,16 @@ pub enum CommandError {
         /// What the system says.
         error: std::io::Error,
     },
+    /// A diagnosis would take more memory than there is.
+    #[error(
+        "takes up to {needed_gb:.1} GB of memory, and {free_gb:.1} GB are free: give it fewer rows, or allow it with --memory {:.0}", .needed_gb.ceil()
+    )]
+    Memory {
+        /// The most that it takes, GB.
+        needed_gb: f64,
+        /// What is free, GB.
+        free_gb: f64,
+    },
     /// The threads that were asked for cannot be started.
     #[error("{threads} threads cannot be had: {error}")]
     Threads {

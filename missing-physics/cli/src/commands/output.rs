@@ -124,10 +124,12 @@ impl Place {
         match (&*text, descriptor) {
             ("-" | "/dev/stdout", _) | (_, Some("1")) => return Ok(Self::Stdout),
             ("/dev/stderr", _) | (_, Some("2")) => return Ok(Self::Stderr),
-            (_, Some(_)) => return Ok(Self::Device(path.into())),
             _ => {}
         }
         let io = |error| CommandError::Io { path: path.into(), error };
+        if descriptor.is_some() {
+            return std::fs::metadata(path).map(|_| Self::Device(path.into())).map_err(io);
+        }
         match std::fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => Err(CommandError::NotAFile { path: path.into() }),
             Ok(metadata) if !metadata.is_file() => Ok(Self::Device(path.into())),
@@ -151,7 +153,14 @@ impl Place {
 
     pub(super) fn write(&self, contents: &[u8]) -> Result<(), CommandError> {
         let done = match self {
-            Self::Stdout => io::stdout().lock().write_all(contents).and_then(|()| io::stdout().flush()),
+            Self::Stdout => {
+                let mut out = io::stdout().lock();
+                match out.write_all(contents).and_then(|()| out.flush()) {
+                    // A reader that has gone away is no failure of ours.
+                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+                    done => done,
+                }
+            }
             Self::Stderr => io::stderr().lock().write_all(contents),
             Self::Device(path) => {
                 std::fs::OpenOptions::new().append(true).open(path).and_then(|mut f| f.write_all(contents))

@@ -9,6 +9,7 @@ mod drops;
 mod figures;
 mod import;
 mod located;
+mod long_work;
 mod machines;
 mod next_experiment;
 mod outputs;

@@ -128,6 +128,57 @@ fn quiet_says_nothing_and_verbose_says_each_step() {
     let (out, err) = said(&run(&["diagnose", RECORDING, "--verbose"]));
     assert!(out.starts_with("The simulation does not explain"), "{out}");
     assert!(err.lines().count() > 2 && err.contains(" s in all"), "{err}");
+    assert!(err.contains("tried quadratic-drag: probability"), "{err}");
     let many = run(&["diagnose", RECORDING, "--threads", "100000"]);
     assert_eq!(said(&many).0, out);
+}
+
+/// Nine is no descriptor that is open: that is said before the work, not after it.
+#[test]
+fn a_descriptor_that_is_not_open_is_refused_before_the_work() {
+    let (out, err) = said(&run(&["diagnose", RECORDING, "--json", "/dev/fd/9"]));
+    assert_eq!(out, "");
+    assert!(err.contains("/dev/fd/9: ") && err.lines().count() == 1, "{err}");
+}
+
+/// `--html - | head` is as good as without `--html -`.
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    for arguments in [&["domains"][..], &["diagnose", RECORDING, "--html", "-"]] {
+        let mut child = tool(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut first = [0];
+        let mut stdout = child.stdout.take().unwrap();
+        stdout.read_exact(&mut first).unwrap();
+        drop(stdout);
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && !said(&output).1.contains("ipe"), "{arguments:?}: {output:?}");
+    }
+}
+
+/// A file may not grow beyond some kilobytes, as on a disk that fills up while it is written.
+#[test]
+fn a_disk_that_fills_up_leaves_the_old_file_and_no_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("report.html");
+    std::fs::write(&path, "old").unwrap();
+    let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" diagnose \"$1\" --html \"$2\"";
+    let output = Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_missing-physics"), RECORDING])
+        .arg(&path)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    let (out, err) = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(out.starts_with("The simulation does not explain"), "{out}");
+    assert!(err.contains("report.html: ") && err.lines().count() == 1, "{err}");
+    assert_eq!(std::fs::read(&path).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["report.html"]);
+}
+
+/// What is said of a folder moves no cursor, wherever standard error leads: it is quoted in errors by whoever reads them.
+#[test]
+fn control_characters_of_names_are_escaped() {
+    let (_, err) = said(&run(&["check", "no\u{1b}[2Jsuch"]));
+    assert!(err.contains("no\\u{1b}[2Jsuch") && !err.contains('\u{1b}'), "{err}");
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -16,6 +16,8 @@ use crate::recording::quoted;
 
 /// The longest line that a simulator may answer, bytes.
 const LONGEST_LINE: u64 = 64 << 20;
+/// How many lines it may answer before they are read.
+const AHEAD: usize = 1;
 /// How many of its last words on stderr are kept, and how many bytes of each.
 const LAST_WORDS: usize = 3;
 const LONGEST_WORDS: u64 = 1 << 12;
@@ -226,7 +228,8 @@ impl Process {
                 }
             }
         });
-        let (found, answers) = channel();
+        // One that answers more than it is asked waits: what nobody has asked for is not kept.
+        let (found, answers) = sync_channel(AHEAD);
         std::thread::spawn(move || {
             let mut stdout = BufReader::new(stdout);
             loop {
@@ -373,6 +376,33 @@ impl Drop for Process {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
     use super::*;
+
+    /// What a simulator says beyond what it is asked is not kept, however much it is.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_simulator_that_says_too_much_waits() {
+        let taken = || {
+            let status = std::fs::read_to_string("/proc/self/statm").unwrap();
+            status.split(' ').nth(1).unwrap().parse::<u64>().unwrap() * 4096
+        };
+        let command =
+            ["sh", "-c", "read l; echo '{\"id\": 1, \"channels\": {}}'; yes yes"].map(str::to_owned);
+        let pool = Pool::new(Start {
+            command: command.into(),
+            folder: std::env::temp_dir(),
+            limit: Duration::from_secs(60),
+            processes: 1,
+            batch: 1,
+        });
+        let before = taken();
+        let alone = [vec![]];
+        let (run, parameters, sets, inputs) = ("a", &[][..], &alone[..], &[][..]);
+        let asked = Questions { run, parameters, sets, inputs, channels: &[], rows: 0 };
+        assert_eq!(pool.predict(&asked).ok(), Some(vec![vec![]]));
+        std::thread::sleep(Duration::from_secs(1));
+        let more = taken().saturating_sub(before);
+        assert!(more < 20 << 20, "{more} bytes");
+    }
 
     /// The only simulator there may be dies while many wait for it: each of them is told.
     #[test]

@@ -10,6 +10,7 @@ use granular_infer::campaign::{Conditions, Grains, Ranges, Rig};
 use granular_infer::dem::Pour;
 use granular_infer::seeing::HeightMap;
 use granular_infer::statistics::{COUNT, STATISTICS, Symmetry, statistics};
+use missing_physics::observer::Silent;
 use rayon::prelude::*;
 
 use super::campaign::{BUNDLED_RIG, Campaign};
@@ -71,8 +72,8 @@ fn distance(folder: &Path) -> Result<Distance, Box<dyn std::error::Error>> {
     let key: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("key.json"))?)?;
     let read = read(&Header::read(&Source::folder(folder))?)?;
     let heights: Vec<f64> = read.pictures.iter().map(|p| p.height_m).collect();
-    let campaign = Campaign::of(&read.rig, read.heights_m())?;
-    let model = PourModel::new(&campaign, &read)?;
+    let campaign = Campaign::of(&read.rig, read.heights_m(), &Silent)?;
+    let model = PourModel::new(&campaign, &read, &Silent)?;
     let aside = aside(&read);
     let (conditions, blur_px2) = truth(&key, &campaign, aside).ok_or("a key without a truth")?;
     let at_truth = distances(&model, &read, &conditions, blur_px2);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use granular_infer::campaign::{Grains, Ranges, Rig};
 use granular_infer::shard;
-use indicatif::{ProgressBar, ProgressStyle};
+use missing_physics::observer::{Observer, Progress};
 use rayon::prelude::*;
 
 use crate::recording::ReadError;
@@ -21,6 +21,7 @@ pub(super) fn cached(
     rig: &Rig,
     ranges: &Ranges,
     file: Option<PathBuf>,
+    observer: &dyn Observer,
 ) -> Result<Vec<(u32, Grains)>, ReadError> {
     let mut bytes = file.as_ref().and_then(|f| std::fs::read(f).ok()).unwrap_or_default();
     // A file that was cut short, or is another's, is made anew.
@@ -29,11 +30,12 @@ pub(super) fn cached(
         bytes.clear();
     }
     let mut next = pours.last().map_or(0, |p| p.0 + 1);
-    let bar = ProgressBar::new(u64::from(POURS)).with_position(u64::from(next));
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} pouring {pos} of {len}, {eta} left") {
-        bar.set_style(style);
-    }
     while next < POURS {
+        // Where it is stopped, what was poured is kept.
+        let done = f64::from(next) / f64::from(POURS);
+        if !observer.progress(Progress { stage: "pouring grains with this rig", done }) {
+            return Err(ReadError::Unfit { file: "the pours".into(), why: "stopped".into() });
+        }
         let last = (next + CHUNK).min(POURS);
         let made: Vec<_> = (next..last)
             .into_par_iter()
@@ -57,10 +59,8 @@ pub(super) fn cached(
             let part = file.with_extension(format!("{}.part", std::process::id()));
             let _ = std::fs::write(&part, &bytes).and_then(|()| std::fs::rename(&part, file));
         }
-        bar.set_position(u64::from(last));
         next = last;
     }
-    bar.finish_and_clear();
     pours = shard::read(&bytes, rig)
         .map_err(|e| ReadError::Unfit { file: "the pours".into(), why: e.to_string() })?;
     Ok(pours)

@@ -2,6 +2,7 @@
 
 use granular_infer::campaign::{Conditions, Grains, Ranges, Rig};
 use granular_infer::shard;
+use missing_physics::observer::Observer;
 
 use super::cache::{Cache, cached, holds};
 use crate::recording::ReadError;
@@ -61,7 +62,7 @@ impl Campaign {
     ///
     /// # Errors
     /// [`ReadError::Unfit`] where no pour can be made, or the cache is not what it should be.
-    pub(super) fn of(rig: &Rig, [low, high]: [f64; 2]) -> Result<Self, ReadError> {
+    pub(super) fn of(rig: &Rig, [low, high]: [f64; 2], observer: &dyn Observer) -> Result<Self, ReadError> {
         let length = rig.diameter_m / BUNDLED_RIG.diameter_m;
         let adhesion = rig.density_kg_m3() / BUNDLED_RIG.density_kg_m3() * length.powi(2);
         let scale = Scale { length, adhesion };
@@ -80,7 +81,7 @@ impl Campaign {
         let cache = Cache::of(&rig);
         let height_m = cache.heights_m(heights_m);
         let ranges = Ranges { height_m, ..ranges };
-        let pours = cached(&rig, &ranges, cache.file(height_m))?;
+        let pours = cached(&rig, &ranges, cache.file(height_m), observer)?;
         Ok(Self { ranges, pours, scale })
     }
 }
@@ -109,6 +110,8 @@ fn similar(rig: &Rig, scale: f64) -> bool {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use missing_physics::observer::Silent;
+
     use super::super::cache::SEED;
     use super::*;
 
@@ -139,7 +142,7 @@ mod tests {
     /// may differ between processors, and a pour amplifies them.)
     #[test]
     fn bundled_pours_can_be_poured_again() {
-        let campaign = Campaign::of(&BUNDLED_RIG, [0.04, 0.12]).unwrap();
+        let campaign = Campaign::of(&BUNDLED_RIG, [0.04, 0.12], &Silent).unwrap();
         assert_eq!(campaign.scale, Scale { length: 1.0, adhesion: 1.0 });
         let mean_radius = |g: &Grains| {
             let radii: Vec<f64> =

@@ -17,7 +17,7 @@ use super::statistic;
 use crate::figures::Fit;
 
 /// Simulated pours of which the mean is drawn.
-const POURS: u64 = 6;
+const POURS: u64 = 4;
 /// How far from the axis heaps are drawn, in edges of the cube that holds the grains in rows.
 const REACH: f64 = 2.1;
 /// Fewest and most cells along a map.

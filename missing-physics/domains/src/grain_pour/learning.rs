@@ -7,6 +7,7 @@ use granular_infer::campaign::{Conditions, Grains, Ranges};
 use granular_infer::emulator::Sample;
 use granular_infer::seeing::HeightMap;
 use granular_infer::statistics::{COUNT, statistics, volume_in_sight};
+use missing_physics::observer::{Observer, Progress};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -23,9 +24,11 @@ const IN_SIGHT: f64 = 0.7;
 /// Over what part of half its range a friction or restitution is near; what pours far from it count for.
 const NEAR: f64 = 0.7;
 const FAR_COUNTS: f64 = 0.05;
+/// Parts of the pours between which is told how far the work is.
+const PARTS: usize = 20;
 
 /// Pictures of a campaign's pours, as the recording's camera would have taken them.
-pub(super) fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
+pub(super) fn samples(campaign: &Campaign, read: &Read, observer: &dyn Observer) -> Vec<Sample> {
     let noise = upper_median(read.pictures.iter().map(|p| p.map.noise_m).collect()).unwrap_or(0.0);
     let unit = read.camera.depth_unit_m;
     // Rounding to counts adds its own part again.
@@ -48,7 +51,14 @@ pub(super) fn samples(campaign: &Campaign, read: &Read) -> Vec<Sample> {
             })
             .collect::<Vec<_>>()
     };
-    campaign.pours.par_iter().flat_map_iter(one).collect()
+    let (pours, mut samples) = (&campaign.pours, Vec::with_capacity(2 * campaign.pours.len()));
+    for (k, part) in pours.chunks(pours.len().div_ceil(PARTS).max(1)).enumerate() {
+        let done = k as f64 / PARTS as f64;
+        // What is learned from is never a part of it: to stop is for the diagnosis that follows.
+        let _ = observer.progress(Progress { stage: "learning what pictures of pours show", done });
+        samples.par_extend(part.par_iter().flat_map_iter(one));
+    }
+    samples
 }
 
 /// What a pour counts for beside grains that are likely: less the further its frictions and restitution lie from theirs.

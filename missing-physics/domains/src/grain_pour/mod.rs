@@ -20,6 +20,7 @@ mod statistic;
 use granular_infer::statistics::{COUNT, STATISTICS};
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::{Experiment, Quantity, Spec};
+use missing_physics::observer::Observer;
 
 use self::campaign::Campaign;
 use self::model::PourModel;
@@ -83,7 +84,7 @@ impl Domain for GrainPour {
     fn read(&self, header: &Header) -> Result<CheckedRecording, ReadError> {
         let read = read::read(header)?;
         let file = header.file.clone();
-        Ok(CheckedRecording::new(contents(&read), || prepare(read, file)))
+        Ok(CheckedRecording::long(contents(&read), move |observer| prepare(read, file, observer)))
     }
 }
 
@@ -107,10 +108,10 @@ fn funnel_height() -> Quantity {
 }
 
 /// Learns what pictures of such pours show: from the pours that come with the tool or, for another rig, from new ones.
-fn prepare(read: Read, file: String) -> Result<Loaded, ReadError> {
+fn prepare(read: Read, file: String, observer: &dyn Observer) -> Result<Loaded, ReadError> {
     let range = read.heights_m();
-    let campaign = Campaign::of(&read.rig, range)?;
-    let mut model = PourModel::new(&campaign, &read).map_err(|e| ReadError::Unfit {
+    let campaign = Campaign::of(&read.rig, range, observer)?;
+    let mut model = PourModel::new(&campaign, &read, observer).map_err(|e| ReadError::Unfit {
         file,
         why: format!("nothing can be learned for this camera: {e}"),
     })?;

@@ -7,6 +7,7 @@ use granular_infer::emulator::{Emulator, EmulatorError};
 use granular_infer::statistics::{COUNT, STATISTICS};
 use missing_physics::data::Run;
 use missing_physics::model::{ErrorModel, Extensions, Model, PredictError, Spec};
+use missing_physics::observer::Observer;
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign::{Campaign, Scale};
@@ -36,10 +37,14 @@ pub(super) struct PourModel {
 }
 
 impl PourModel {
-    pub(super) fn new(campaign: &Campaign, read: &Read) -> Result<Self, EmulatorError> {
+    pub(super) fn new(
+        campaign: &Campaign,
+        read: &Read,
+        observer: &dyn Observer,
+    ) -> Result<Self, EmulatorError> {
         let (ranges, scale) = (&campaign.ranges, campaign.scale);
         let seen = Seen::of(read, scale.length);
-        let samples = in_sight(samples(campaign, read), &seen.statistics, read.rig.count);
+        let samples = in_sight(samples(campaign, read, observer), &seen.statistics, read.rig.count);
         let emulator = Emulator::learn(ranges, &samples)?;
         let mut law = PictureLaw { emulator, diameter_m: read.rig.diameter_m, pictures: read.pictures.len() };
         // Grains like these count for more: a polynomial is nearer to the truth the smaller its range is.

@@ -1,0 +1,85 @@
+//! What a diagnosis takes of memory: told beforehand, and kept within what there is.
+
+use missing_physics::data::Recording;
+
+use super::error::CommandError;
+
+/// What the tool itself takes, with what `grain-pour` learns from, bytes.
+const ITSELF: u64 = 256 << 20;
+/// The most that a diagnosis has been seen to take for each measured value, bytes; less in most domains (docs/limits.md).
+const EACH_VALUE: u64 = 24 << 10;
+/// What is not worth a word.
+const LITTLE: u64 = 1 << 30;
+
+/// The most memory that a diagnosis of a recording takes, bytes.
+pub(super) fn needed(recording: &Recording) -> u64 {
+    let values: usize = recording.runs.iter().map(|run| run.len() * recording.channels.len()).sum();
+    ITSELF + EACH_VALUE * values as u64
+}
+
+/// What is to be said before a diagnosis that needs so many bytes; nothing where it needs little.
+///
+/// # Errors
+/// [`CommandError::Memory`] where it needs more than `most` or, where nothing is said, than is free.
+pub(super) fn checked(needed: u64, most: Option<u64>) -> Result<Option<String>, CommandError> {
+    if let Some(free) = most.or_else(free)
+        && needed > free
+    {
+        return Err(CommandError::Memory { needed_gb: gigabytes(needed), free_gb: gigabytes(free) });
+    }
+    Ok((needed > LITTLE).then(|| said(needed)))
+}
+
+/// How much memory is needed, in words.
+pub(super) fn said(needed: u64) -> String {
+    format!("takes up to {:.1} GB of memory", gigabytes(needed))
+}
+
+fn gigabytes(bytes: u64) -> f64 {
+    bytes as f64 / 1e9
+}
+
+/// Memory that is free, bytes: of the machine, and of the group to which this process is held; nothing where nobody says.
+fn free() -> Option<u64> {
+    let file = |path: &str| std::fs::read_to_string(path).ok();
+    let machine = file("/proc/meminfo").and_then(|text| kilobytes(&text, "MemAvailable:"));
+    let number = |path: &str| file(path)?.trim().parse::<u64>().ok();
+    let group = number("/sys/fs/cgroup/memory.max")
+        .zip(number("/sys/fs/cgroup/memory.current"))
+        .map(|(most, taken)| most.saturating_sub(taken));
+    machine.into_iter().chain(group).min()
+}
+
+/// The most memory that this process has had, bytes; nothing where nobody says.
+pub fn most_memory() -> Option<u64> {
+    kilobytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
+}
+
+/// A value of a line such as `VmHWM:  1234 kB`, in bytes.
+fn kilobytes(text: &str, key: &str) -> Option<u64> {
+    let value = text.lines().find_map(|line| line.strip_prefix(key))?;
+    Some(value.split_whitespace().next()?.parse::<u64>().ok()? << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_refused_and_what_is_much_is_said() {
+        assert_eq!(checked(1 << 20, Some(1 << 30)).ok(), Some(None));
+        assert_eq!(
+            checked(3_400_000_000, Some(1 << 40)).ok().flatten().as_deref(),
+            Some("takes up to 3.4 GB of memory")
+        );
+        let refused = checked(3_400_000_000, Some(1 << 31)).map_err(|e| e.to_string());
+        let why = refused.err().unwrap_or_default();
+        assert!(why.contains("3.4 GB") && why.contains("2.1 GB") && why.contains("--memory"), "{why}");
+    }
+
+    #[test]
+    fn sizes_are_read_from_what_the_system_says() {
+        assert_eq!(kilobytes("Name: x\nVmHWM:\t  1024 kB\n", "VmHWM:"), Some(1 << 20));
+        assert_eq!(kilobytes("VmHWM: many", "VmHWM:"), None);
+    }
+}
