@@ -46,6 +46,8 @@ pub struct Request {
     pub rate_hz: Option<f64>,
     /// The folder of a recording whose `recording.toml` is taken over.
     pub like: Option<PathBuf>,
+    /// The contents of a `recording.toml` that is taken over, instead of one in a folder.
+    pub header: Option<String>,
 }
 
 /// A recording as it is to be written, and what is to be said of it.
@@ -59,6 +61,8 @@ pub struct Imported {
     pub copies: Vec<(PathBuf, String)>,
     /// What was found, taken, left out and not known, for a person.
     pub text: String,
+    /// Of that, what is not known or was taken for granted, a sentence each.
+    pub notes: Vec<String>,
     /// What each column of the recording comes from.
     pub mapped: Vec<Mapped>,
     /// Keys of `recording.toml` whose values are the template's.
@@ -84,6 +88,26 @@ impl Mapped {
         };
         Self { target: choice.target.clone(), title, formula: choice.formula() }
     }
+}
+
+/// What a domain wants of tables, and what of them would be taken for it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Proposal {
+    /// Names of the columns that the domain, or the header that is taken over, knows; `run` is the first.
+    pub wanted: Vec<String>,
+    /// What was asked for, and what is proposed beside it.
+    pub mapped: Vec<Mapped>,
+}
+
+/// What would be taken for what in tables that were read already ([`file::read_bytes`]), however much is missing yet.
+///
+/// # Errors
+/// [`ImportError`]: no such domain, or an option that makes no sense.
+pub fn propose(request: &Request, tables: &[Table]) -> Result<Proposal, ImportError> {
+    let wanted = wanted(request)?;
+    let names = wanted.targets.iter().map(|target| target.name.clone());
+    let mapped = choices(request, &wanted, tables)?.iter().map(Mapped::of).collect();
+    Ok(Proposal { wanted: std::iter::once("run".to_owned()).chain(names).collect(), mapped })
 }
 
 /// What the files hold, for a person: columns with units and first values.
@@ -114,7 +138,7 @@ fn import_with(
     request: &Request,
     tables: impl FnOnce() -> Result<Vec<Table>, ImportError>,
 ) -> Result<Imported, ImportError> {
-    let wanted = Wanted::of(&request.domain, request.like.as_deref())?;
+    let wanted = wanted(request)?;
     let settings: Vec<Setting> =
         request.settings.iter().map(|s| Setting::parse(s)).collect::<Result<_, _>>()?;
     if let (Some(_), Some(setting)) = (&wanted.like, request.settings.first()) {
@@ -156,9 +180,13 @@ fn import_with(
     };
     let story =
         Story { tables: &tables, choices: &choices, rows: &rows, unknown: &unknown, domain: wanted.domain };
-    let text = story.tell();
+    let (text, notes) = (story.tell(), story.notes());
     let mapped = choices.iter().map(Mapped::of).collect();
-    Ok(Imported { text, header, table: Some((data, rows.to_csv())), copies, mapped, unknown })
+    Ok(Imported { text, notes, header, table: Some((data, rows.to_csv())), copies, mapped, unknown })
+}
+
+fn wanted(request: &Request) -> Result<Wanted, ImportError> {
+    Wanted::of(&request.domain, request.header.as_deref(), request.like.as_deref())
 }
 
 fn read(files: &[PathBuf]) -> Result<Vec<Table>, ImportError> {
@@ -245,5 +273,6 @@ fn of_sound(request: &Request, wanted: &Wanted, settings: &[Setting], tables: &[
     let header = text.lines().filter(without_table).collect::<Vec<_>>().join("\n") + "\n" + &audio;
     let copies = request.files.iter().cloned().zip(names).collect();
     let text = say::columns(tables, &[]) + &say::sound(tables);
-    Imported { header, table: None, copies, text, mapped: Vec::new(), unknown: Vec::new() }
+    let notes = say::SOUND_NOTES.map(str::to_owned).to_vec();
+    Imported { header, table: None, copies, text, notes, mapped: Vec::new(), unknown: Vec::new() }
 }

@@ -74,7 +74,8 @@ impl Story<'_> {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
+    /// What is not known, or was taken for granted.
+    pub(crate) fn notes(&self) -> Vec<String> {
         let mut notes = self.rows.remarks.clone();
         for choice in self.choices {
             let wanted = units::of_name(&choice.target).map(|(_, unit)| unit);
@@ -186,6 +187,12 @@ fn aligned(lines: &[[String; 4]]) -> String {
     text
 }
 
+/// What is not known of sound.
+pub(crate) const SOUND_NOTES: [&str; 2] = [
+    "where the microphones are: without microphones_m only times are heard",
+    "the speed of sound: 343 m/s, unless temperature_k says otherwise",
+];
+
 /// What is to say of sound that is taken as it is.
 pub(crate) fn sound(tables: &[Table]) -> String {
     let mut text = format!("\n{} files of sound, one a run\n", tables.len());
@@ -197,7 +204,7 @@ pub(crate) fn sound(tables: &[Table]) -> String {
             picture(&points).iter().for_each(|line| text.push_str(&format!("  {line}\n")));
         }
     }
-    text.push_str("\nnot known, or taken for granted\n  where the microphones are: without microphones_m only times are heard\n");
-    text.push_str("  the speed of sound: 343 m/s, unless temperature_k says otherwise\n");
+    text.push_str("\nnot known, or taken for granted\n");
+    SOUND_NOTES.iter().for_each(|note| text.push_str(&format!("  {note}\n")));
     text
 }

@@ -196,11 +196,11 @@ impl Target {
 }
 
 impl Wanted {
-    /// What a domain wants; `like` is the folder of a recording whose header is taken over.
+    /// What a domain wants; the header that is taken over is a text, or that of the recording in a folder.
     ///
     /// # Errors
     /// [`ImportError::UnknownDomain`], or why the other recording's header cannot be taken.
-    pub(crate) fn of(domain: &str, like: Option<&Path>) -> Result<Self, ImportError> {
+    pub(crate) fn of(domain: &str, header: Option<&str>, like: Option<&Path>) -> Result<Self, ImportError> {
         let domain = domains::find(domain)?;
         let mut targets: Vec<Target> = domain
             .columns()
@@ -208,7 +208,11 @@ impl Wanted {
             .filter(|c| c.name != "run")
             .map(|c| Target::new(c.name, c.label))
             .collect();
-        let like = like.map(|folder| Like::read(folder, domain.id())).transpose()?;
+        let like = match (header, like) {
+            (Some(text), _) => Some(Like::parse(Path::new("recording.toml"), text.to_owned(), domain.id())?),
+            (None, Some(folder)) => Some(Like::read(folder, domain.id())?),
+            (None, None) => None,
+        };
         if targets.is_empty() {
             targets.push(Target::new("t_s", false));
         }
@@ -225,13 +229,16 @@ impl Like {
         if std::fs::metadata(&file).map_err(open)?.len() > LARGEST_FILE {
             return Err(ImportError::broken(&file, "too large for the header of a recording"));
         }
-        let text = std::fs::read_to_string(&file).map_err(open)?;
+        Self::parse(&file, std::fs::read_to_string(&file).map_err(open)?, domain)
+    }
+
+    fn parse(file: &Path, text: String, domain: &str) -> Result<Self, ImportError> {
         let table: toml::Table =
-            text.parse().map_err(|e: toml::de::Error| ImportError::broken(&file, e.message().to_owned()))?;
+            text.parse().map_err(|e: toml::de::Error| ImportError::broken(file, e.message().to_owned()))?;
         let named = table.get("domain").and_then(toml::Value::as_str).unwrap_or_default();
         if named != domain {
             let why = format!("a recording of the domain {}, not of {domain}", quoted(named));
-            return Err(ImportError::broken(&file, why));
+            return Err(ImportError::broken(file, why));
         }
         let data = table.get("data").and_then(toml::Value::as_str).unwrap_or("data.csv").to_owned();
         let plain = !data.is_empty()
@@ -240,7 +247,7 @@ impl Like {
             && data != "recording.toml";
         if !plain {
             return Err(ImportError::broken(
-                &file,
+                file,
                 format!("data = {}, expected a plain name", quoted(&data)),
             ));
         }

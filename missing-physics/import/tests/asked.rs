@@ -1,7 +1,10 @@
 //! What is asked for is done, and what cannot be is said in one line.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
-use missing_physics_import::{Imported, Request, import};
+use std::path::Path;
+
+use missing_physics_import::file::read_bytes;
+use missing_physics_import::{Imported, Request, import, import_tables, propose};
 
 fn with(text: &str, domain: &str, change: impl FnOnce(&mut Request)) -> Result<Imported, String> {
     let folder = tempfile::tempdir().unwrap();
@@ -162,6 +165,31 @@ fn another_recordings_header_is_taken_over() {
     assert_eq!(imported.header, header);
     let (name, table) = imported.table.unwrap();
     assert_eq!((name.as_str(), table.lines().nth(1)), ("rows.csv", Some("1,0,3.14159265359")));
+    // The same from memory, where the header is a text.
+    let (maps, header) = (vec!["angle_rad=Winkel".into()], Some(header.to_owned()));
+    let request = Request { domain: "custom".into(), maps, header, ..Request::default() };
+    let tables = read_bytes(Path::new("a.csv"), text.as_bytes()).unwrap();
+    let again = import_tables(&request, tables).unwrap();
+    assert_eq!((again.header, again.table.unwrap().1), (imported.header, table));
     let refused = with(text, "slosh", |r| r.like = Some(folder.path().into())).unwrap_err();
     assert!(refused.contains("a recording of the domain \"custom\", not of slosh"), "{refused}");
+}
+
+/// What is missing is no reason to propose nothing, and what was settled stays.
+#[test]
+fn what_would_be_taken_is_said_before_all_is_there() {
+    let tables =
+        read_bytes(Path::new("a.csv"), b"Zeit [ms];H\xc3\xb6he (mm);Wert\n0;2000;1\n10;1999;2\n").unwrap();
+    let mut request = Request { domain: "trajectory".into(), ..Request::default() };
+    let of = |request: &Request| -> Vec<String> {
+        let mapped = propose(request, &tables).unwrap().mapped;
+        mapped.into_iter().map(|m| format!("{} = {}", m.target, m.formula)).collect()
+    };
+    assert_eq!(of(&request), ["t_s = 0.001 × \"Zeit [ms]\"", "z_m = 0.001 × \"Höhe (mm)\""]);
+    request.maps = vec!["t_s=".into(), "z_m=-Wert [cm]".into()];
+    assert_eq!(of(&request), ["z_m = -0.01 × \"Wert\""]);
+    let wanted = propose(&request, &tables).unwrap().wanted;
+    assert_eq!(wanted[..5], ["run", "t_s", "x_m", "y_m", "z_m"]);
+    request.maps = vec!["height=Wert".into()];
+    assert!(propose(&request, &tables).unwrap_err().to_string().contains("no column \"height\""));
 }
