@@ -50,6 +50,12 @@ fn dependency_arrows_point_down_and_chapters_never_see_each_other() {
                 "missing-physics-prove",
                 "missing-physics-report",
             ],
+            "missing-physics-web" => vec![
+                "missing-physics",
+                "missing-physics-domains",
+                "missing-physics-import",
+                "missing-physics-report",
+            ],
             // It reads everything as text; its tests make the bundled recordings again.
             "house" => vec![],
             // Examples look at everything, benches at the examples' helpers too; nothing else looks at either.

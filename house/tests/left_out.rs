@@ -4,11 +4,12 @@
 use house::{root, sources};
 
 /// How the name of a test that is left out begins, by which the gate asks for it, and the reason that stands in its `ignore`.
-const KINDS: [(&str, &str); 6] = [
+const KINDS: [(&str, &str); 7] = [
     ("shared_long_", "needs ../shared, long: .ci/run --long"),
     ("shared_", "needs ../shared"),
     ("long_", "long: .ci/run --long"),
     ("python_", "needs python3"),
+    ("browser_page_", "needs chromium and the page that .ci/web builds, long: .ci/run --long"),
     ("browser_", "needs chromium, long: .ci/run --long"),
     ("", "by hand: "),
 ];

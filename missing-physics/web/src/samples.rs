@@ -7,6 +7,8 @@ use serde::Serialize;
 pub struct Sample {
     /// The recording's folder in the repository, or of a table its name.
     pub name: &'static str,
+    /// What it is called.
+    pub title: &'static str,
     /// What it is, in a few words.
     pub words: &'static str,
     /// The domain, where no header says it.
@@ -17,9 +19,10 @@ pub struct Sample {
 
 /// The header and the table of a recording in the repository.
 macro_rules! recording {
-    ($name:literal, $domain:literal, $words:literal) => {
+    ($name:literal, $domain:literal, $title:literal, $words:literal) => {
         Sample {
             name: concat!("recordings/", $name),
+            title: $title,
             words: $words,
             domain: $domain,
             files: &[
@@ -33,20 +36,34 @@ macro_rules! recording {
 /// The recordings that come with the page, and a table as a laboratory wrote it.
 pub fn samples() -> &'static [Sample] {
     &[
-        recording!("dropped-ball", "trajectory", "a tennis ball, dropped four times and filmed"),
         recording!(
-            "measured/slosh/antisloshing-torque",
-            "slosh",
-            "measured: a wave of water, felt at a robot's wrist"
+            "dropped-ball",
+            "trajectory",
+            "a dropped ball",
+            "simulated: a tennis ball, filmed four times"
+        ),
+        recording!(
+            "practice/liquid-tilt/c02",
+            "liquid-tilt",
+            "a tilted bottle",
+            "simulated: felt at a robot's wrist, two effects hidden"
+        ),
+        recording!(
+            "measured/indentation/sand-plate-60mm",
+            "indentation",
+            "pressed sand",
+            "measured: a plate in dry sand, three times"
         ),
         recording!(
             "measured/motion/pendulum-small-swing",
             "motion",
-            "measured: a pendulum that comes to rest"
+            "a pendulum",
+            "measured until it came to rest; takes half a minute"
         ),
         Sample {
-            name: "throws.csv",
-            words: "a tracker's table in German: its columns are to be named",
+            name: "throws",
+            title: "a tracker's table",
+            words: "in German: what its columns are is proposed",
             domain: "trajectory",
             files: &[("throws.csv", include_str!("../../../recordings/throws.csv"))],
         },

@@ -22,11 +22,12 @@ fn asked(name: &str) -> Asked {
     Asked { name: name.into(), seed: 1, alpha: 0.05 }
 }
 
-/// Of each recording that comes with the page text and JSON are the command's; the JSON without the path that the command was given.
+/// Of the recordings that come with the page text, JSON and report are the command's, but for the path that the command was given. (The
+/// machine among them takes half a minute: the browser's test has it.)
 #[test]
 fn answers_are_the_commands() {
     let written = tempfile::tempdir().unwrap();
-    for sample in samples().iter().filter(|s| s.files.len() > 1) {
+    for sample in samples().iter().filter(|s| s.files.len() > 1 && s.domain != "motion") {
         let folder = root().join(sample.name);
         let [json, html] = ["a.json", "a.html"].map(|name| written.path().join(name));
         let arguments = DiagnoseArguments {
@@ -57,7 +58,7 @@ fn every_domain_has_a_sound_template() {
         assert!(!checked.runs.is_empty() && !checked.channels.is_empty(), "{}", domain.id);
     }
     let sample = |s: &&missing_physics_web::Sample| known.iter().any(|d| d.id == s.domain);
-    assert_eq!(samples().iter().filter(sample).count(), 4);
+    assert_eq!(samples().iter().filter(sample).count(), 5);
 }
 
 const TABLE: &str =
