@@ -1,6 +1,6 @@
 //! The free decay of a mode as a sensor reads it, with what real walls, surfaces and sensors add.
 
-use super::linear::{Propagator, STEPS_PER_RADIAN, Series};
+use super::linear::{Propagator, Rows, STEPS_PER_RADIAN, Stretch};
 
 /// Effects beyond a linear, viscously damped mode; all zero is off.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -118,19 +118,34 @@ impl Decay {
         let (w, ratio) = (self.omega_rad_s, self.damping_ratio);
         let per_step = w * STEPS_PER_RADIAN;
         let step = 1.0 / per_step;
-        let over = |h| Propagator::new(w, ratio, h);
-        let (whole, mut begin) = (over(step), 0.0);
-        let mut series = Series::new(w, ratio, step, [x, v]);
-        for (reading, &t) in out.iter_mut().zip(t_s) {
+        let over = |ahead: f64| Propagator::new(w, ratio, ahead * step);
+        let (whole, mut begin) = (Propagator::new(w, ratio, step), 0.0);
+        // Rows that are evenly spaced lie few different numbers of steps apart.
+        let mut known = [(0.0, whole); 2];
+        let mut rows = Rows::new(w, ratio, out);
+        let mut left = t_s;
+        while let Some(&t) = left.first() {
             if t - begin >= step {
-                let ahead = ((t - begin) / step).floor().max(1.0);
-                let to_there = if ahead == 1.0 { whole } else { over(ahead * step) };
+                // Whole steps, of a number that is not negative.
+                let ahead = (((t - begin) / step) as u64 as f64).max(1.0);
+                let to_there = if ahead == 1.0 {
+                    whole
+                } else if let Some((_, known)) = known.iter().find(|(steps, _)| *steps == ahead) {
+                    *known
+                } else {
+                    known = [(ahead, over(ahead)), known[0]];
+                    known[0].1
+                };
                 (x, v) = to_there.apply(x, v);
                 begin += ahead * step;
-                series = Series::new(w, ratio, step, [x, v]);
             }
-            *reading = series.at((t - begin) * per_step);
+            rows.step(Stretch { h: step, begin: [x, v], departing: None });
+            // The row that led here lies in the step, rounding or not.
+            let within = left.iter().enumerate().take_while(|(row, t)| *row == 0 || **t - begin < step);
+            let taken = rows.rows(within.map(|(_, t)| (t - begin) * per_step));
+            left = &left[taken..];
         }
+        rows.read();
     }
 }
 

@@ -1,7 +1,7 @@
 //! The decay with its effects, integrated: Runge-Kutta about the exact linear motion, stopped at the turning points of dry friction.
 
 use super::decay::{Decay, DecayError, QUINTIC};
-use super::linear::{Propagator, STEPS_PER_RADIAN, Series};
+use super::linear::{Propagator, Rows, STEPS_PER_RADIAN, Stretch};
 
 impl Decay {
     /// What the effects add to the acceleration.
@@ -22,56 +22,73 @@ impl Decay {
         state.set_off(w, friction);
         let whole = Stride::new(self, 1.0 / (w * STEPS_PER_RADIAN));
         let (mut begin, mut step) = (0.0, self.step(&state, &whole));
-        for (reading, &t) in out.iter_mut().zip(t_s) {
+        // How the position moves within a step is worked out where a row lies in it, which is in few where rows are far apart.
+        let mut taken = false;
+        let mut rows = Rows::new(w, self.damping_ratio, out);
+        let checked = |rows: &mut Rows<'_>| {
+            rows.read();
+            rows.beyond(bound).map_or(Ok(()), |row| Err(DecayError::Diverges { t_s: t_s[row] }))
+        };
+        for &t in t_s {
             while !state.stuck() && t >= begin + step.h {
                 begin += step.h;
                 state = step.end;
                 // A wave that has grown beyond all bounds is not followed to the next row.
                 if !(state.x.abs() <= bound) {
+                    checked(&mut rows)?;
                     return Err(DecayError::Diverges { t_s: t });
                 }
                 step = self.step(&state, &whole);
+                taken = false;
             }
-            *reading = if state.stuck() { state.x } else { step.motion.at((t - begin) / step.h) };
-            if !(reading.abs() <= bound) {
-                return Err(DecayError::Diverges { t_s: t });
+            if state.stuck() {
+                rows.known(state.x);
+            } else {
+                if !taken {
+                    rows.step(self.motion(&state, &step, &whole));
+                    taken = true;
+                }
+                rows.rows(std::iter::once((t - begin) / step.h));
             }
         }
-        Ok(())
+        checked(&mut rows)
+    }
+
+    /// What dry friction adds to the acceleration, against the direction of the motion.
+    fn force(&self, state: &Motion) -> f64 {
+        self.effects.friction * self.omega_rad_s * self.omega_rad_s * state.direction
     }
 
     /// The step from a state, which ends at the turning point where dry friction has one.
     fn step(&self, begin: &Motion, whole: &Stride) -> Step {
-        let stiffening = self.stiffening();
-        let force = self.effects.friction * self.omega_rad_s * self.omega_rad_s * begin.direction;
+        let (stiffening, force) = (self.stiffening(), self.force(begin));
         let advance = |stride: &Stride| self.runge_kutta(begin, stride, stiffening, force);
-        let push = |x, v| self.push(x, v, stiffening, force);
-        let pushes = |end: &Motion| [push(begin.x, begin.v), push(end.x, end.v)];
         let (x, v) = advance(whole);
-        let end = Motion { x, v, ..*begin };
         if self.effects.friction == 0.0 || v * begin.direction > 0.0 || begin.stuck() {
-            return Step { h: whole.h, motion: self.motion(begin, whole, &end, pushes(&end)), end };
+            return Step { h: whole.h, turn: None, end: Motion { x, v, ..*begin } };
         }
         if begin.v == 0.0 {
             // Hardly pulled beyond friction, and not moved by it.
-            let end = Motion { direction: 0.0, ..*begin };
-            return Step { h: 0.0, motion: self.motion(begin, whole, &end, [0.0; 2]), end };
+            return Step { h: 0.0, turn: None, end: Motion { direction: 0.0, ..*begin } };
         }
         let turn = self.turning_point(begin, whole.h, stiffening, force);
         let mut end = Motion { x: advance(&turn).0, v: 0.0, ..*begin };
-        let motion = self.motion(begin, &turn, &end, pushes(&end));
         end.set_off(self.omega_rad_s, self.effects.friction);
-        Step { h: turn.h, motion, end }
+        Step { h: turn.h, turn: Some(turn), end }
     }
 
     /// The positions within a step, from what the effects add to the acceleration at both ends.
-    fn motion(&self, begin: &Motion, stride: &Stride, end: &Motion, push: [f64; 2]) -> Series {
+    fn motion(&self, begin: &Motion, step: &Step, whole: &Stride) -> Stretch {
+        let (stiffening, force) = (self.stiffening(), self.force(begin));
+        let push = |at: &Motion| self.push(at.x, at.v, stiffening, force);
+        let [first, last] = [push(begin), push(&step.end)];
+        let stride = step.turn.as_ref().unwrap_or(whole);
         let (w, ratio, h) = (self.omega_rad_s, self.damping_ratio, stride.h);
         let (x, v) = stride.whole.apply(begin.x, begin.v);
-        let (x, v) = (end.x - x, end.v - v);
-        let acceleration = push[1] - w * w * x - 2.0 * ratio * w * v;
-        let linear = Series::new(w, ratio, h, [begin.x, begin.v]);
-        linear.departing(push[0] * h * h, [x, v * h, acceleration * h * h])
+        let (x, v) = (step.end.x - x, step.end.v - v);
+        let acceleration = last - w * w * x - 2.0 * ratio * w * v;
+        let departing = Some((first * h * h, [x, v * h, acceleration * h * h]));
+        Stretch { h, begin: [begin.x, begin.v], departing }
     }
 
     /// The stride after which the motion turns, somewhere within `h` (the speed is monotone there): Newton's method
@@ -103,6 +120,13 @@ impl Decay {
     /// doi:10.1137/0704033): with no effect there is no error, whatever the step.
     fn runge_kutta(&self, s: &Motion, stride: &Stride, stiffening: f64, force: f64) -> (f64, f64) {
         let (h, half, whole) = (stride.h, &stride.half, &stride.whole);
+        if stiffening == 0.0 && self.effects.quadratic_per_reading == 0.0 {
+            // The same sums where friction, which is constant, is all there is.
+            let k = -force;
+            let (x, v) = whole.apply(s.x, s.v + h / 6.0 * k);
+            let (dx, dv) = half.apply(0.0, h / 3.0 * (k + k));
+            return (x + dx, v + dv + h / 6.0 * k);
+        }
         let push = |(x, v): (f64, f64)| self.push(x, v, stiffening, force);
         let k1 = push((s.x, s.v));
         let k2 = push(half.apply(s.x, s.v + 0.5 * h * k1));
@@ -132,10 +156,10 @@ impl Stride {
     }
 }
 
-/// A step: how long it is, how the position moves within it, and where it ends.
+/// A step: how long it is, its stride where it ends at a turning point, and where it ends.
 struct Step {
     h: f64,
-    motion: Series,
+    turn: Option<Stride>,
     end: Motion,
 }
 
