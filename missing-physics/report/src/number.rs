@@ -49,12 +49,13 @@ pub(super) fn p_value(d: &Diagnosis) -> String {
     }
 }
 
-/// A probability with two decimals, never "1.00" or "0.00" where it is not.
+/// A probability with two decimals; whether a sum of probabilities is 1 to its last bit hangs on the processor, and is not said.
 pub(super) fn probability(p: f64) -> String {
     match p {
-        p if p > 0.995 && p < 1.0 => ">0.99".into(),
+        p if p > 0.995 => ">0.99".into(),
         p if p < 0.005 && p > 0.0 => "<0.01".into(),
-        p => format!("{:.2}", p.max(0.0)),
+        // Nothing has no sign.
+        p => format!("{:.2}", p.max(0.0) + 0.0),
     }
 }
 
@@ -91,5 +92,13 @@ mod tests {
         assert_eq!(significant(-1234.5, 2), "-1200");
         assert_eq!(significant(f64::NAN, 2), "unknown");
         assert_eq!(significant(0.0, 2), "0");
+    }
+
+    #[test]
+    fn a_probability_hangs_on_no_last_bit() {
+        for p in [0.999, 1.0 - f64::EPSILON, 1.0, 1.0 + f64::EPSILON] {
+            assert_eq!(probability(p), ">0.99");
+        }
+        assert_eq!([0.0, -0.0, 1e-300, 0.5].map(probability), ["0.00", "0.00", "<0.01", "0.50"]);
     }
 }

@@ -7,6 +7,10 @@ use crate::locate::responses::{Effect, Form, Responses};
 const GROUPS: usize = 40;
 /// By how much a change that goes on to the last run is worth more than what is over before.
 const STAYS: f64 = 1.0;
+/// Likelihoods that differ by this part of their sum are the same: as they are where the same readings are moved, but for rounding.
+const EVEN: f64 = 1e-3;
+/// Hypotheses that are worth the same to so much (twice a log likelihood) differ by rounding: the first of them is taken.
+const SAME: f64 = 1e-4;
 /// A subset of the runs is sought among so many at most.
 const SUBSETS: usize = 64;
 
@@ -88,7 +92,7 @@ impl Scan<'_> {
         let price = form.sizes() as f64 * self.rows.ln();
         let gains: Vec<f64> = effects.iter().map(Effect::gain).collect();
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
-            if best.as_ref().is_none_or(|b| gain - price > b.worth()) && gain.is_finite() {
+            if best.as_ref().is_none_or(|b| gain - price > b.worth() + SAME) && gain.is_finite() {
                 let bins = self.bins.clone();
                 *best = Some(Found { bins, interval, form, runs: runs(), components, gain, price });
             }
@@ -165,7 +169,7 @@ impl Scan<'_> {
                     ways += (((self.runs - k) as f64) / (k + 1) as f64).ln();
                     let price = self.rows.ln() + scanned + 2.0 * (ways + (self.runs as f64).ln());
                     let gain = sum.gain();
-                    if best.as_ref().is_none_or(|b| gain - price > b.worth()) {
+                    if best.as_ref().is_none_or(|b| gain - price > b.worth() + SAME) {
                         let mut runs = vec![false; self.runs];
                         order[..=k].iter().for_each(|&r| runs[r] = true);
                         let (form, components, bins) = (Form::Even, vec![component], self.bins.clone());
@@ -198,13 +202,15 @@ impl Scan<'_> {
             .map(|(interval, form)| Edges { interval, form, worth: worth(interval, form) })
             .filter(|edges| edges.worth.is_finite())
             .collect();
-        let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth()) else {
+        let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth() - SAME) else {
             return found;
         };
         // Edges that may be anywhere are worth what they are on average, not what the best of them is.
         let likelihoods = judged.iter().map(|e| (0.5 * (e.worth - best.worth)).exp());
         let average = best.worth + 2.0 * (likelihoods.sum::<f64>() / judged.len() as f64).ln();
-        let [from, to] = [|e: &Edges| e.interval.0, |e: &Edges| e.interval.1].map(|of| middle(&judged, of));
+        // What acts where it moves no reading may act there or not: the wider interval of those that are as likely.
+        let from = middle(&judged, |e| e.interval.0, -EVEN);
+        let to = middle(&judged, |e| e.interval.1, EVEN);
         let middle = likeliest(judged.iter().filter(|e| e.interval == (from, to))).unwrap_or(best);
         let price = price(middle.form);
         let (interval, form, gain) = (middle.interval, middle.form, average.max(found.worth()) + price);
@@ -223,13 +229,13 @@ fn likeliest<'a>(edges: impl Iterator<Item = &'a Edges>) -> Option<&'a Edges> {
     edges.max_by(|a, b| a.worth.total_cmp(&b.worth))
 }
 
-/// The edge before which there is half of the likelihood.
-fn middle(judged: &[Edges], edge: impl Fn(&Edges) -> usize) -> usize {
+/// The edge before which there is half of the likelihood, and a small part more.
+fn middle(judged: &[Edges], edge: impl Fn(&Edges) -> usize, more: f64) -> usize {
     let most = likeliest(judged.iter()).map_or(0.0, |best| best.worth);
     let mut weights: Vec<(usize, f64)> =
         judged.iter().map(|e| (edge(e), (0.5 * (e.worth - most)).exp())).collect();
     weights.sort_by_key(|weight| weight.0);
-    let mut left = 0.5 * weights.iter().map(|weight| weight.1).sum::<f64>();
+    let mut left = (0.5 + more) * weights.iter().map(|weight| weight.1).sum::<f64>();
     let passed = |weight: &&(usize, f64)| {
         left -= weight.1;
         left <= 0.0
