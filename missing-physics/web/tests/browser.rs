@@ -190,7 +190,7 @@ fn laboratory() -> String {
         format!("{};{};{};{}\n", comma(1e3 * t), comma(1e2 * z), comma(21.0), cells[0])
     };
     let rows: String = data.lines().skip(1).map(line).collect();
-    format!("t [ms];Messwert A;Messwert B (mm);Serie\n{rows}")
+    format!("t [ms];Messwert A;Messwert B (mm);Versuch\n{rows}")
 }
 
 /// Numbers of the JSON that a processor and WebAssembly work out in other orders and with other exponentials.
@@ -285,7 +285,7 @@ fn browser_page_takes_a_laboratorys_table() {
     until(&mut browser, "document.querySelector('#state').textContent.startsWith('no column found for z_m')");
     let header = "document.querySelector('#header').value";
     let rows = "[...document.querySelectorAll('#table tbody tr')].map((r) => r.cells[0].textContent + ': ' + r.querySelector('select').value).join()";
-    assert_eq!(browser.text(rows), "t [ms]: t_s,Messwert A: ,Messwert B (mm): ,Serie: ");
+    assert_eq!(browser.text(rows), "t [ms]: t_s,Messwert A: ,Messwert B (mm): ,Versuch: ");
     picture(&mut browser, "columns");
 
     // One column is the height, without a unit until one is given; another tells runs apart.
@@ -294,9 +294,9 @@ fn browser_page_takes_a_laboratorys_table() {
     until(&mut browser, &format!("{state}.includes('is z_m in centimetres?')"));
     name(&mut browser, "unit of Messwert A", "cm");
     until(&mut browser, &format!("{state}.includes('z_m -14.55 to 1.54 m')"));
-    name(&mut browser, "what Serie is", "run");
-    until(&mut browser, &format!("{rows}.endsWith('run') && {header}.includes('run = \"Serie\"')"));
-    assert_eq!(browser.text(rows), "t [ms]: t_s,Messwert A: z_m,Messwert B (mm): ,Serie: run");
+    name(&mut browser, "what Versuch is", "run");
+    until(&mut browser, &format!("{rows}.endsWith('run') && {header}.includes('run = \"Versuch\"')"));
+    assert_eq!(browser.text(rows), "t [ms]: t_s,Messwert A: z_m,Messwert B (mm): ,Versuch: run");
 
     // What somebody writes into the header is read, and can be taken back.
     write(&mut browser, "# mass_kg", "no_such_key");
