@@ -1,23 +1,30 @@
 """A pendulum: one question as a line of JSON in, one answer as a line of JSON out."""
 import json, math, sys
 
-def acceleration(angle, w, p):
-    # tanh for sign: a step of the integrator must not jump over the turning point.
-    return (-9.80665 / p["length_m"] * math.sin(angle) - 2 * p["damping_per_s"] * w
-            - p["drag"] * abs(w) * w - p["friction_rad_s2"] * math.tanh(w / 0.01))
-
 def swing(times, p):
+    pull, viscous = -9.80665 / p["length_m"], 2 * p["damping_per_s"]
+    drag, dry = p["drag"], p["friction_rad_s2"]
+    sin, tanh = math.sin, math.tanh
+
+    def acceleration(angle, w):
+        # tanh for sign: a step of the integrator must not jump over the turning point.
+        return pull * sin(angle) - viscous * w - drag * abs(w) * w - dry * tanh(w / 0.01)
+
     angle, w, t, angles = p["released_rad"], 0.0, times[0], []
     for until in times:
         steps = math.ceil((until - t) / 0.004)
         for _ in range(steps):  # Runge-Kutta, fourth order
             h = (until - t) / steps
-            k1, l1 = w, acceleration(angle, w, p)
-            k2, l2 = w + h / 2 * l1, acceleration(angle + h / 2 * k1, w + h / 2 * l1, p)
-            k3, l3 = w + h / 2 * l2, acceleration(angle + h / 2 * k2, w + h / 2 * l2, p)
-            k4, l4 = w + h * l3, acceleration(angle + h * k3, w + h * l3, p)
-            angle += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            w += h / 6 * (l1 + 2 * l2 + 2 * l3 + l4)
+            half, sixth = h / 2, h / 6
+            k1, l1 = w, acceleration(angle, w)
+            k2 = w + half * l1
+            l2 = acceleration(angle + half * k1, k2)
+            k3 = w + half * l2
+            l3 = acceleration(angle + half * k2, k3)
+            k4 = w + h * l3
+            l4 = acceleration(angle + h * k3, k4)
+            angle += sixth * (k1 + 2 * k2 + 2 * k3 + k4)
+            w += sixth * (l1 + 2 * l2 + 2 * l3 + l4)
         t = until
         angles.append(angle)
     return angles
