@@ -12,7 +12,7 @@ use missing_physics::engine::Options;
 use missing_physics::observer::Silent;
 
 /// Runs of which the median is taken.
-const RUNS: usize = 5;
+const RUNS: usize = 3;
 
 /// The folders of recordings below one, in order.
 fn recordings(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
@@ -40,12 +40,8 @@ fn diagnose(folder: &Path) -> Result<(String, usize, f64), Box<dyn std::error::E
 
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 {
-        values[middle]
-    } else {
-        0.5 * (values[middle.saturating_sub(1)] + values.get(middle).copied().unwrap_or(f64::NAN))
-    }
+    let of = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
+    0.5 * (of(values.len().saturating_sub(1) / 2) + of(values.len() / 2))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -74,7 +74,7 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
             say(&format!("{}: {line}", arguments.folder.display()));
         }
     };
-    let needed = memory::needed(&loaded.recording);
+    let needed = memory::needed(&*loaded.model, &loaded.recording);
     let said = memory::checked(needed, arguments.memory)?;
     said.or_else(|| arguments.verbose.then(|| memory::said(needed))).into_iter().for_each(tell);
     let diagnosis = pool.install(|| loaded.diagnose(&arguments.options, observer))?;

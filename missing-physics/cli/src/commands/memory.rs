@@ -1,20 +1,32 @@
 //! What a diagnosis takes of memory: told beforehand, and kept within what there is.
 
-use missing_physics::data::Recording;
+use missing_physics::data::{Recording, Run};
+use missing_physics::model::Model;
 
 use super::error::CommandError;
 
 /// What the tool itself takes, with what `grain-pour` learns from, bytes.
-const ITSELF: u64 = 256 << 20;
-/// The most that a diagnosis has been seen to take for each measured value, bytes; less in most domains (docs/limits.md).
-const EACH_VALUE: u64 = 24 << 10;
+const ITSELF: f64 = 256e6;
+/// What is kept of a run and channel, for each shape that its noise may have: columns of derivatives and curves, and their products. Bytes
+/// of all shapes together for each value of a column, and for each product; more than any recording of `docs/evidence` takes.
+const COLUMN: f64 = 600.0;
+const PRODUCT: f64 = 1000.0;
+/// Columns of curves along each variable.
+const CURVES: usize = 12;
+/// The part of it where noise has one shape.
+const WHITE: f64 = 0.05;
 /// What is not worth a word.
-const LITTLE: u64 = 1 << 30;
+const LITTLE: u64 = 1_000_000_000;
 
 /// The most memory that a diagnosis of a recording takes, bytes.
-pub(super) fn needed(recording: &Recording) -> u64 {
-    let values: usize = recording.runs.iter().map(|run| run.len() * recording.channels.len()).sum();
-    ITSELF + EACH_VALUE * values as u64
+pub(super) fn needed(model: &dyn Model, recording: &Recording) -> u64 {
+    let columns = (model.spec().parameters.len() + CURVES * recording.variables.len()) as f64;
+    let channels = recording.channels.len() as f64;
+    let rows: usize = recording.runs.iter().map(Run::len).sum();
+    let products = recording.runs.len() as f64 * columns * columns;
+    let white = model.extensions().errors.is_some_and(|errors| errors.longest_correlation() <= 0.0);
+    let shapes = if white { WHITE } else { 1.0 };
+    (ITSELF + shapes * channels * (COLUMN * columns * rows as f64 + PRODUCT * products)) as u64
 }
 
 /// What is to be said before a diagnosis that needs so many bytes; nothing where it needs little.

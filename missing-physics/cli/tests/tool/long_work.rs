@@ -108,25 +108,28 @@ fn memory_is_said_beforehand_and_bounded() {
     );
 }
 
-/// Fifteen thousand values along three axes, of which most is asked.
+/// Fifteen thousand values of four throws, and as many throws as their parts may be.
 #[test]
 #[ignore = "long: .ci/run --long"]
-fn long_memory_of_a_long_recording_is_bounded() {
+fn long_memory_of_long_and_of_many_runs_is_bounded() {
     use rand::SeedableRng as _;
     use rand_distr::Distribution as _;
-    let folder = tempfile::tempdir().unwrap();
     let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n[rig]\ngravity_m_s2 = 9.80665\n";
-    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
     let normal = rand_distr::Normal::new(0.0, 0.004).unwrap();
-    let mut rows = String::from("run,t_s,x_m,y_m,z_m\n");
-    for row in 0..5000 {
-        let t = 1.5 * f64::from(row % 1250) / 1250.0;
-        let [a, b, c] = std::array::from_fn(|_| normal.sample(&mut rng));
-        let (x, z) = (3.0 * t - 0.05 * t * t + a, 20.0 + 2.0 * t - 4.85 * t * t + c);
-        rows.push_str(&format!("{},{t:.7},{x:.6},{:.6},{z:.6}\n", row / 1250, t + b));
+    for (runs, rows) in [(4, 1250), (60, 20)] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+        let mut table = String::from("run,t_s,x_m,y_m,z_m,spin_x_rad_s,spin_y_rad_s,spin_z_rad_s\n");
+        for row in 0..runs * rows {
+            let t = 1.5 * f64::from(row % rows) / f64::from(rows);
+            let [a, b, c] = std::array::from_fn(|_| normal.sample(&mut rng));
+            let (x, z) = (3.0 * t - 0.05 * t * t + a, 20.0 + 2.0 * t - 4.85 * t * t + c);
+            let run = row / rows;
+            table.push_str(&format!("{run},{t:.7},{x:.6},{:.6},{z:.6},{run},{},7\n", t + b, 3 * run));
+        }
+        std::fs::write(folder.path().join("data.csv"), table).unwrap();
+        let [most, taken] = memory_mb(folder.path());
+        assert!(taken > 100.0 && taken < most, "{runs} runs: {taken} of {most} MB");
     }
-    std::fs::write(folder.path().join("data.csv"), rows).unwrap();
-    let [most, taken] = memory_mb(folder.path());
-    assert!(taken > 100.0 && taken < most, "{taken} of {most} MB");
 }
