@@ -72,7 +72,7 @@ impl Mark {
     }
 
     fn is_empty(&self) -> bool {
-        !self.points.iter().any(|p| is_finite(p))
+        !self.points.iter().any(is_finite)
     }
 
     /// As SVG, in pixels.
