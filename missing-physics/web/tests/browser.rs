@@ -245,7 +245,6 @@ fn browser_page_answers_in_every_domain() {
     for name in [
         "steel-ball",
         "thrown-ball",
-        "measured/trajectory/desilva-tennis-ball",
         "measured/bounce/erickson-pingpong-times",
         "practice/bounce/c01",
         "practice/slosh/c01",

@@ -7,6 +7,9 @@ use super::setup::Vessel;
 /// A closed line in the container's frame, x and z, m.
 pub(super) type Outline = Vec<[f64; 2]>;
 
+/// An edge of a triangle, by its vertices.
+type Edge = (u32, u32);
+
 /// The inside of a wall of some thickness (m), cut in the plane in which the container is tilted.
 pub(super) fn section(vessel: &Vessel, wall_m: f64) -> Vec<Outline> {
     match vessel {
@@ -26,10 +29,10 @@ fn cut(mesh: &MeshContainer) -> Vec<Outline> {
     let (low, high) = mesh.bounds();
     let middle = 0.5 * (low.y + high.y) + ASIDE * (high.y - low.y);
     // Each triangle that is cut leads from one of its edges to another, all in one sense.
-    let mut next: Vec<((u32, u32), (u32, u32), [f64; 2])> = Vec::new();
+    let mut next: Vec<(Edge, Edge, [f64; 2])> = Vec::new();
     for &[a, b, c] in mesh.triangles() {
         let at = |i: u32| mesh.vertices()[i as usize];
-        let crossing = |(i, j): (u32, u32)| {
+        let crossing = |(i, j): Edge| {
             let (p, q) = (at(i), at(j));
             let share = (middle - p.y) / (q.y - p.y);
             [p.x + share * (q.x - p.x), p.z + share * (q.z - p.z)]

@@ -9,8 +9,6 @@ const GROUPS: usize = 40;
 const STAYS: f64 = 1.0;
 /// Likelihoods that differ by this part of their sum are the same: as they are where the same readings are moved, but for rounding.
 const EVEN: f64 = 1e-3;
-/// Hypotheses that are worth the same to so much (twice a log likelihood) differ by rounding: the first of them is taken.
-const SAME: f64 = 1e-4;
 /// A subset of the runs is sought among so many at most.
 const SUBSETS: usize = 64;
 
@@ -92,7 +90,7 @@ impl Scan<'_> {
         let price = form.sizes() as f64 * self.rows.ln();
         let gains: Vec<f64> = effects.iter().map(Effect::gain).collect();
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
-            if best.as_ref().is_none_or(|b| gain - price > b.worth() + SAME) && gain.is_finite() {
+            if best.as_ref().is_none_or(|b| gain - price > b.worth()) && gain.is_finite() {
                 let bins = self.bins.clone();
                 *best = Some(Found { bins, interval, form, runs: runs(), components, gain, price });
             }
@@ -169,7 +167,7 @@ impl Scan<'_> {
                     ways += (((self.runs - k) as f64) / (k + 1) as f64).ln();
                     let price = self.rows.ln() + scanned + 2.0 * (ways + (self.runs as f64).ln());
                     let gain = sum.gain();
-                    if best.as_ref().is_none_or(|b| gain - price > b.worth() + SAME) {
+                    if best.as_ref().is_none_or(|b| gain - price > b.worth()) {
                         let mut runs = vec![false; self.runs];
                         order[..=k].iter().for_each(|&r| runs[r] = true);
                         let (form, components, bins) = (Form::Even, vec![component], self.bins.clone());
@@ -202,7 +200,7 @@ impl Scan<'_> {
             .map(|(interval, form)| Edges { interval, form, worth: worth(interval, form) })
             .filter(|edges| edges.worth.is_finite())
             .collect();
-        let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth() - SAME) else {
+        let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth()) else {
             return found;
         };
         // Edges that may be anywhere are worth what they are on average, not what the best of them is.
