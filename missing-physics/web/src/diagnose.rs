@@ -91,6 +91,7 @@ pub fn diagnose(asked: &Asked, files: &Files, observer: &dyn Observer) -> Result
     let (domain, loaded) = domains::load_source(&source)?;
     let options = Options { seed: asked.seed, ..Options::with_alpha(asked.alpha) };
     let diagnosis = loaded.diagnose(&options, observer)?;
+    let figures = loaded.figures(&diagnosis);
     let title = asked.name.rsplit('/').find(|part| !part.is_empty()).unwrap_or("recording");
     let context = ReportContext {
         domain: domain.id().to_owned(),
@@ -99,6 +100,7 @@ pub fn diagnose(asked: &Asked, files: &Files, observer: &dyn Observer) -> Result
         citations: vec![domains::THESIS.into()],
         words: domain.words(),
         additions: loaded.additions,
+        figures,
         provenance: json!({
             "version": env!("CARGO_PKG_VERSION"),
             "seed": options.seed,
