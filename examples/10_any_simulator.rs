@@ -27,6 +27,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             model: None,
             options: Options::default(),
             threads: 0,
+            memory: None,
+            say: None,
+            verbose: false,
         };
         println!("== {title}\n{}", diagnose(&arguments, &Silent)?.text);
         Ok(())
