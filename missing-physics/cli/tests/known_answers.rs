@@ -46,7 +46,7 @@ fn answer(folder: &Path, threads: &str) -> Value {
     let curves: Value = serde_json::from_str(curves.0).unwrap();
     assert!(!curves["runs"].as_array().unwrap().is_empty());
     let answer: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
-    let panels = page.matches("<svg viewBox=\"0 0 3").count();
+    let panels = page.matches("<figure><svg viewBox=").count();
     let figures: &[&str] = match answer["domain"].as_str().unwrap() {
         "grain-pour" => &["<h2>The heap of run", "<h2>What the pictures show", "class=\"level after\""],
         "liquid-tilt" => &["<h2>The container at its tilts", "<polygon class=\"area"],
