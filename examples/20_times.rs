@@ -10,6 +10,7 @@ use std::time::Instant;
 use examples::small;
 use missing_physics::engine::Options;
 use missing_physics::observer::Silent;
+use statrs::statistics::{Data, OrderStatistics};
 
 /// Runs of which the median is taken.
 const RUNS: usize = 3;
@@ -38,12 +39,6 @@ fn diagnose(folder: &Path) -> Result<(String, usize, f64), Box<dyn std::error::E
     Ok((format!("{}{}", domain.id(), if sound { ", from sound" } else { "" }), values, seconds))
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let of = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
-    0.5 * (of(values.len().saturating_sub(1) / 2) + of(values.len() / 2))
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings");
     let (folders, runs) = if small() {
@@ -58,7 +53,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let name = folder.strip_prefix(&root)?.display().to_string();
         match (0..runs).map(|_| diagnose(&folder)).collect::<Result<Vec<_>, _>>() {
             Ok(all) => {
-                let seconds = median(all.iter().map(|(.., seconds)| *seconds).collect());
+                let seconds =
+                    Data::new(all.iter().map(|(.., seconds)| *seconds).collect::<Vec<_>>()).median();
                 let (domain, values) = all.first().map(|(d, v, _)| (d.clone(), *v)).unwrap_or_default();
                 println!("{name:40} {domain:20} {values:7} {seconds:7.2}");
                 domains.entry(domain).or_default().push(seconds);
@@ -69,7 +65,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("\n{:20} {:>10} {:>10}", "domain", "recordings", "median, s");
     for (domain, seconds) in domains {
-        println!("{domain:20} {:10} {:10.2}", seconds.len(), median(seconds));
+        println!("{domain:20} {:10} {:10.2}", seconds.len(), Data::new(seconds).median());
     }
     Ok(())
 }
