@@ -24,13 +24,15 @@ liquid_mass_kg = 0.28182
 volume_m3 = 0.000308
 "#;
 
-/// The torque of the first mode, which the wall holds back by a constant, in steps of a tenth of a millisecond, and the sensor's noise.
+/// The torque of the first mode, which the wall holds back by a constant, in steps of a tenth of a millisecond, and the sensor's noise. The
+/// bottle is let go when the sensor is first read, so that what is recorded hangs on no clock.
 fn wave(seed: u64) -> impl FnMut(f64) -> [f64; 6] + Send {
     let (radius, level): (f64, f64) = (0.0387, 0.000308 / (std::f64::consts::PI * 0.0387 * 0.0387));
     let stiffness = 1.8412 * 9.80665 / radius * (1.8412 * level / radius).tanh();
-    let (mut now_s, mut x, mut v) = (0.0, 0.05, 0.0);
+    let (mut released_s, mut now_s, mut x, mut v) = (None, 0.0, 0.05, 0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     move |t_s| {
+        let t_s = t_s - *released_s.get_or_insert(t_s);
         while now_s < t_s {
             let h = (t_s - now_s).min(1e-4);
             // The middle of the step from its beginning.

@@ -2,6 +2,7 @@
 
 use super::curves::{Curves, DEGREE};
 use super::plane::{Alternative, Block, Linearised};
+use super::pooled::separate;
 use crate::fit::columns::whitened_columns;
 use crate::fit::optimum::Fit;
 use crate::linalg::{determined, dot};
@@ -174,9 +175,21 @@ impl<'a> Linearised<'a> {
             })
             .collect();
         let rule = rule.clone();
-        let in_play = Vec::new();
-        let mut linearised =
-            Self { problem, in_play, blocks, n_nuisance, n_shared, alternatives, mechanisms, rule, freedom };
+        let (in_play, pooled) = (Vec::new(), Vec::new());
+        let separate = separate(&blocks, n_nuisance);
+        let mut linearised = Self {
+            problem,
+            in_play,
+            blocks,
+            pooled,
+            separate,
+            n_nuisance,
+            n_shared,
+            alternatives,
+            mechanisms,
+            rule,
+            freedom,
+        };
         linearised.play(&linearised.rule.allowed.clone());
         Ok(linearised)
     }

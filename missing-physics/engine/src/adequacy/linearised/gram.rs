@@ -31,17 +31,21 @@ impl Gram {
         self.beside = DMatrix::from_fn(n, n, |i, j| self.values[(i, j)] - dot(borders[i], borders[j]));
     }
 
-    /// The product of two columns beside those that were eliminated.
-    pub(super) fn beside(&self, a: usize, b: usize) -> f64 {
-        match (self.places[a], self.places[b]) {
-            (Some(a), Some(b)) => self.beside[(a, b)],
-            _ => 0.0,
-        }
+    /// Where a column stands among those that are not zero.
+    pub(super) fn place(&self, column: usize) -> Option<usize> {
+        self.places[column]
     }
 
-    /// Whether a column is anything but zero.
-    pub(super) fn acts(&self, column: usize) -> bool {
-        self.places[column].is_some()
+    /// Products of the column at a place with those at all places.
+    pub(super) fn at(&self, place: usize) -> &[f64] {
+        let n = self.values.nrows();
+        &self.values.as_slice()[place * n..(place + 1) * n]
+    }
+
+    /// The same beside the columns that were eliminated.
+    pub(super) fn beside(&self, place: usize) -> &[f64] {
+        let n = self.beside.nrows();
+        &self.beside.as_slice()[place * n..(place + 1) * n]
     }
 
     /// The product of two columns.
@@ -67,15 +71,16 @@ mod tests {
                 assert_eq!(gram.of(a, b), dot(of_a, of_b));
             }
         }
-        assert!(gram.acts(2) && !gram.acts(1));
+        assert_eq!([gram.place(1), gram.place(2)], [None, Some(1)]);
+        assert_eq!(gram.at(1)[2], dot(&columns[2], &columns[3]));
         let length = dot(&columns[0], &columns[0]).sqrt();
         let borders: Vec<Vec<f64>> = columns.iter().map(|c| vec![dot(c, &columns[0]) / length]).collect();
         gram.eliminate(&borders);
-        assert!(gram.beside(0, 2).abs() < 1e-14);
+        assert!(gram.beside(0)[1].abs() < 1e-14);
         let rest = |k: usize| -> Vec<f64> {
             let along = borders[k][0] / length;
             columns[k].iter().zip(&columns[0]).map(|(v, of_first)| v - along * of_first).collect()
         };
-        assert!((gram.beside(2, 3) - dot(&rest(2), &rest(3))).abs() < 1e-14);
+        assert!((gram.beside(1)[2] - dot(&rest(2), &rest(3))).abs() < 1e-14);
     }
 }

@@ -10,6 +10,7 @@ pub(crate) mod curves;
 mod gram;
 mod outliers;
 mod plane;
+mod pooled;
 mod read;
 mod shapes;
 mod solve;

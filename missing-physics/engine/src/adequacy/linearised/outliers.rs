@@ -4,9 +4,8 @@
 //! (the mean-shift test, Cook and Weisberg 1982, Residuals and Influence in Regression, section 2.2). Unlike a look at a row's neighbours, this sees a wild reading at
 //! the end of a run, and one among few rows.
 
-use nalgebra::DMatrix;
-
 use super::plane::Linearised;
+use super::solve::normal;
 use crate::fit::bordered::BorderedNormal;
 use crate::linalg::{SemiCholesky, dot};
 use crate::statistics::median;
@@ -60,22 +59,14 @@ impl<'a> Fitted<'a> {
         let products = linearised.products(data);
         let start = linearised.white_start(&products);
         let (_, noise, coefficients) = linearised.alternate(&products, &nuisance, &shared, &start, 8);
+        let coefficients = linearised.solve_by_run(&products, &coefficients.noise, &nuisance, &shared);
         let ids: Vec<usize> = nuisance.iter().chain(&shared).copied().collect();
         let mut bordered = BorderedNormal::new(shared.len());
         for row in &linearised.blocks {
             // The residual is looked at row by row: here it is zero.
-            let mut normal = DMatrix::zeros(ids.len() + 1, ids.len() + 1);
-            for (i, &a) in ids.iter().enumerate() {
-                for (j, &c) in ids.iter().enumerate().take(i + 1) {
-                    let channels = row.iter().zip(&noise);
-                    normal[(i, j)] = channels
-                        .map(|(block, &(shape, sigma))| block.shapes[shape].gram.of(a, c) / (sigma * sigma))
-                        .sum();
-                }
-            }
-            bordered.add(&normal);
+            bordered.add(&normal(row, &noise, &ids));
         }
-        let factor = bordered.factor_against(&linearised.scales(&noise, &shared));
+        let factor = bordered.factor_of_independent();
         Self { linearised, ids, n_nuisance: nuisance.len(), noise, coefficients, bordered, factor }
     }
 

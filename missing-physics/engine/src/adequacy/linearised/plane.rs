@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::gram::Gram;
+use super::pooled::{Pooled, PooledProduct};
 use crate::fit::bordered::Eliminated;
 use crate::linalg::rank;
 use crate::noise::process::Whitener;
@@ -37,6 +38,8 @@ pub(super) struct Whitened {
     pub(super) gram: Gram,
     /// The nuisance columns that the channel determines, eliminated from every column.
     pub(super) eliminated: Eliminated,
+    /// Where in the Gram matrix each column stands that acts and is not eliminated.
+    pub(super) others: Vec<Option<usize>>,
     /// Log determinant of the noise and of the nuisance columns.
     pub(super) log_determinant: f64,
 }
@@ -47,6 +50,10 @@ pub(crate) struct Linearised<'a> {
     /// Index into the family for each shape in play.
     pub(super) in_play: Vec<usize>,
     pub(super) blocks: Vec<Vec<Block>>,
+    /// All runs together, `[channel][shape]`.
+    pub(super) pooled: Vec<Vec<Pooled>>,
+    /// Which of the model's nuisance columns act on one channel of each run at most, which eliminates them.
+    pub(super) separate: Vec<bool>,
     pub(super) n_nuisance: usize,
     pub(super) n_shared: usize,
     pub(crate) alternatives: Vec<Alternative>,
@@ -69,9 +76,10 @@ pub(super) struct Product {
     pub(super) total: f64,
 }
 
-/// Products of a data vector with every block's columns, `[run][channel][shape]`.
+/// Products of a data vector with every block's columns, `[run][channel][shape]`, and with those of all runs, `[channel][shape]`.
 pub(super) struct Products {
     pub(super) values: Vec<Vec<Vec<Product>>>,
+    pub(super) pooled: Vec<Vec<PooledProduct>>,
 }
 
 /// What a data vector says of the model and its alternatives.
@@ -98,8 +106,11 @@ impl Block {
         let beside = (0..columns.len()).map(|j| mine.iter().map(|&i| gram.of(i, j)).collect());
         let eliminated = Eliminated::new(block, rank::CHANNEL, beside);
         gram.eliminate(&eliminated.borders);
+        let other =
+            |i: usize| gram.place(i).filter(|&place| !mine.contains(&i) && gram.at(place)[place] > 0.0);
+        let others = (0..columns.len()).map(other).collect();
         let log_determinant = whitener.log_determinant + eliminated.log_determinant();
-        Whitened { columns, gram, eliminated, log_determinant }
+        Whitened { columns, gram, eliminated, others, log_determinant }
     }
 }
 
@@ -114,6 +125,8 @@ impl Linearised<'_> {
                 block.shapes = shapes.iter().map(whitened).collect();
             }
         }
+        let pooled = |channel| (0..shapes.len()).map(|k| Pooled::new(&self.blocks, channel, k)).collect();
+        self.pooled = (0..problem.channels()).map(pooled).collect();
     }
 
     /// Degrees of freedom of the noise that the model and so many further columns leave.

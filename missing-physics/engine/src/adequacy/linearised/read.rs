@@ -11,6 +11,7 @@ impl Linearised<'_> {
         let (score, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
         let gain = |alternative| self.gain(&products, (&nuisance, &shared), &noise, alternative);
         let gains = self.alternatives.iter().map(gain).collect();
+        let coefficients = self.solve_by_run(&products, &coefficients.noise, &nuisance, &shared);
         Reading { score, gains, noise, coefficients }
     }
 
@@ -39,8 +40,8 @@ impl Linearised<'_> {
         let with_shared = [shared, &alternative.shared].concat();
         let (_, beside, _) = self.alternate(products, &with_nuisance, &with_shared, noise, 4);
         let x = self.solve(products, &beside, &with_nuisance, &with_shared);
-        let wrong = alternative.sign != 0.0
-            && x.first().and_then(|x| x.last()).is_some_and(|value| value * alternative.sign < 0.0);
+        let wrong =
+            alternative.sign != 0.0 && x.shared.last().is_some_and(|value| value * alternative.sign < 0.0);
         if wrong {
             return 0.0;
         }

@@ -2,9 +2,38 @@
 
 use nalgebra::DMatrix;
 
-use super::plane::{Linearised, Product, Products};
+use super::plane::{Block, Linearised, Product, Products};
+use super::pooled::{Pooled, PooledProduct};
 use crate::fit::bordered::BorderedNormal;
 use crate::linalg::dot;
+
+/// Coefficients of a fit of columns.
+pub(super) struct Coefficients {
+    /// The noise that they were fitted under: shape in play and sigma, by channel.
+    pub(super) noise: Vec<(usize, f64)>,
+    pub(super) shared: Vec<f64>,
+    /// Those of each run's nuisance columns; none where each channel's elimination makes up for them.
+    nuisance: Vec<Vec<f64>>,
+}
+
+/// One run's normal equations of the columns `ids` for a given noise, the lower triangle; the residual's row, the last, is zero.
+pub(super) fn normal(row: &[Block], noise: &[(usize, f64)], ids: &[usize]) -> DMatrix<f64> {
+    let mut normal = DMatrix::zeros(ids.len() + 1, ids.len() + 1);
+    // Each column that acts: its number among `ids`, its place.
+    let mut acting: Vec<(usize, usize)> = Vec::with_capacity(ids.len());
+    for (block, &(shape, sigma)) in row.iter().zip(noise) {
+        let weight = 1.0 / (sigma * sigma);
+        let gram = &block.shapes[shape].gram;
+        acting.clear();
+        for (i, &a) in ids.iter().enumerate() {
+            let Some(place) = gram.place(a) else { continue };
+            let products = gram.at(place);
+            acting.push((i, place));
+            acting.iter().for_each(|&(j, other)| normal[(i, j)] += weight * products[other]);
+        }
+    }
+    normal
+}
 
 impl Linearised<'_> {
     /// Products of a data vector with all columns.
@@ -16,7 +45,7 @@ impl Linearised<'_> {
                     let mut y = data[run][channel].clone();
                     self.problem.whitener(run, channel, shape).whiten(&mut y);
                     let with = |(i, column): (usize, &Vec<f64>)| {
-                        if whitened.gram.acts(i) { dot(column, &y) } else { 0.0 }
+                        whitened.gram.place(i).map_or(0.0, |_| dot(column, &y))
                     };
                     let with: Vec<f64> = whitened.columns.iter().enumerate().map(with).collect();
                     let mine = &self.blocks[run][channel].mine;
@@ -28,11 +57,40 @@ impl Linearised<'_> {
                 .collect()
         };
         let of_run = |run: usize| (0..data[run].len()).map(|channel| of_block(run, channel)).collect();
-        Products { values: (0..data.len()).map(of_run).collect() }
+        let values: Vec<Vec<Vec<Product>>> = (0..data.len()).map(of_run).collect();
+        let of_channel = |(channel, shapes): (usize, &Vec<Pooled>)| -> Vec<PooledProduct> {
+            let shapes = shapes.iter().enumerate();
+            shapes.map(|(shape, pooled)| pooled.products(&self.blocks, &values, channel, shape)).collect()
+        };
+        Products { pooled: self.pooled.iter().enumerate().map(of_channel).collect(), values }
+    }
+
+    /// Whether each of these nuisance columns acts on one channel of each run at most, which eliminates it.
+    fn are_separate(&self, nuisance: &[usize]) -> bool {
+        nuisance.iter().all(|&a| self.separate.get(a) == Some(&true))
     }
 
     /// Fits the model with an alternative's columns added, for a given noise.
     pub(super) fn solve(
+        &self,
+        products: &Products,
+        noise: &[(usize, f64)],
+        nuisance: &[usize],
+        shared: &[usize],
+    ) -> Coefficients {
+        if self.are_separate(nuisance) {
+            let shared = self.solve_pooled(&products.pooled, noise, shared);
+            return Coefficients { noise: noise.to_vec(), shared, nuisance: Vec::new() };
+        }
+        let by_run = self.solve_by_run(products, noise, nuisance, shared);
+        let n = nuisance.len();
+        let shared = by_run.first().map_or(Vec::new(), |x| x[n..].to_vec());
+        let nuisance = by_run.into_iter().map(|x| x[..n].to_vec()).collect();
+        Coefficients { noise: noise.to_vec(), shared, nuisance }
+    }
+
+    /// The same for each run: coefficients of its nuisance columns, then of the shared ones.
+    pub(super) fn solve_by_run(
         &self,
         products: &Products,
         noise: &[(usize, f64)],
@@ -43,70 +101,48 @@ impl Linearised<'_> {
         let last = ids.len();
         let mut bordered = BorderedNormal::new(shared.len());
         for (row, values) in self.blocks.iter().zip(&products.values) {
-            let mut normal = DMatrix::zeros(last + 1, last + 1);
-            for ((block, value), &(shape, sigma)) in row.iter().zip(values).zip(noise) {
+            let mut normal = normal(row, noise, &ids);
+            for (value, &(shape, sigma)) in values.iter().zip(noise) {
                 let weight = 1.0 / (sigma * sigma);
-                let gram = &block.shapes[shape].gram;
                 for (i, &a) in ids.iter().enumerate() {
                     normal[(last, i)] += weight * value[shape].with[a];
-                    for (j, &c) in ids.iter().enumerate().take(i + 1) {
-                        normal[(i, j)] += weight * gram.of(a, c);
-                    }
                 }
             }
             bordered.add(&normal);
         }
         // A column that the others already span (a polynomial within the nuisances) is dropped.
-        let (x, _) = bordered.solve(&bordered.factor_against(&self.scales(noise, shared)));
+        let (x, _) = bordered.solve(&bordered.factor_of_independent());
         bordered.coefficients(&x)
     }
 
-    /// Sums of squares of the shared columns before anything is eliminated, the measure of "already spanned".
-    pub(super) fn scales(&self, noise: &[(usize, f64)], shared: &[usize]) -> Vec<f64> {
-        shared
-            .iter()
-            .map(|&a| {
-                self.blocks
-                    .iter()
-                    .flat_map(|row| row.iter().zip(noise))
-                    .map(|(block, &(shape, sigma))| block.shapes[shape].gram.of(a, a) / (sigma * sigma))
-                    .sum()
-            })
-            .collect()
-    }
-
-    /// Residual sum of squares of one channel under one shape.
+    /// Residual sum of squares of one channel under one shape, and the log determinant. The nuisance coefficients that the channel
+    /// determines are fitted anew under each shape; the others are given.
     fn squares(
         &self,
         products: &Products,
-        channel: usize,
-        shape: usize,
-        ids: &[usize],
-        coefficients: &[Vec<f64>],
+        (channel, shape): (usize, usize),
+        (nuisance, shared): (&[usize], &[usize]),
+        coefficients: &Coefficients,
     ) -> (f64, f64) {
-        let (mut squares, mut log_determinant) = (0.0, 0.0);
-        let mut others: Vec<(usize, f64)> = Vec::with_capacity(ids.len());
-        for ((row, values), x) in self.blocks.iter().zip(&products.values).zip(coefficients) {
-            // The nuisance coefficients are fitted anew under each shape; the others are given.
+        let product = &products.pooled[channel][shape];
+        let (mut squares, log_determinant) =
+            self.pooled[channel][shape].left(product, shared, &coefficients.shared);
+        // Without coefficients of nuisance columns there are none but those that are eliminated.
+        let by_run = products.values.iter().zip(&coefficients.nuisance);
+        for (row, (values, x)) in self.blocks.iter().zip(by_run) {
             let block = &row[channel].shapes[shape];
-            let borders = &block.eliminated.borders;
             let product = &values[channel][shape];
-            let mine = &row[channel].mine;
-            let acts = |(a, _): &(usize, f64)| !mine.contains(a) && block.gram.of(*a, *a) > 0.0;
-            others.clear();
-            others.extend(ids.iter().copied().zip(x.iter().copied()).filter(acts));
-            let mut form = product.left;
-            for (k, &(a, xa)) in others.iter().enumerate() {
-                let left = product.with[a] - dot(&borders[a], &product.nuisance);
-                let mut inner = -2.0 * left + block.gram.beside(a, a) * xa;
-                let pairs: f64 = others[..k].iter().map(|&(c, xc)| block.gram.beside(a, c) * xc).sum();
-                inner += 2.0 * pairs;
-                form += xa * inner;
+            for (k, (&a, xa)) in nuisance.iter().zip(x).enumerate() {
+                let Some(place) = block.others[a] else { continue };
+                let beside = block.gram.beside(place);
+                let with = |(&c, xc): (&usize, &f64)| block.others[c].map_or(0.0, |other| beside[other] * xc);
+                let pairs = nuisance[..k].iter().zip(x).map(with).sum::<f64>()
+                    + shared.iter().zip(&coefficients.shared).map(with).sum::<f64>();
+                let left = product.with[a] - dot(&block.eliminated.borders[a], &product.nuisance);
+                squares += xa * (-2.0 * left + beside[place] * xa + 2.0 * pairs);
             }
-            squares += form.max(0.0);
-            log_determinant += block.log_determinant;
         }
-        (squares, log_determinant)
+        (squares.max(0.0), log_determinant)
     }
 
     /// Score and sigma of a channel under a shape of the family.
@@ -124,8 +160,7 @@ impl Linearised<'_> {
         shared: &[usize],
         start: &[(usize, f64)],
         rounds: usize,
-    ) -> (f64, Vec<(usize, f64)>, Vec<Vec<f64>>) {
-        let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
+    ) -> (f64, Vec<(usize, f64)>, Coefficients) {
         let mut noise = start.to_vec();
         let mut coefficients = self.solve(products, &noise, nuisance, shared);
         let mut score = f64::NEG_INFINITY;
@@ -140,7 +175,7 @@ impl Linearised<'_> {
                         continue;
                     }
                     let (squares, log_determinant) =
-                        self.squares(products, channel, shape, &ids, &coefficients);
+                        self.squares(products, (channel, shape), (nuisance, shared), &coefficients);
                     let (mut value, sigma) =
                         self.channel_score(channel, self.in_play[shape], squares, log_determinant);
                     value += of_noise.log_prior();
@@ -169,14 +204,13 @@ impl Linearised<'_> {
         noise: &[(usize, f64)],
         nuisance: &[usize],
         shared: &[usize],
-        coefficients: &[Vec<f64>],
+        coefficients: &Coefficients,
     ) -> f64 {
-        let ids: Vec<usize> = nuisance.iter().chain(shared).copied().collect();
         noise
             .iter()
             .enumerate()
             .map(|(c, &(shape, sigma))| {
-                self.squares(products, c, shape, &ids, coefficients).0 / (sigma * sigma)
+                self.squares(products, (c, shape), (nuisance, shared), coefficients).0 / (sigma * sigma)
             })
             .sum()
     }
@@ -184,10 +218,7 @@ impl Linearised<'_> {
     /// White noise at the level of the whole data, where fits begin.
     pub(super) fn white_start(&self, products: &Products) -> Vec<(usize, f64)> {
         (0..self.problem.channels())
-            .map(|c| {
-                let squares: f64 = products.values.iter().map(|row| row[c][0].total).sum();
-                (0, self.channel_score(c, 0, squares, 0.0).1)
-            })
+            .map(|c| (0, self.channel_score(c, 0, products.pooled[c][0].total, 0.0).1))
             .collect()
     }
 }
