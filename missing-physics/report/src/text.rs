@@ -220,8 +220,13 @@ pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
 /// How runs differ, and which contradict the others, a line each.
 pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
     let spread = |s: &RunSpread| {
+        // A name such as a rate's says nothing where several mechanisms have one.
+        let is_of =
+            |m: &&MechanismReport| m.parameters.iter().any(|e| e.name == s.parameter && e.value == s.value);
+        let of = d.mechanisms.iter().filter(|m| d.chosen.contains(&m.id)).find(is_of);
+        let of = of.map_or_else(String::new, |m| format!(" of {}", m.name));
         format!(
-            "{} differs from run to run by {} {} (one standard deviation) beyond their noise; its interval allows for that",
+            "{}{of} differs from run to run by {} {} (one standard deviation) beyond their noise; its interval allows for that",
             s.parameter,
             significant(s.standard_deviation, 2),
             s.unit

@@ -1,7 +1,7 @@
 //! What a diagnosis takes of memory: told beforehand, and kept within what there is.
 
 use missing_physics::data::{Recording, Run};
-use missing_physics::model::Model;
+use missing_physics::model::{Model, Scope};
 
 use super::error::CommandError;
 
@@ -18,15 +18,47 @@ const WHITE: f64 = 0.05;
 /// What is not worth a word.
 const LITTLE: u64 = 1_000_000_000;
 
-/// The most memory that a diagnosis of a recording takes, bytes.
+/// The most memory that a diagnosis of a recording takes, bytes. Where that is much, it is asked which parameters act on which channel in
+/// the longest run: a parameter of another run, or of another joint, takes no room there.
 pub(super) fn needed(model: &dyn Model, recording: &Recording) -> u64 {
-    let columns = (model.spec().parameters.len() + CURVES * recording.variables.len()) as f64;
-    let channels = recording.channels.len() as f64;
+    let curves = CURVES * recording.variables.len();
+    let columns = (model.spec().parameters.len() + curves) as f64;
+    let channels = recording.channels.len();
     let rows: usize = recording.runs.iter().map(Run::len).sum();
-    let products = recording.runs.len() as f64 * columns * columns;
     let white = model.extensions().errors.is_some_and(|errors| errors.longest_correlation() <= 0.0);
     let shapes = if white { WHITE } else { 1.0 };
-    (ITSELF + shapes * channels * (COLUMN * columns * rows as f64 + PRODUCT * products)) as u64
+    let with = |squares: f64| {
+        let products = recording.runs.len() as f64 * squares;
+        let values = channels as f64 * columns * rows as f64;
+        (ITSELF + shapes * (COLUMN * values + PRODUCT * products)) as u64
+    };
+    let all = with(channels as f64 * columns * columns);
+    if all <= LITTLE {
+        return all;
+    }
+    let square = |acting: usize| ((acting + curves) as f64).powi(2);
+    acting(model, recording).map_or(all, |acting| with(acting.into_iter().map(square).sum()))
+}
+
+/// How many parameters act on each channel in the longest run, from where fits begin; nothing where the model predicts nothing there.
+fn acting(model: &dyn Model, recording: &Recording) -> Option<Vec<usize>> {
+    let run = recording.runs.iter().max_by_key(|run| run.len())?;
+    let starts = |scope: Scope| -> Vec<f64> {
+        model.spec().parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
+    };
+    let (shared, mut nuisance) = (starts(Scope::Shared), starts(Scope::PerRun));
+    model.nuisance_start(run, &mut nuisance);
+    let (all_shared, all_nuisance): (Vec<usize>, Vec<usize>) =
+        ((0..shared.len()).collect(), (0..nuisance.len()).collect());
+    let values = run.len() * recording.channels.len();
+    let mut out = vec![0.0; values];
+    let mut columns = vec![0.0; values * (shared.len() + nuisance.len())];
+    model.jacobian(run, &shared, &nuisance, &all_shared, &all_nuisance, &mut out, &mut columns).ok()?;
+    let of_channel = |channel: usize| {
+        let rows = channel * run.len()..(channel + 1) * run.len();
+        columns.chunks(values).filter(|column| column[rows.clone()].iter().any(|v| *v != 0.0)).count()
+    };
+    Some((0..recording.channels.len()).map(of_channel).collect())
 }
 
 /// What is to be said before a diagnosis that needs so many bytes; nothing where it needs little.
