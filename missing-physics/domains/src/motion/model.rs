@@ -4,7 +4,9 @@ use joint_laws::integrate::{Contact, Integrator, Machine as _, Method, Reading};
 use joint_laws::signal::Signal;
 use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
-use missing_physics::model::{Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec};
+use missing_physics::model::{
+    Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec, WindowedModel,
+};
 
 use super::effects::{Effects, OfJoint, Role};
 use super::equations::{Equations, Start};
@@ -56,8 +58,15 @@ pub struct MotionModel {
     speeds: Vec<f64>,
     pace: Pace,
     scales: Scales,
-    /// Where runs are cut into windows: when each run begins.
-    cut: Option<Vec<f64>>,
+    /// Where runs are cut into windows: the runs.
+    cut: Option<Vec<Whole>>,
+}
+
+/// A run that is cut into windows.
+#[derive(Debug, Clone)]
+struct Whole {
+    label: String,
+    begin_s: f64,
 }
 
 /// States and their derivatives along a run.
@@ -117,7 +126,11 @@ impl MotionModel {
             equations.states.iter().map(|s| slot(cut.is_some() || s.start == Start::Free)).collect();
         let middles = scales.joints.iter().map(|j| 0.5 * (j.range[0] + j.range[1])).collect();
         let speeds = scales.joints.iter().map(|j| j.speed).collect();
-        let cut = cut.map(|runs| runs.iter().map(|r| r.inputs[0].first().copied().unwrap_or(0.0)).collect());
+        let whole = |run: &Run| Whole {
+            label: run.label.clone(),
+            begin_s: run.inputs[0].first().copied().unwrap_or(0.0),
+        };
+        let cut = cut.map(|runs| runs.iter().map(whole).collect());
         Self { equations, spec, roles, off, per_run, free_states, middles, speeds, pace, scales, cut }
     }
 
@@ -383,8 +396,8 @@ impl MotionModel {
             machine.outputs(reading.t_s, x, wanted, |c, value| out[c * n + reading.row] = value);
         })?;
         let times = &run.inputs[0];
-        let of_run = self.cut.as_ref().and_then(|begins| begins.get(windows::of_run(run)));
-        let begin = of_run.or(times.first()).copied().unwrap_or(0.0);
+        let of_run = self.cut.as_ref().and_then(|runs| runs.get(windows::of_run(run)));
+        let begin = of_run.map(|whole| &whole.begin_s).or(times.first()).copied().unwrap_or(0.0);
         for (sensor, column) in sensors.iter().zip(out.chunks_mut(n.max(1))) {
             sensor.read(begin, times, column);
         }
@@ -470,6 +483,7 @@ impl Model for MotionModel {
             modes: Some(self),
             limits: Some(self),
             local_causes: Some(self),
+            windows: self.cut.is_some().then_some(self as &dyn WindowedModel),
             ..Extensions::default()
         }
     }
@@ -507,6 +521,13 @@ impl Model for MotionModel {
             .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
         }
         Ok(())
+    }
+}
+
+impl WindowedModel for MotionModel {
+    fn whole(&self, window: &Run) -> Option<&str> {
+        let run = self.cut.as_ref()?.get(windows::of_run(window))?;
+        Some(&run.label)
     }
 }
 

@@ -4,6 +4,7 @@ pub(crate) mod begin;
 mod course;
 mod input;
 pub mod stream;
+mod windows;
 
 use crate::data::Recording;
 use crate::diagnosis::{Contradiction, Diagnosis, Verdict};
@@ -62,6 +63,9 @@ fn diagnose_with(
         diagnosis.contradiction = without
             .filter(|without| says(without.verdict) > says(diagnosis.verdict))
             .map(|without| contradiction(contradicting, share, without));
+    }
+    if let Some(windowed) = model.extensions().windows {
+        windows::join(&mut diagnosis, recording, windowed);
     }
     tell(observer, "done", 1.0)?;
     Ok(diagnosis)

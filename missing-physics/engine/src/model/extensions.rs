@@ -19,6 +19,8 @@ pub struct Extensions<'a> {
     pub local_causes: Option<&'a dyn LocalCauses>,
     /// A program that makes the predictions.
     pub program: Option<&'a dyn ExternalProgram>,
+    /// Which runs are windows of longer ones.
+    pub windows: Option<&'a dyn WindowedModel>,
 }
 
 impl std::fmt::Debug for Extensions<'_> {
@@ -29,8 +31,15 @@ impl std::fmt::Debug for Extensions<'_> {
             .field("limits", &self.limits.is_some())
             .field("local_causes", &self.local_causes.is_some())
             .field("program", &self.program.is_some())
+            .field("windows", &self.windows.is_some())
             .finish()
     }
+}
+
+/// A model whose runs are windows of longer ones, in order: an answer speaks of the runs as they were recorded.
+pub trait WindowedModel: Sync {
+    /// The label of the run that a window is of; nothing where it is none.
+    fn whole(&self, window: &Run) -> Option<&str>;
 }
 
 /// What a model knows of its errors of measurement. Without it they are independent of the prediction, normal, and correlated over

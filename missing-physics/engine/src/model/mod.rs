@@ -13,6 +13,7 @@ pub use check::SpecError;
 pub use error::{LARGEST_PREDICTION, PredictError};
 pub use extensions::{
     ErrorModel, Extensions, ExternalProgram, JointLimits, LocalCauses, LocalUnknown, MultimodalModel,
+    WindowedModel,
 };
 pub use simulation::{Experiment, Model, Pair, difference_points, finite_differences};
 pub use spec::{Derived, DerivedPerRun, Mechanism, OfParameters, OfRun, Over, Parameter, Scope, Spec, Term};

@@ -2,9 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test stops where it fails")]
 
 use crate::common::{Ball, World};
-use missing_physics::data::Recording;
+use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
+use missing_physics::model::{Extensions, Model, PredictError, Spec, WindowedModel};
 use missing_physics::observer::Silent;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -97,4 +98,56 @@ fn runs_that_share_a_misfit_do_not_contradict_each_other() {
     }
     let answer = answer(&recording);
     assert_eq!((answer.verdict, answer.contradiction), (Verdict::Unexplained, None));
+}
+
+/// A ball's flights, each half of which is a window of one recording.
+struct Halves(Ball);
+
+impl Model for Halves {
+    fn spec(&self) -> &Spec {
+        self.0.spec()
+    }
+
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
+        self.0.predict(run, shared, nuisance, out)
+    }
+
+    fn extensions(&self) -> Extensions<'_> {
+        Extensions { windows: Some(self), ..Extensions::default() }
+    }
+}
+
+impl WindowedModel for Halves {
+    fn whole(&self, window: &Run) -> Option<&str> {
+        Some(if ["1", "2", "3"].contains(&window.label.as_str()) { "morning" } else { "evening" })
+    }
+}
+
+/// An answer speaks of the runs as they were recorded, not of the windows that they were cut into; a single window that contradicts the
+/// rest keeps its label.
+#[test]
+fn windows_are_said_by_the_runs_that_they_are_of() {
+    let mut recording = knocked(0.4);
+    recording.runs[1].outputs[0][7] += 0.3;
+    let rows = recording.runs[0].len();
+    let answer = diagnose(&Halves(Ball::default()), &recording, &[], &Options::default(), &Silent).unwrap();
+    let labels: Vec<&str> = answer.curves.iter().map(|c| c.run.as_str()).collect();
+    assert_eq!(labels, ["morning", "evening"]);
+    for curves in &answer.curves {
+        let columns = [&curves.inputs[0], &curves.measured[0], &curves.before[0], &curves.after[0]];
+        assert_eq!(columns.map(Vec::len), [3 * rows; 4]);
+    }
+    assert!(!answer.location.is_empty());
+    for location in answer.location.iter().chain(&answer.leftover) {
+        assert!(location.runs.iter().all(|run| labels.contains(&run.as_str())), "{:?}", location.runs);
+    }
+    let wild = &answer.outliers[0];
+    assert_eq!((wild.run.as_str(), wild.row), ("morning", rows + 7));
+    assert_eq!(answer.contradiction.unwrap().runs, ["4"]);
 }
