@@ -419,6 +419,58 @@ fn shared_long_measured_roll_hardens_and_is_damped_the_more_the_faster() {
     assert!(sets.len() == 2 && rivals.iter().all(|rival| sets.iter().any(|set| set == rival)), "{sets:?}");
 }
 
+/// A small quadrotor in still air: the drag of its rotors grows with the speed along the floor, by 0.36 to 0.47 1/s by the slope of its
+/// accelerometer and by plain least squares; upward nothing is proven.
+#[test]
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_measured_quadrotor_drags_along_the_floor() {
+    let answer = answer(&shared("recordings/real/motion/quad-nanobench"), "0");
+    assert_eq!(answer["verdict"], "partly");
+    assert_eq!(ids(&answer["chosen"]), ["viscous-friction@x", "viscous-friction@y"]);
+    let sets = named_sets(&answer);
+    assert!(sets.iter().all(|set| set.iter().all(|id| !id.ends_with("@z"))), "{sets:?}");
+    for axis in ["x", "y"] {
+        let id = format!("viscous-friction@{axis}");
+        let mechanism = answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == id.as_str());
+        let interval = &mechanism.unwrap()["parameters"][0]["ci95"];
+        let [low, high] = [0, 1].map(|k| interval[k].as_f64().unwrap());
+        assert!(low < 0.42 && 0.42 < high && high < 0.7, "{id}: {low} to {high}");
+    }
+}
+
+/// A pendulum that swings freely: dry friction, and damping that grows faster than the speed; neither gains alone.
+#[test]
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_measured_pendulum_rubs_and_is_damped_by_the_air() {
+    let answer = answer(&shared("recordings/real/motion/pendulum-single"), "0");
+    assert_eq!(answer["verdict"], "partly");
+    let sets = named_sets(&answer);
+    assert!(sets.contains(&vec!["coulomb-friction".into(), "quadratic-damping".into()]), "{sets:?}");
+    let (rubs, damped) = (["coulomb-friction", "stribeck-friction"], ["quadratic-damping", "cubic-damping"]);
+    let holds =
+        |set: &Vec<String>, of: [&str; 2]| set.iter().filter(|id| of.contains(&id.as_str())).count() == 1;
+    assert!(sets.iter().all(|set| set.len() == 2 && holds(set, rubs) && holds(set, damped)), "{sets:?}");
+}
+
+/// Joints of an arm with hobby servos: each stops short of its command by a dead band, which several laws of friction and play say alike; the
+/// wrist reaches its stop in one run.
+#[test]
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_measured_servos_have_a_dead_band() {
+    let dead_band =
+        ["coulomb-friction", "stribeck-friction", "load-dependent-friction", "backlash", "hysteresis"];
+    let is_dead_band = |id: &String| dead_band.contains(&id.as_str());
+    let pitch = answer(&shared("recordings/real/motion/so101-pitch"), "0");
+    assert_eq!(pitch["verdict"], "partly");
+    assert!(named_sets(&pitch).iter().all(|set| set.len() == 1 && is_dead_band(&set[0])));
+    let roll = answer(&shared("recordings/real/motion/so101-wrist-roll"), "0");
+    assert_eq!(roll["verdict"], "partly");
+    let sets = named_sets(&roll);
+    let stops = |id: &String| ["end-stop", "input-saturation"].contains(&id.as_str());
+    assert!(sets.iter().all(|set| set.iter().any(is_dead_band) && set.iter().any(stops)), "{sets:?}");
+    assert!(sets.contains(&vec!["coulomb-friction".into(), "end-stop".into()]), "{sets:?}");
+}
+
 /// Curves on cells' surfaces that no law of the list, and no pair of them, takes away nearly all of: nothing is named that is wrong, and
 /// the closest set is said.
 #[test]
