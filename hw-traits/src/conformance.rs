@@ -14,6 +14,7 @@ use crate::clock::{Clock, Stamped};
 use crate::force_torque::ForceTorque;
 use crate::gripper::Gripper;
 use crate::microphones::Microphones;
+use crate::motor::Motor;
 use crate::picture::Picture;
 use crate::pneumatics::{Pressure, Valve};
 use crate::rotary::Rotary;
@@ -116,6 +117,38 @@ pub fn valve<D: Valve + ?Sized>(device: &mut D, mut read: impl FnMut(&mut D)) ->
     for right in [0.0, 0.25, -0.25, 0.0] {
         read(device);
         answered("an opening within -1 to 1 is taken", device.open(right))?;
+    }
+    Ok(())
+}
+
+/// [`Motor`]: wrong commands, then each of `torques_nm`, which is read to within `tolerance_nm` after `readings` readings; zero at the end.
+///
+/// # Errors
+/// The first promise that was broken.
+pub fn motor<D: Motor + ?Sized>(
+    device: &mut D,
+    torques_nm: &[f64],
+    readings: usize,
+    tolerance_nm: f64,
+) -> Result<(), Broken> {
+    let limit_nm = device.limit_nm();
+    hold("a limit is above zero", limit_nm > 0.0, "above zero", limit_nm)?;
+    for wrong in [f64::NAN, 1.001 * limit_nm, -1.001 * limit_nm, f64::INFINITY] {
+        answered("a reading comes", device.read())?;
+        refused("a torque beyond the limit is refused", device.drive(wrong))?;
+    }
+    for &torque_nm in torques_nm.iter().chain(&[0.0]) {
+        answered("a reading comes", device.read())?;
+        answered("a torque within the limit is taken", device.drive(torque_nm))?;
+        let mut last_nm = f64::NAN;
+        let sound = |r: &crate::motor::MotorReading| {
+            last_nm = r.torque_nm;
+            let finite = r.angle_rad.is_finite() && r.torque_nm.is_finite();
+            hold("an angle and a torque are numbers", finite, "finite", r)
+        };
+        stream(readings, || device.read(), sound)?;
+        let acts = (last_nm - torque_nm).abs() <= tolerance_nm;
+        hold("the torque that was commanded acts", acts, torque_nm, last_nm)?;
     }
     Ok(())
 }

@@ -11,6 +11,7 @@ pub mod conformance;
 pub mod force_torque;
 pub mod gripper;
 pub mod microphones;
+pub mod motor;
 pub mod picture;
 pub mod pneumatics;
 pub mod programme;

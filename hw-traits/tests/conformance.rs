@@ -11,6 +11,7 @@ use hw_traits::conformance::{self as contract, Broken};
 use hw_traits::force_torque::{ForceTorque, Wrench};
 use hw_traits::gripper::Gripper;
 use hw_traits::microphones::Microphones;
+use hw_traits::motor::{Motor, MotorReading};
 use hw_traits::picture::{Intrinsics, Picture};
 use hw_traits::pneumatics::{Pressure, Valve};
 use hw_traits::rotary::Rotary;
@@ -27,6 +28,7 @@ enum Fault {
     ArrivesElsewhere,
     ForgetsTheTare,
     NoDepth,
+    Powerless,
     TwiceHeard,
     Sleepless,
 }
@@ -38,12 +40,13 @@ struct Device {
     place: f64,
     goal: f64,
     tared: f64,
+    torque_nm: f64,
     heard: usize,
 }
 
 impl Device {
     fn new(fault: Fault) -> Self {
-        Self { fault, now_s: 1.0, place: 0.2, goal: 0.2, tared: 0.0, heard: 0 }
+        Self { fault, now_s: 1.0, place: 0.2, goal: 0.2, tared: 0.0, torque_nm: 0.0, heard: 0 }
     }
 
     fn at<T>(&mut self, value: T) -> Result<Stamped<T>, ErrorKind> {
@@ -122,6 +125,21 @@ impl Arm for Device {
         self.arrived()
     }
 }
+impl Motor for Device {
+    fn limit_nm(&self) -> f64 {
+        2.0
+    }
+    fn drive(&mut self, torque_nm: f64) -> Result<(), ErrorKind> {
+        if torque_nm.is_nan() || torque_nm.abs() > 2.0 {
+            return Err(ErrorKind::OutOfRange);
+        }
+        self.torque_nm = if self.fault == Fault::Powerless { 0.0 } else { torque_nm };
+        Ok(())
+    }
+    fn read(&mut self) -> Result<Stamped<MotorReading>, ErrorKind> {
+        self.at(MotorReading { angle_rad: self.place, torque_nm: self.torque_nm })
+    }
+}
 impl Pressure for Device {
     fn pressure_pa(&mut self) -> Result<Stamped<f64>, ErrorKind> {
         self.at(1e3)
@@ -181,11 +199,22 @@ impl Clock for Device {
 }
 
 trait Everything:
-    ForceTorque + Rotary + Gripper + Arm + Pressure + Valve + Camera + DepthCamera + Microphones + Clock
+    ForceTorque + Rotary + Gripper + Arm + Pressure + Valve + Camera + DepthCamera + Microphones + Motor + Clock
 {
 }
-impl<T: ForceTorque + Rotary + Gripper + Arm + Pressure + Valve + Camera + DepthCamera + Microphones + Clock>
-    Everything for T
+impl<
+    T: ForceTorque
+        + Rotary
+        + Gripper
+        + Arm
+        + Pressure
+        + Valve
+        + Camera
+        + DepthCamera
+        + Microphones
+        + Motor
+        + Clock,
+> Everything for T
 {
 }
 
@@ -195,6 +224,7 @@ fn contracts<D: Everything>(device: &mut D) -> Result<(), Broken> {
     contract::rotary(device, &[0.9, 0.1], 1.0, 1e-9, |_, _| ())?;
     contract::gripper(device, &[0.4], 1.0, 1e-9, |_, _| ())?;
     contract::arm(device, &[goal], 1.0, 1e-9, |_, _| ())?;
+    contract::motor(device, &[1.5, -2.0], 3, 1e-9)?;
     contract::pressure(device, 3)?;
     contract::valve(device, |d| drop(d.pressure_pa()))?;
     contract::camera(device, 3)?;
@@ -231,6 +261,7 @@ fn each_broken_promise_is_found_on_the_device_and_on_its_recording() {
         (Fault::NeverArrives, "a command within the limits is carried out"),
         (Fault::ArrivesElsewhere, "the place that was commanded is reached"),
         (Fault::ForgetsTheTare, "after a tare the load is zero"),
+        (Fault::Powerless, "the torque that was commanded acts"),
         (Fault::NoDepth, "a depth is above zero, or NaN"),
         (Fault::TwiceHeard, "no sample comes twice"),
         (Fault::Sleepless, "time has risen by at least the wait"),

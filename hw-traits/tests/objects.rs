@@ -7,6 +7,7 @@ use hw_traits::clock::{Clock, Stamped};
 use hw_traits::force_torque::{ForceTorque, Wrench};
 use hw_traits::gripper::Gripper;
 use hw_traits::microphones::Microphones;
+use hw_traits::motor::{Motor, MotorReading};
 use hw_traits::picture::{Intrinsics, Picture};
 use hw_traits::pneumatics::{Pressure, Valve};
 use hw_traits::programme::{TiltProgramme, run};
@@ -110,6 +111,18 @@ impl Microphones for Rig {
     }
 }
 
+impl Motor for Rig {
+    fn limit_nm(&self) -> f64 {
+        15.0
+    }
+    fn drive(&mut self, torque_nm: f64) -> Result<(), ErrorKind> {
+        self.command("drive", torque_nm, 0.0)
+    }
+    fn read(&mut self) -> Result<Stamped<MotorReading>, ErrorKind> {
+        at(MotorReading { angle_rad: 16.0, torque_nm: 17.0 })
+    }
+}
+
 impl Pressure for Rig {
     fn pressure_pa(&mut self) -> Result<Stamped<f64>, ErrorKind> {
         at(12.0)
@@ -207,6 +220,15 @@ fn every_trait_is_object_safe_and_its_objects_are_devices() {
             assert_eq!(samples, [10.0; 8]);
         },
         &[]
+    );
+    everywhere!(
+        Motor,
+        |d| {
+            let said = d.read().unwrap().value;
+            assert_eq!((d.limit_nm(), said.angle_rad, said.torque_nm), (15.0, 16.0, 17.0));
+            d.drive(-0.5).unwrap();
+        },
+        &[("drive", -0.5, 0.0)]
     );
     everywhere!(Pressure, |d| { assert_eq!(d.pressure_pa().unwrap().value, 12.0) }, &[]);
     everywhere!(Valve, |d| { d.open(-0.5).unwrap() }, &[("open", -0.5, 0.0)]);

@@ -2,6 +2,7 @@ use crate::ErrorKind;
 use crate::arm::Pose;
 use crate::clock::Stamped;
 use crate::force_torque::Wrench;
+use crate::motor::MotorReading;
 use crate::picture::{Intrinsics, Picture};
 
 /// One thing that happened at a device.
@@ -40,6 +41,8 @@ pub enum Fact {
     Microphones(usize, f64),
     /// The pinhole of a depth camera.
     Intrinsics(Intrinsics),
+    /// Largest torque of a motor, N m.
+    LimitNm(f64),
 }
 
 /// A command, with the arguments of the trait's method.
@@ -56,6 +59,8 @@ pub enum Command {
     Open(f64),
     /// [`ForceTorque::tare`](crate::force_torque::ForceTorque::tare).
     Tare(usize),
+    /// [`Motor::drive`](crate::motor::Motor::drive).
+    Drive(f64),
 }
 
 impl Command {
@@ -66,7 +71,7 @@ impl Command {
                 [&pose.position_m[..], &pose.rotation_xyzw, &[*deadline_s]].concat()
             }
             Self::OpenTo(a, b) | Self::TurnTo(a, b) => vec![*a, *b],
-            Self::Open(a) => vec![*a],
+            Self::Open(a) | Self::Drive(a) => vec![*a],
             Self::Tare(readings) => vec![*readings as f64],
         }
     }
@@ -99,6 +104,8 @@ pub enum Reading {
     DepthM(Stamped<Picture<f32>>),
     /// Sound, channel after channel for each instant.
     Samples(Stamped<Vec<f32>>),
+    /// A joint's angle and its motor's torque.
+    Motor(Stamped<MotorReading>),
     /// Whether a device that moves has settled.
     Settled(bool),
 }
@@ -123,6 +130,8 @@ pub enum Stream {
     Depth,
     /// Sound.
     Sound,
+    /// A joint's angle and its motor's torque.
+    Motor,
     /// Whether a device that moves has settled.
     Settled,
 }
@@ -139,6 +148,7 @@ impl Reading {
             Self::Grey(_) => Stream::Grey,
             Self::DepthM(_) => Stream::Depth,
             Self::Samples(_) => Stream::Sound,
+            Self::Motor(_) => Stream::Motor,
             Self::Settled(_) => Stream::Settled,
         }
     }
@@ -152,6 +162,7 @@ impl Reading {
             Self::Grey(s) => Some(s.t_s),
             Self::DepthM(s) => Some(s.t_s),
             Self::Samples(s) => Some(s.t_s),
+            Self::Motor(s) => Some(s.t_s),
             Self::Settled(_) => None,
         }
     }
@@ -160,6 +171,6 @@ impl Reading {
 impl Stream {
     /// Whether each of its readings is returned once; the others are states, of which the last one can be asked for again.
     pub(super) fn comes_once(self) -> bool {
-        matches!(self, Self::Wrench | Self::Pressure | Self::Grey | Self::Depth | Self::Sound)
+        matches!(self, Self::Wrench | Self::Pressure | Self::Grey | Self::Depth | Self::Sound | Self::Motor)
     }
 }

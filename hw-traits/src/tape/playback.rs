@@ -8,6 +8,7 @@ use crate::clock::{Clock, Stamped};
 use crate::force_torque::{ForceTorque, Wrench};
 use crate::gripper::Gripper;
 use crate::microphones::Microphones;
+use crate::motor::{Motor, MotorReading};
 use crate::picture::{Intrinsics, Picture};
 use crate::pneumatics::{Pressure, Valve};
 use crate::rotary::Rotary;
@@ -18,7 +19,7 @@ use crate::{ErrorKind, ErrorType};
 /// * A command has to be the next recorded one, to within a tolerance of each number; another is an error of the kind
 ///   [`ErrorKind::NotAsRecorded`], and one after the last of the kind [`ErrorKind::EndOfRecording`].
 /// * A question is answered by the readings between the last command and the next, in their order. Readings that come once
-///   (wrench, pressure, pictures, sound) then end, with [`ErrorKind::EndOfRecording`]; of states (pose, angle, width, settled)
+///   (wrench, pressure, a motor's, pictures, sound) then end, with [`ErrorKind::EndOfRecording`]; of states (pose, angle, width, settled)
 ///   the last one stays.
 /// * Sound is a stream of samples: a buffer may have any length, as long as no samples were lost within it.
 /// * Time is that of the last reading that was played, and what was slept since.
@@ -236,6 +237,25 @@ impl DepthCamera for Playback {
 
     fn depth_m(&mut self) -> Result<Stamped<Picture<f32>>, ErrorKind> {
         ask!(self, Depth, DepthM)
+    }
+}
+
+impl Motor for Playback {
+    /// Of a recording that has none, none.
+    fn limit_nm(&self) -> f64 {
+        let told = |fact: &Fact| match fact {
+            Fact::LimitNm(limit_nm) => Some(*limit_nm),
+            _ => None,
+        };
+        self.facts.iter().find_map(told).unwrap_or(f64::INFINITY)
+    }
+
+    fn drive(&mut self, torque_nm: f64) -> Result<(), ErrorKind> {
+        self.command(Command::Drive(torque_nm))
+    }
+
+    fn read(&mut self) -> Result<Stamped<MotorReading>, ErrorKind> {
+        ask!(self, Motor, Motor)
     }
 }
 

@@ -5,6 +5,7 @@ use crate::clock::{Clock, Stamped};
 use crate::force_torque::{ForceTorque, Wrench};
 use crate::gripper::Gripper;
 use crate::microphones::Microphones;
+use crate::motor::{Motor, MotorReading};
 use crate::picture::{Intrinsics, Picture};
 use crate::pneumatics::{Pressure, Valve};
 use crate::rotary::Rotary;
@@ -17,13 +18,13 @@ use crate::{Error, ErrorType};
 pub struct Recorder<D, S> {
     device: D,
     sink: S,
-    told: [bool; 4],
+    told: [bool; 5],
 }
 
 impl<D, S: FnMut(Event)> Recorder<D, S> {
     /// Tells `sink` of all that passes to and from `device`.
     pub fn new(device: D, sink: S) -> Self {
-        Self { device, sink, told: [false; 4] }
+        Self { device, sink, told: [false; 5] }
     }
 
     /// The device, and who was told.
@@ -37,6 +38,7 @@ impl<D, S: FnMut(Event)> Recorder<D, S> {
             Fact::LimitsM(..) => 1,
             Fact::Microphones(..) => 2,
             Fact::Intrinsics(_) => 3,
+            Fact::LimitNm(_) => 4,
         };
         if !std::mem::replace(&mut self.told[number], true) {
             (self.sink)(Event::Fact(fact));
@@ -197,6 +199,24 @@ impl<D: Microphones, S: FnMut(Event)> Microphones for Recorder<D, S> {
         let whole = interleaved.len() / channels.max(1) * channels;
         let samples = &interleaved[..whole];
         self.answer(Stream::Sound, answer, |t_s| Reading::Samples(Stamped { t_s, value: samples.to_vec() }))
+    }
+}
+
+impl<D: Motor, S: FnMut(Event)> Motor for Recorder<D, S> {
+    fn limit_nm(&self) -> f64 {
+        self.device.limit_nm()
+    }
+
+    fn drive(&mut self, torque_nm: f64) -> Result<(), Self::Error> {
+        let limit_nm = self.device.limit_nm();
+        self.fact(Fact::LimitNm(limit_nm));
+        let answer = self.device.drive(torque_nm);
+        self.command(Command::Drive(torque_nm), answer)
+    }
+
+    fn read(&mut self) -> Result<Stamped<MotorReading>, Self::Error> {
+        let answer = self.device.read();
+        self.answer(Stream::Motor, answer, Reading::Motor)
     }
 }
 
