@@ -2,6 +2,7 @@
 
 mod effects;
 mod equations;
+mod experiments;
 mod expression;
 mod growth;
 mod knots;
@@ -85,7 +86,7 @@ impl Domain for Motion {
                 got: "without an answer".into(),
                 expected: format!("equations that can be followed from their starts ({why})"),
             })?;
-            Ok(Loaded::new(tuned.recording, tuned.model, Vec::new(), tuned.remarks))
+            Ok(Loaded::new(tuned.recording, tuned.model, tuned.experiments, tuned.remarks))
         }))
     }
 }

@@ -53,9 +53,10 @@ pub struct MotionModel {
     /// Nuisance slots of the recording's parameters of each run, and of the states that are free at its start.
     per_run: Vec<Option<usize>>,
     free_states: Vec<Option<usize>>,
-    /// Middle of each joint's range, and its typical speed.
+    /// Middle of each joint's range, and its typical speed and acceleration.
     middles: Vec<f64>,
     speeds: Vec<f64>,
+    accelerations: Vec<f64>,
     pace: Pace,
     scales: Scales,
     /// Where runs are cut into windows: the runs.
@@ -131,7 +132,21 @@ impl MotionModel {
             begin_s: run.inputs[0].first().copied().unwrap_or(0.0),
         };
         let cut = cut.map(|runs| runs.iter().map(whole).collect());
-        Self { equations, spec, roles, off, per_run, free_states, middles, speeds, pace, scales, cut }
+        let accelerations = scales.joints.iter().map(|j| j.acceleration).collect();
+        Self {
+            equations,
+            spec,
+            roles,
+            off,
+            per_run,
+            free_states,
+            middles,
+            speeds,
+            accelerations,
+            pace,
+            scales,
+            cut,
+        }
     }
 
     /// The same model under equations that only take their inputs otherwise.
@@ -148,6 +163,24 @@ impl MotionModel {
             }
         }
         rubbing
+    }
+
+    /// Shared parameters with every mechanism off.
+    pub(super) fn unrepaired(&self) -> Vec<f64> {
+        self.off.clone()
+    }
+
+    /// Nuisance parameters of a run that begins where another did, with no joint moving.
+    pub(super) fn at_rest(&self, run: &Run) -> Vec<f64> {
+        let own = |p: &&missing_physics::model::Parameter| p.scope == Scope::PerRun;
+        let mut nuisance: Vec<f64> = self.spec.parameters.iter().filter(own).map(|p| p.start).collect();
+        self.nuisance_start(run, &mut nuisance);
+        for joint in &self.equations.joints {
+            if let Some(slot) = self.free_states[joint.velocity] {
+                nuisance[slot] = 0.0;
+            }
+        }
+        nuisance
     }
 
     /// The equations.
@@ -234,6 +267,7 @@ impl MotionModel {
             run: windows::of_run(run),
             middles: &self.middles,
             speeds: &self.speeds,
+            accelerations: &self.accelerations,
         };
         shared.setting(values)
     }

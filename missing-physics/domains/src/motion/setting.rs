@@ -40,8 +40,9 @@ pub(super) struct Shared<'a, T> {
     pub(super) run: usize,
     /// Middle of each joint's range: a stop stands on the side where its position is.
     pub(super) middles: &'a [f64],
-    /// Typical speed of each joint.
+    /// Typical speed and acceleration of each joint.
     pub(super) speeds: &'a [f64],
+    pub(super) accelerations: &'a [f64],
 }
 
 impl<T: Number> Shared<'_, T> {
@@ -104,7 +105,12 @@ impl<T: Number> Shared<'_, T> {
         match what {
             OfJoint::Coulomb => dry.get_or_insert(without).level = value,
             OfJoint::Asymmetry => dry.get_or_insert(without).forward_less_backward = value,
-            OfJoint::StribeckLevel => dry.get_or_insert(without).stribeck_level = value,
+            OfJoint::StribeckLevel => {
+                let law = dry.get_or_insert(without);
+                law.stribeck_level = value;
+                let fades = law.stribeck_speed.re();
+                setting.no_slower_than(fades / self.accelerations[joint]);
+            }
             OfJoint::LoadFraction => dry.get_or_insert(without).load_fraction = value,
             OfJoint::Damping(power) => laws.forces.push(Force::Damping(power, value)),
             OfJoint::Stiffness(power) => laws.forces.push(Force::Stiffness(power, value)),
@@ -183,5 +189,57 @@ impl<T: Number> Setting<T> {
             OfOutput::Upper => sensor.upper = value,
             OfOutput::Lower => sensor.lower = value,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use joint_laws::integrate::Method;
+    use missing_physics::data::Run;
+    use missing_physics::model::{Model as _, Scope};
+
+    use crate::motion::equations::Equations;
+    use crate::motion::model::{MotionModel, Pace};
+    use crate::motion::scales::Scales;
+
+    /// A joint that turns back and forth passes speeds at which its friction fades in a fifth of a row: the motion is that of steps which
+    /// are a hundred times finer.
+    #[test]
+    fn steps_resolve_friction_that_fades_between_two_rows() {
+        let all = Equations::example();
+        let starts: Vec<f64> = all.parameters.iter().map(|p| p.value).collect();
+        let times: Vec<f64> = (0..400).map(|k| 0.005 * f64::from(k)).collect();
+        let wave: Vec<f64> = times.iter().map(|t| (5.0 * t).sin()).collect();
+        let run = Run {
+            label: "1".into(),
+            inputs: vec![times.clone(), wave],
+            outputs: vec![vec![0.0; times.len()]; all.outputs.len()],
+            kind: 0,
+        };
+        let mut scales = Scales::of_example(&all);
+        (scales.step_s, scales.joints[0].acceleration) = (0.005, 20.0);
+        let pace = |step_s| Pace { method: Method::Kutta, step_s };
+        let mut model = MotionModel::baseline(all, pace(0.005)).full(scales, &starts, None);
+        let of = |model: &MotionModel, scope| {
+            let mine = model.spec().parameters.iter().filter(|p| p.scope == scope);
+            mine.map(|p| p.start).collect::<Vec<f64>>()
+        };
+        let (mut shared, nuisance) = (of(&model, Scope::Shared), of(&model, Scope::PerRun));
+        let stribeck = model.spec().mechanisms.iter().find(|m| m.id == "stribeck-friction").unwrap();
+        let slots = model.spec().slots();
+        let [level, speed] = stribeck.parameters[..] else { panic!("two parameters") };
+        (shared[slots[level]], shared[slots[speed]]) = (10.0, 0.02);
+        let predict = |model: &MotionModel| {
+            let mut out = vec![0.0; times.len()];
+            model.predict(&run, &shared, &nuisance, &mut out).unwrap();
+            out
+        };
+        let found = predict(&model);
+        model.set_pace(pace(5e-6));
+        let fine = predict(&model);
+        let worst = found.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let reach = fine.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        assert!(reach > 0.3 && worst < 1e-5, "{worst} of {reach}");
     }
 }

@@ -4,10 +4,11 @@
 use joint_laws::integrate::Method;
 use missing_physics::data::{Recording, Run};
 use missing_physics::fit::least_squares;
-use missing_physics::model::Model as _;
+use missing_physics::model::{Experiment, Model as _};
 use missing_physics::noise::rough_sigma;
 
 use super::equations::Equations;
+use super::experiments::experiments;
 use super::growth::too_long;
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range};
@@ -38,6 +39,8 @@ const FIRST_WINDOW: usize = 40;
 pub(super) struct Tuned {
     pub(super) model: MotionModel,
     pub(super) recording: Recording,
+    /// What could be commanded next; nothing, where runs cannot be followed as a whole.
+    pub(super) experiments: Vec<Experiment>,
     /// What was done to the rows, one sentence each.
     pub(super) remarks: Vec<String>,
 }
@@ -133,7 +136,10 @@ fn followed(equations: Equations, recording: Recording, steps: bool) -> Result<T
     let stated = model.stated(&fitted);
     let Some(length) = followed else {
         let scales = sizes(&model, &recording, &fitted)?;
-        return Ok(Tuned { model: model.full(scales, &stated, None), recording, remarks });
+        let times = [scales.step_s, scales.duration_s];
+        let model = model.full(scales, &stated, None);
+        let experiments = experiments(&model, &recording, times);
+        return Ok(Tuned { model, recording, experiments, remarks });
     };
     let free = MotionModel::baseline(model.equations().free(), model.pace());
     let whole = recording;
@@ -145,7 +151,8 @@ fn followed(equations: Equations, recording: Recording, steps: bool) -> Result<T
         "runs are followed in windows of {longest:.3} s with free starts: over more, a small deviation of the start grows until the \
          motion tells nothing of the physics"
     ));
-    Ok(Tuned { model: model.full(scales, &stated, Some(&whole.runs)), recording, remarks })
+    let model = model.full(scales, &stated, Some(&whole.runs));
+    Ok(Tuned { model, recording, experiments: Vec::new(), remarks })
 }
 
 /// A recording may come from a simulator that takes one step of Runge and Kutta's a row: where that fits better than the exact motion by
