@@ -15,8 +15,9 @@ const KEPT: usize = 6;
 const FOLLOWED: usize = 14;
 /// So many.
 const STEPS: usize = 4;
-/// Starts of a mechanism that are looked at again beside others: those that promised most beside nothing.
-const STARTS: usize = 2;
+/// Starts of a mechanism that are looked at again beside others, those that promised most beside nothing: few of many, yet beside a cause that
+/// outweighs the mechanism the right one may have promised little.
+const STARTS: usize = 9;
 
 /// A mechanism worth a fit, and where its fit begins.
 pub(crate) struct Promising {
