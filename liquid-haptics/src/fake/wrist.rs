@@ -10,15 +10,12 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::cavity::Cavity;
 use super::film::Film;
+use super::joint::Joint;
 use super::sensor::{Noise, Sensor};
 use super::slosh::Slosh;
 
 /// Points of the table of where the liquid lies while the wrist turns; at rest it is summed at the very angle.
 const TABLE: usize = 90;
-/// How fast the wrist speeds up and slows down, rad/s^2.
-const ACCELERATION_RAD_S2: f64 = 40.0;
-/// Fastest turn, rad/s (UR5, wrist joints).
-const FASTEST_RAD_S: f64 = PI;
 /// Standard deviation of the joint's measured angle, rad.
 const ANGLE_NOISE_RAD: f64 = 1e-4;
 /// Steps in which the motion is followed, s.
@@ -68,9 +65,7 @@ pub struct FakeWrist {
     noise: Noise,
     rng: ChaCha8Rng,
     now_s: f64,
-    angle_rad: f64,
-    speed_rad_s: f64,
-    goal: (f64, f64),
+    joint: Joint,
     offset: Wrench,
     /// Where the liquid lies across and along the container's axis at the table's angles, m.
     table: Vec<[f64; 2]>,
@@ -109,9 +104,7 @@ impl FakeWrist {
             noise: Noise::new(),
             rng: ChaCha8Rng::seed_from_u64(seed),
             now_s: 0.0,
-            angle_rad: 0.0,
-            speed_rad_s: 0.0,
-            goal: (0.0, FASTEST_RAD_S),
+            joint: Joint::new(),
             offset: Wrench::default(),
             table,
             last: None,
@@ -160,23 +153,6 @@ impl FakeWrist {
         x * cos + (z - self.load.grasp_height_m) * sin
     }
 
-    /// One step of the wrist's motion towards its goal, at most `h` long (s): speed up, go on, or slow down in time.
-    fn turn(&mut self, h: f64) {
-        let (goal, rate) = self.goal;
-        let way = goal - self.angle_rad;
-        let towards = way.signum();
-        let braking = (2.0 * ACCELERATION_RAD_S2 * way.abs()).sqrt();
-        let wanted = towards * rate.min(FASTEST_RAD_S).min(braking);
-        let change = ACCELERATION_RAD_S2 * h;
-        self.speed_rad_s += (wanted - self.speed_rad_s).clamp(-change, change);
-        let step = self.speed_rad_s * h;
-        if step.abs() >= way.abs() {
-            (self.angle_rad, self.speed_rad_s) = (goal, 0.0);
-        } else {
-            self.angle_rad += step;
-        }
-    }
-
     fn advance(&mut self, duration_s: f64) {
         let end = self.now_s + duration_s;
         while self.now_s < end {
@@ -184,19 +160,19 @@ impl FakeWrist {
             if !(h > 0.0) || self.now_s + h == self.now_s {
                 break;
             }
-            let before = (self.about(self.angle_rad), self.speed_rad_s, self.angle_rad);
-            if self.angle_rad == self.goal.0 && self.speed_rad_s == 0.0 {
+            let before = (self.about(self.joint.angle_rad), self.joint.speed_rad_s, self.joint.angle_rad);
+            if self.joint.settled() {
                 self.slosh.advance(h, 0.0);
             } else {
-                self.turn(h);
+                self.joint.turn(h);
                 // What the level liquid's centre is accelerated by, from the change of its speed.
                 let slope = |wrist: &Self, at: f64| (wrist.about(at + 0.01) - wrist.about(at - 0.01)) / 0.02;
-                let speed = slope(self, self.angle_rad) * self.speed_rad_s;
+                let speed = slope(self, self.joint.angle_rad) * self.joint.speed_rad_s;
                 let acceleration = (speed - slope(self, before.2) * before.1) / h;
                 self.slosh.advance(h, acceleration);
             }
             if let Some(film) = &mut self.film {
-                film.advance(h, self.angle_rad);
+                film.advance(h, self.joint.angle_rad);
             }
             self.now_s += h;
         }
@@ -205,7 +181,7 @@ impl FakeWrist {
 
     /// Force and torque of the load, in the world's frame.
     fn wrench_in_world(&mut self) -> Wrench {
-        let tilt = self.angle_rad;
+        let tilt = self.joint.angle_rad;
         let place = match self.last {
             Some((at, place)) if at == tilt => place,
             _ => lies(&self.load, tilt),
@@ -262,25 +238,26 @@ impl Rotary for FakeWrist {
             return Err(ErrorKind::OutOfRange);
         }
         let load = &self.load;
-        let on_side = (self.angle_rad - 0.5 * PI).abs() < ON_ITS_SIDE_RAD && self.speed_rad_s == 0.0;
+        let on_side =
+            (self.joint.angle_rad - 0.5 * PI).abs() < ON_ITS_SIDE_RAD && self.joint.speed_rad_s == 0.0;
         if self.thick() && load.volume_m3 > 0.0 && on_side && angle_rad == 0.0 {
             let (radius, length) = (load.radius_m, load.length_m);
             self.film =
                 Some(Film::new(radius, length, load.volume_m3, load.viscosity_m2_s, load.gravity_m_s2));
-        } else if angle_rad != self.angle_rad {
+        } else if angle_rad != self.joint.angle_rad {
             self.film = None;
         }
-        self.goal = (angle_rad, rate_rad_s);
+        self.joint.goal = (angle_rad, rate_rad_s);
         Ok(())
     }
 
     fn angle_rad(&mut self) -> Result<Stamped<f64>, ErrorKind> {
         let noise: f64 = StandardNormal.sample(&mut self.rng);
-        Ok(Stamped { t_s: self.now_s, value: self.angle_rad + ANGLE_NOISE_RAD * noise })
+        Ok(Stamped { t_s: self.now_s, value: self.joint.angle_rad + ANGLE_NOISE_RAD * noise })
     }
 
     fn settled(&mut self) -> Result<bool, ErrorKind> {
-        Ok(self.angle_rad == self.goal.0 && self.speed_rad_s == 0.0)
+        Ok(self.joint.settled())
     }
 }
 
@@ -288,7 +265,7 @@ impl ForceTorque for FakeWrist {
     fn read(&mut self) -> Result<Stamped<Wrench>, ErrorKind> {
         self.advance(1.0 / self.sensor.rate_hz);
         let world = self.wrench_in_world();
-        let (sin, cos) = self.angle_rad.sin_cos();
+        let (sin, cos) = self.joint.angle_rad.sin_cos();
         let [fx, fy, fz] = world.force_n;
         let body = Wrench { force_n: [fx * cos - fy * sin, fx * sin + fy * cos, fz], ..world };
         let read = self.noise.read(&self.sensor, &body, &mut self.rng).ok_or(ErrorKind::Saturated)?;

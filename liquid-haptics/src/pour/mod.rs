@@ -7,6 +7,7 @@
 //! breaks, and a stream stops at that of the receding one. Liquid at rest, turned slowly; a viscous film that stays on the
 //! wall is not counted.
 
+pub mod closed_loop;
 mod error;
 
 pub use error::PourError;
