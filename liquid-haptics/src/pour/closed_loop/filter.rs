@@ -23,7 +23,7 @@ const DRIFT: usize = 10;
 const N: usize = 12;
 
 /// Share of a flow by which the law is off, correlated over some second.
-const MISFIT_SHARE: f64 = 0.2;
+const MISFIT_SHARE: f64 = 0.15;
 /// Volume that moves unexplained, mL per root of a second.
 const UNEXPLAINED_ML: f64 = 0.02;
 /// Wander of the bead (mm) and of the factor, per root of a second, while it flows.

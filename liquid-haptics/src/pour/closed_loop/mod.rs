@@ -45,7 +45,7 @@ const MOST_M3: f64 = 2e-6;
 const STALL_M3: f64 = 1e-6;
 const STALL_S: f64 = 8.0;
 /// Longest time of the last part over what flows then, s.
-const SLOWING_S: f64 = 2.5;
+const SLOWING_S: f64 = 3.0;
 
 /// How good the sensor is; the filter's prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
