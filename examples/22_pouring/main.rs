@@ -1,6 +1,6 @@
 //! Pouring with the scale in the loop, beside the open loop of [Matl 2021]: six liquids, three vessels, 20 to 120 mL.
 //!
-//! `cargo run --release -p examples --example 22_pouring` (108 pours; `--small`: 6 of the bottle, nothing but them) writes `pouring.svg` in the
+//! `cargo run --release -p examples --example 22_pouring` (108 pours, each four times; `--small`: 6 of the bottle, twice) writes `pouring.svg` in the
 //! temporary folder: a pour of water and one of honey. Volume, density and viscosity are felt first, by a slow turn and a swing.
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 

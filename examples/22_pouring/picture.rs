@@ -30,14 +30,14 @@ fn row(case: &Case, moments: &[Moment], history: &[TruePour]) -> [Panel; 4] {
     let name = case.kind().name;
     // A fifth of a second between points is as fine as a picture shows.
     let moments: Vec<&Moment> = moments.iter().step_by(10).collect();
-    let true_m3 = |t: f64| history.iter().find(|h| h.t_s >= t).map_or(f64::NAN, |h| h.poured_m3 + h.hung_m3);
+    let true_m3 = |t: f64| history.iter().find(|h| h.t_s >= t).map_or(f64::NAN, |h| h.poured_m3);
     let mut error = Panel::new(format!("{name}: weighed less true"), "t, s", "mL");
     let off = |m: &Moment| 1e6 * (m.poured_m3 - true_m3(m.t_s));
     for side in [-1.96, 1.96] {
         error.line(moments.iter().map(|m| [m.t_s, side * 1e6 * m.error_m3]), PALE);
     }
     error.line(moments.iter().map(|m| [m.t_s, off(m)]), BELIEVED);
-    error.name("weighed less what has left the bottle", BELIEVED).name("its 95 % band", PALE);
+    error.name("weighed less what has come off the lip", BELIEVED).name("its 95 % band", PALE);
     let history: Vec<&TruePour> = history.iter().step_by(4).collect();
     let mut tilt = Panel::new(format!("{name}: tilt"), "t, s", "rad");
     tilt.line(history.iter().map(|h| [h.t_s, h.tilt_rad]), TRUE);

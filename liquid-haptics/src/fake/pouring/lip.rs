@@ -7,8 +7,6 @@ use rand_distr::{Distribution, StandardNormal};
 const STRIPS: usize = 24;
 /// How long the contact line's wander remembers, s.
 const WANDER_S: f64 = 2.0;
-/// Radius of a thread that thins, m.
-const THREAD_M: f64 = 1.5e-3;
 /// Time in which a thin liquid's stream comes off the lip, s.
 const THIN_S: f64 = 0.04;
 
@@ -24,6 +22,8 @@ pub(super) struct Shape {
     /// What stays on the lip, and what a drop takes with it, m^3.
     pub(super) hanging: f64,
     pub(super) drop: f64,
+    /// Radius of a thread that thins, m.
+    pub(super) thread: f64,
     pub(super) viscosity: f64,
     /// Dynamic viscosity over surface tension, s/m.
     pub(super) slowness: f64,
@@ -93,7 +93,7 @@ impl Lip {
         if !self.falling {
             return 0.0;
         }
-        let lasts = THIN_S + 3.0 * THREAD_M * shape.slowness;
+        let lasts = THIN_S + 3.0 * shape.thread * shape.slowness;
         let fallen = (self.hung - shape.hanging).max(0.0) * (1.0 - (-h / lasts).exp());
         self.hung -= fallen;
         fallen

@@ -23,6 +23,8 @@ use lip::{Lip, Shape};
 const STEP_S: f64 = 2.5e-3;
 /// Standard deviation of the joint's measured angle, rad.
 const ANGLE_NOISE_RAD: f64 = 1e-4;
+/// Radius of a thread that thins, to a quarter of it, m.
+const THREAD_M: f64 = 1.5e-3;
 /// Steps of the history, s.
 const HISTORY_S: f64 = 0.05;
 /// In which the sensor comes to its new temperature, s.
@@ -144,7 +146,8 @@ pub struct TruePour {
 }
 
 impl FakePour {
-    /// A wrist at rest, upright; all its noise comes from the seed, and so do the drops that stay on the lip (0.02 to 0.08 mL).
+    /// A wrist at rest, upright; all its noise comes from the seed, and so do what stays on the lip (0.02 to 0.08 mL) and how thick a thread hangs
+    /// from it (1.5 mm, to a quarter).
     ///
     /// # Errors
     /// [`ErrorKind::OutOfRange`] for a bottle of which a number is none or negative, or whose liquid does not fit.
@@ -174,15 +177,16 @@ impl FakePour {
             return Err(ErrorKind::OutOfRange);
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let draw: f64 = StandardNormal.sample(&mut rng);
+        let [hangs, thins]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
         let shape = Shape {
             radius: bottle.lip_radius_m,
             hold: bottle.hold_m,
             rest: bottle.rest_m,
             wander: disturbances.bead_wander_m,
             discharge: bottle.discharge,
-            hanging: 5e-8 + 1e-8 * draw.clamp(-3.0, 3.0),
+            hanging: 5e-8 + 1e-8 * hangs.clamp(-3.0, 3.0),
             drop: 5e-8,
+            thread: THREAD_M * (0.25 * thins).exp(),
             viscosity: bottle.viscosity_m2_s,
             slowness: bottle.viscosity_m2_s * bottle.density_kg_m3 / bottle.surface_tension_n_m,
             gravity: bottle.gravity_m_s2,

@@ -38,7 +38,7 @@ const CREST_MM: f64 = 1.5;
 /// Time in which the wrist makes up for a head that is not the wanted one, s.
 const HEAD_S: f64 = 0.3;
 /// What is left on its way at the end of the last, slow part, m^3.
-const LAST_M3: f64 = 0.8e-6;
+const LAST_M3: f64 = 0.6e-6;
 /// Most that is on its way while it pours, m^3.
 const MOST_M3: f64 = 2e-6;
 /// Where less than that (m^3) leaves in that time (s), and four lags, nothing flows any more.
