@@ -220,6 +220,15 @@ fn intervals(results: &[Tried]) {
         "what was poured lies in its 95 % interval: {} of {n}; half its width {half:.2} mL",
         results.iter().filter(holds).count()
     );
+    let at_the_turn = |r: &&Tried| {
+        let poured = &r.closed.poured;
+        (r.closed.truth_m3 - poured.predicted_m3).abs() <= 1.96 * poured.predicted_error_m3
+    };
+    let error = results.iter().map(|r| 1.96e6 * r.closed.poured.predicted_error_m3).sum::<f64>() / n as f64;
+    println!(
+        "what was poured lies in the one at the turn back: {} of {n}; half its width {error:.2} mL",
+        results.iter().filter(at_the_turn).count()
+    );
     let felt: Vec<f64> =
         results.iter().map(|r| 1e6 * (r.closed.poured.volume_m3 - r.closed.truth_m3)).collect();
     println!("what was poured, as weighed: {}", shown(&felt));

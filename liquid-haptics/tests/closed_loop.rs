@@ -209,7 +209,7 @@ fn each_failure_has_its_error() {
     let (error, _) = refused(water, Disturbances { nan_after_s: 15.0, ..none }, |_| {});
     assert!(matches!(error, ClosedLoopError::NotFinite { t_s } if t_s >= 15.0), "{error}");
     let (error, _) = refused(water, Disturbances { lost_after_s: 15.0, ..none }, |_| {});
-    assert!(matches!(error, ClosedLoopError::Lost { tries: 5, source: ErrorKind::Link, .. }), "{error}");
+    assert!(matches!(error, ClosedLoopError::Lost { tries: 5, answer: ErrorKind::Link, .. }), "{error}");
 }
 
 /// A wrist whose clock stands still, and one that is deaf now and then.

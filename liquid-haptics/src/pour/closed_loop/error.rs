@@ -31,14 +31,14 @@ pub enum ClosedLoopError<E: std::fmt::Debug> {
         t_s: f64,
     },
     /// The sensor or the joint gave no answer, several times in a row.
-    #[error("no answer after {poured_m3} m^3, {tries} tries: {source:?}")]
+    #[error("no answer after {poured_m3} m^3, {tries} tries: {answer:?}")]
     Lost {
         /// What had been poured, m^3.
         poured_m3: f64,
         /// How often it was asked.
         tries: usize,
         /// The last answer.
-        source: E,
+        answer: E,
     },
     /// Times of readings do not rise.
     #[error("a reading at {t_s} s follows one at {before_s} s, expected a later one")]
@@ -82,6 +82,6 @@ pub(super) fn of_device<D: ErrorType>(
 ) -> ClosedLoopError<D::Error> {
     match hw_traits::Error::kind(&error) {
         ErrorKind::Saturated => ClosedLoopError::Saturated { poured_m3 },
-        _ => ClosedLoopError::Lost { poured_m3, tries, source: error },
+        _ => ClosedLoopError::Lost { poured_m3, tries, answer: error },
     }
 }

@@ -2,8 +2,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::PourError;
+use super::plan::Scale;
 use super::stream::Stream;
-use super::{PourError, Scale};
 
 /// Volume that has come off the lip, and that has passed it, mL.
 const OFF: usize = 0;
@@ -80,6 +81,11 @@ impl<'a> Filter<'a> {
     /// Its standard error, m^3.
     pub(super) fn error_m3(&self) -> f64 {
         self.p[(OFF, OFF)].max(0.0).sqrt() * ML
+    }
+
+    /// The standard error of what has passed the lip, m^3.
+    pub(super) fn passed_error_m3(&self) -> f64 {
+        self.p[(PASSED, PASSED)].max(0.0).sqrt() * ML
     }
 
     /// The factor of the flow.
