@@ -104,7 +104,7 @@ impl Joint {
             acting_nm: 0.0,
             jitter: Normal::new(0.0, JITTER_RAD)?,
             current: Normal::new(0.0, SIGMA_NM)?,
-            rng: ChaCha8Rng::seed_from_u64(seed ^ 0x6a6f_696e_74),
+            rng: ChaCha8Rng::seed_from_u64(seed ^ 0x006a_6f69_6e74),
         })
     }
 

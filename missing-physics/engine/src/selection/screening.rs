@@ -13,11 +13,13 @@ use crate::selection::candidate::{Candidate, Guess};
 const KEPT: usize = 6;
 /// Mechanisms that are followed some steps on, of those whose first step promises most: one step may promise what no fit keeps.
 const FOLLOWED: usize = 14;
+/// Starts of one mechanism that are followed, and looked at again where more than those were, that differ in its shape: of that a step promises
+/// least reliably, the more so where a larger cause is missing.
+const SHAPES: usize = 3;
 /// So many.
 const STEPS: usize = 4;
-/// Starts of a mechanism that are looked at again beside others, those that promised most beside nothing: few of many, yet beside a cause that
-/// outweighs the mechanism the right one may have promised little.
-const STARTS: usize = 9;
+/// Starts of a mechanism that are looked at again beside others: those that promised most beside nothing.
+const STARTS: usize = 2;
 
 /// A mechanism worth a fit, and where its fit begins.
 pub(crate) struct Promising {
@@ -50,11 +52,16 @@ impl Screening {
             .collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut first: Vec<(usize, usize)> = Vec::new();
-        for &(left, k, start) in &scored {
-            if first.len() == FOLLOWED || left.is_infinite() {
-                break;
-            }
-            if first.iter().all(|(other, _)| *other != k) {
+        let mut mechanisms = 0;
+        for &(_, k, start) in scored.iter().filter(|(left, ..)| left.is_finite()) {
+            let shape = |start: usize| self.shape(problem, k, start);
+            let others = || first.iter().filter(|(other, _)| *other == k);
+            if others().next().is_none() {
+                if mechanisms < FOLLOWED {
+                    first.push((k, start));
+                    mechanisms += 1;
+                }
+            } else if others().count() < SHAPES && others().all(|(_, other)| shape(*other) != shape(start)) {
                 first.push((k, start));
             }
         }
@@ -62,20 +69,43 @@ impl Screening {
             .into_par_iter()
             .filter_map(|(k, start)| follow(problem, parent, self.0[k].0, &self.0[k].1[start]))
             .collect();
-        self.forget(&scored);
+        self.forget(problem, &scored);
         followed.retain(|(left, _)| *left < parent.fit.chi2 - 1.0);
         followed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut seen = Vec::new();
+        followed.retain(|(_, promising)| {
+            let new = !seen.contains(&promising.mechanism);
+            seen.push(promising.mechanism);
+            new
+        });
         followed.truncate(KEPT);
         followed.into_iter().map(|(_, promising)| promising).collect()
     }
 
-    fn forget(&mut self, scored: &[(f64, usize, usize)]) {
-        for (k, (_, starts)) in self.0.iter_mut().enumerate().filter(|(_, (_, starts))| starts.len() > STARTS)
-        {
-            let best = scored.iter().filter(|s| s.1 == k).take(STARTS);
-            let best: Vec<Guess> = best.map(|s| starts[s.2].clone()).collect();
-            if !best.is_empty() {
-                *starts = best;
+    /// The shape that a mechanism has at one of its starts; all starts are alike of one that has none.
+    fn shape(&self, problem: &Problem<'_>, k: usize, start: usize) -> Guess {
+        let (mechanism, starts) = &self.0[k];
+        let shape = &problem.spec().mechanisms[*mechanism].shape_parameters;
+        let of_shape = |slot: usize| shape.iter().any(|&p| problem.slots[p] == slot);
+        starts[start].iter().copied().filter(|(slot, _)| of_shape(*slot)).collect()
+    }
+
+    fn forget(&mut self, problem: &Problem<'_>, scored: &[(f64, usize, usize)]) {
+        for k in 0..self.0.len() {
+            let mut kept: Vec<Guess> = Vec::new();
+            let mut shapes: Vec<Guess> = Vec::new();
+            for &(_, _, start) in scored.iter().filter(|s| s.1 == k) {
+                let shape = self.shape(problem, k, start);
+                let new = !shapes.contains(&shape) && shapes.len() < SHAPES;
+                if kept.len() < STARTS || new {
+                    kept.push(self.0[k].1[start].clone());
+                }
+                if new {
+                    shapes.push(shape);
+                }
+            }
+            if !kept.is_empty() && self.0[k].1.len() > STARTS {
+                self.0[k].1 = kept;
             }
         }
     }
