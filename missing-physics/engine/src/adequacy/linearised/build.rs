@@ -1,7 +1,8 @@
 //! Linearises a model around a fit: the columns of its plane, and of the directions in which it might be wrong.
 
+use super::block::Block;
 use super::curves::{Curves, DEGREE};
-use super::plane::{Alternative, Block, Linearised};
+use super::plane::{Alternative, Linearised};
 use super::pooled::separate;
 use crate::fit::columns::whitened_columns;
 use crate::fit::optimum::Fit;

@@ -5,6 +5,7 @@
 //! products with them. A refit of the model, of any alternative and of the noise is then algebra on a few small matrices,
 //! which is what makes a bootstrap of the *whole* fit affordable.
 
+mod block;
 mod build;
 pub(crate) mod curves;
 mod gram;

@@ -5,7 +5,7 @@
 
 use nalgebra::DMatrix;
 
-use super::plane::{Block, Linearised, Product};
+use super::block::{Block, Product};
 use crate::linalg::{SemiCholesky, dot};
 
 /// One channel's columns under one shape of noise.
@@ -95,27 +95,25 @@ impl Pooled {
     }
 }
 
-impl Linearised<'_> {
-    /// The shared coefficients, where each nuisance column is separate.
-    pub(super) fn solve_pooled(
-        &self,
-        products: &[Vec<PooledProduct>],
-        noise: &[(usize, f64)],
-        shared: &[usize],
-    ) -> Vec<f64> {
-        let n = shared.len();
-        let (mut information, mut gradient, mut squares) = (DMatrix::zeros(n, n), vec![0.0; n], vec![0.0; n]);
-        for ((pooled, products), &(shape, sigma)) in self.pooled.iter().zip(products).zip(noise) {
-            let (pooled, product, weight) = (&pooled[shape], &products[shape], 1.0 / (sigma * sigma));
-            for (i, &a) in shared.iter().enumerate() {
-                gradient[i] += weight * product.with[a];
-                squares[i] += weight * pooled.squares[a];
-                let beside = pooled.beside.column(a);
-                shared[..=i].iter().enumerate().for_each(|(j, &b)| information[(i, j)] += weight * beside[b]);
-            }
+/// The shared coefficients of a fit for a given noise, where each nuisance column is separate; `pooled` and `products` by channel and shape.
+pub(super) fn solve(
+    pooled: &[Vec<Pooled>],
+    products: &[Vec<PooledProduct>],
+    noise: &[(usize, f64)],
+    shared: &[usize],
+) -> Vec<f64> {
+    let n = shared.len();
+    let (mut information, mut gradient, mut squares) = (DMatrix::zeros(n, n), vec![0.0; n], vec![0.0; n]);
+    for ((pooled, products), &(shape, sigma)) in pooled.iter().zip(products).zip(noise) {
+        let (pooled, product, weight) = (&pooled[shape], &products[shape], 1.0 / (sigma * sigma));
+        for (i, &a) in shared.iter().enumerate() {
+            gradient[i] += weight * product.with[a];
+            squares[i] += weight * pooled.squares[a];
+            let beside = pooled.beside.column(a);
+            shared[..=i].iter().enumerate().for_each(|(j, &b)| information[(i, j)] += weight * beside[b]);
         }
-        // A column that the others already span (a polynomial within the nuisances) is dropped.
-        SemiCholesky::against(information, &squares).solve(&mut gradient);
-        gradient
     }
+    // A column that the others already span (a polynomial within the nuisances) is dropped.
+    SemiCholesky::against(information, &squares).solve(&mut gradient);
+    gradient
 }

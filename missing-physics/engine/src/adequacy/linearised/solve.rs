@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::plane::{Block, Linearised, Product, Products};
-use super::pooled::{Pooled, PooledProduct};
+use super::block::{Block, Product};
+use super::plane::{Linearised, Products};
+use super::pooled::{self, Pooled, PooledProduct};
 use crate::fit::bordered::BorderedNormal;
 use crate::linalg::dot;
 
@@ -79,7 +80,7 @@ impl Linearised<'_> {
         shared: &[usize],
     ) -> Coefficients {
         if self.are_separate(nuisance) {
-            let shared = self.solve_pooled(&products.pooled, noise, shared);
+            let shared = pooled::solve(&self.pooled, &products.pooled, noise, shared);
             return Coefficients { noise: noise.to_vec(), shared, nuisance: Vec::new() };
         }
         let by_run = self.solve_by_run(products, noise, nuisance, shared);
