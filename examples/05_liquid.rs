@@ -7,10 +7,7 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use hw_traits::clock::Clock;
-use hw_traits::force_torque::ForceTorque;
-use hw_traits::programme::{TiltProgramme, run};
-use hw_traits::rotary::Rotary;
+use examples::liquid::{self, Swing};
 use liquid_haptics::classify::cross_validate;
 use liquid_haptics::container::mesh::{MeshContainer, PlannedMesh};
 use liquid_haptics::container::{Container, Cylinder};
@@ -20,7 +17,7 @@ use liquid_haptics::viscosity::{Bottle, Verdict, ViscosityFit};
 use liquid_haptics::volume::{
     ErrorCorrelation, ForceGain, Liquid, MassFit, SettledPose, VolumeFit, fit_mass,
 };
-use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench, world_from_body};
+use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
 use nalgebra::Point3;
@@ -93,19 +90,7 @@ fn bottle_load(liquid_mass_kg: f64, density: f64, viscosity_m2_s: f64) -> Load {
 /// The slow turn: 19 poses, half a second of readings at each.
 fn sweep(load: Load, seed: u64) -> Outcome<Vec<SettledPose>> {
     let mut wrist = FakeWrist::new(load, AXIA80, seed).map_err(|e| e.to_string())?;
-    let programme = TiltProgramme {
-        angles_rad: (0..19).map(|k| f64::from(10 * k).to_radians()).collect(),
-        rate_rad_s: 0.3,
-        settle_s: 20.0,
-        patience_s: 10.0,
-        readings: 4000,
-    };
-    let felt = run(&mut wrist, &programme)?;
-    let pose = |p: &hw_traits::programme::FeltPose| SettledPose {
-        tilt_rad: p.angle_rad,
-        wrench: PlanarWrench::from(&world_from_body(&p.wrench, p.angle_rad)),
-    };
-    Ok(felt.iter().map(pose).collect())
+    Ok(liquid::sweep(&mut wrist)?)
 }
 
 /// Mass error, volume error with the wall known, and with the outer size taken for the inner; whether the volume's interval holds.
@@ -269,35 +254,12 @@ fn carton(sweeps: u32, correlation: ErrorCorrelation) -> Outcome<()> {
 fn swing(volume_m3: f64, density: f64, viscosity: f64, seed: u64) -> Outcome<Verdict> {
     let mut wrist = FakeWrist::new(bottle_load(density * volume_m3, density, viscosity), AXIA80, seed)
         .map_err(|e| e.to_string())?;
-    let mut turn = |angle: f64, rate: f64, wait_s: f64| -> Result<f64, hw_traits::ErrorKind> {
-        wrist.turn_to(angle, rate)?;
-        let begin = wrist.now_s()?;
-        while !wrist.settled()? {
-            wrist.sleep_s(1e-3)?;
-        }
-        let took = wrist.now_s()? - begin;
-        wrist.sleep_s(wait_s)?;
-        Ok(took)
-    };
-    turn(0.5 * PI, 1.0, 20.0).map_err(|e| e.to_string())?;
-    let turn_s = turn(0.0, PI, 0.0).map_err(|e| e.to_string())?;
-    let begin = wrist.now_s().map_err(|e| e.to_string())?;
-    let (mut times, mut torques) = (Vec::new(), Vec::new());
-    for _ in 0..2000 {
-        let (mut t, mut y) = (0.0, 0.0);
-        for _ in 0..78 {
-            let reading = wrist.read().map_err(|e| e.to_string())?;
-            t += (reading.t_s - begin) / 78.0;
-            y += reading.value.torque_nm[2] / 78.0;
-        }
-        times.push(t);
-        torques.push(y);
-    }
+    let Swing { turn_s, times_s, torques_nm } = liquid::swing(&mut wrist).map_err(|e| e.to_string())?;
     let inner = Cylinder::new(RADIUS_M, LENGTH_M, WALL_M)?;
     let bottle = Bottle::new(&inner, volume_m3, density * volume_m3, GRAVITY)?;
     let head_start_s = 2.0 / PI * turn_s;
     Ok(ViscosityFit { bottle, mass_error_share: 0.002, head_start_s, widest_factor: 4.0 }
-        .estimate(&times, &torques)?)
+        .estimate(&times_s, &torques_nm)?)
 }
 
 fn which_liquid(each: u64) -> Outcome<()> {

@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod dough;
 pub mod grains;
+pub mod liquid;
 pub mod plot;
 pub mod rig;
 

@@ -1,6 +1,6 @@
 //! A six-axis sensor: noise, drift and steps.
 
-use hw_traits::force_torque::Wrench;
+use hw_traits::force_torque::{ForceTorque, Wrench};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -36,6 +36,16 @@ pub const AXIA80: Sensor = Sensor {
     wander_steps: 0.02,
     wander_s: 30.0,
 };
+
+/// What has to be added to the readings of a sensor whose offset is zero, so that their mean over so many, one at least, is zero.
+pub(super) fn tared<S: ForceTorque>(sensor: &mut S, readings: usize) -> Result<Wrench, S::Error> {
+    let count = readings.max(1);
+    let mut sum = Wrench::default();
+    for _ in 0..count {
+        sum = sum.plus(&sensor.read()?.value);
+    }
+    Ok(sum.scaled(-1.0 / count as f64))
+}
 
 /// The state of a sensor's noise.
 #[derive(Debug, Clone)]

@@ -6,18 +6,15 @@ use hw_traits::rotary::Rotary;
 use hw_traits::{ErrorKind, ErrorType};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 use super::cavity::Cavity;
 use super::film::Film;
-use super::joint::Joint;
-use super::sensor::{Noise, Sensor};
+use super::joint::{Joint, LIMITS_RAD};
+use super::sensor::{Noise, Sensor, tared};
 use super::slosh::Slosh;
 
 /// Points of the table of where the liquid lies while the wrist turns; at rest it is summed at the very angle.
 const TABLE: usize = 90;
-/// Standard deviation of the joint's measured angle, rad.
-const ANGLE_NOISE_RAD: f64 = 1e-4;
 /// Steps in which the motion is followed, s.
 const STEP_S: f64 = 2e-3;
 /// A liquid more viscous than this (m^2/s) drains down the wall, a thinner one sloshes.
@@ -230,13 +227,11 @@ impl ErrorType for FakeWrist {
 
 impl Rotary for FakeWrist {
     fn limits_rad(&self) -> (f64, f64) {
-        (0.0, PI)
+        LIMITS_RAD
     }
 
     fn turn_to(&mut self, angle_rad: f64, rate_rad_s: f64) -> Result<(), ErrorKind> {
-        if !((0.0..=PI).contains(&angle_rad) && rate_rad_s > 0.0) {
-            return Err(ErrorKind::OutOfRange);
-        }
+        Joint::allows(angle_rad, rate_rad_s)?;
         let load = &self.load;
         let on_side =
             (self.joint.angle_rad - 0.5 * PI).abs() < ON_ITS_SIDE_RAD && self.joint.speed_rad_s == 0.0;
@@ -252,8 +247,7 @@ impl Rotary for FakeWrist {
     }
 
     fn angle_rad(&mut self) -> Result<Stamped<f64>, ErrorKind> {
-        let noise: f64 = StandardNormal.sample(&mut self.rng);
-        Ok(Stamped { t_s: self.now_s, value: self.joint.angle_rad + ANGLE_NOISE_RAD * noise })
+        Ok(Stamped { t_s: self.now_s, value: self.joint.measured_rad(&mut self.rng) })
     }
 
     fn settled(&mut self) -> Result<bool, ErrorKind> {
@@ -274,18 +268,9 @@ impl ForceTorque for FakeWrist {
 
     fn tare(&mut self, readings: usize) -> Result<(), ErrorKind> {
         let before = std::mem::take(&mut self.offset);
-        let mut sum = Wrench::default();
-        for _ in 0..readings.max(1) {
-            match self.read() {
-                Ok(reading) => sum = sum.plus(&reading.value),
-                Err(error) => {
-                    self.offset = before;
-                    return Err(error);
-                }
-            }
-        }
-        self.offset = sum.scaled(-1.0 / readings.max(1) as f64);
-        Ok(())
+        let tared = tared(self, readings);
+        self.offset = *tared.as_ref().unwrap_or(&before);
+        tared.map(drop)
     }
 }
 

@@ -14,15 +14,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::joint::Joint;
-use super::sensor::{Noise, Sensor};
+use super::joint::{Joint, LIMITS_RAD};
+use super::sensor::{Noise, Sensor, tared};
 use channel::Channel;
 use lip::{Lip, Shape};
 
 /// Steps of the flow, s.
 const STEP_S: f64 = 2.5e-3;
-/// Standard deviation of the joint's measured angle, rad.
-const ANGLE_NOISE_RAD: f64 = 1e-4;
 /// Radius of a thread that thins, to a quarter of it, m.
 const THREAD_M: f64 = 1.5e-3;
 /// Steps of the history, s.
@@ -334,20 +332,17 @@ impl ErrorType for FakePour {
 
 impl Rotary for FakePour {
     fn limits_rad(&self) -> (f64, f64) {
-        (0.0, PI)
+        LIMITS_RAD
     }
 
     fn turn_to(&mut self, angle_rad: f64, rate_rad_s: f64) -> Result<(), ErrorKind> {
-        if !((0.0..=PI).contains(&angle_rad) && rate_rad_s > 0.0) {
-            return Err(ErrorKind::OutOfRange);
-        }
+        Joint::allows(angle_rad, rate_rad_s)?;
         self.joint.goal = (angle_rad, rate_rad_s);
         Ok(())
     }
 
     fn angle_rad(&mut self) -> Result<Stamped<f64>, ErrorKind> {
-        let noise: f64 = StandardNormal.sample(&mut self.rng);
-        Ok(Stamped { t_s: self.now_s, value: self.joint.angle_rad + ANGLE_NOISE_RAD * noise })
+        Ok(Stamped { t_s: self.now_s, value: self.joint.measured_rad(&mut self.rng) })
     }
 
     fn settled(&mut self) -> Result<bool, ErrorKind> {
@@ -381,18 +376,9 @@ impl ForceTorque for FakePour {
 
     fn tare(&mut self, readings: usize) -> Result<(), ErrorKind> {
         let before = std::mem::take(&mut self.tare);
-        let mut sum = Wrench::default();
-        for _ in 0..readings.max(1) {
-            match self.read() {
-                Ok(reading) => sum = sum.plus(&reading.value),
-                Err(error) => {
-                    self.tare = before;
-                    return Err(error);
-                }
-            }
-        }
-        self.tare = sum.scaled(-1.0 / readings.max(1) as f64);
-        Ok(())
+        let tared = tared(self, readings);
+        self.tare = *tared.as_ref().unwrap_or(&before);
+        tared.map(drop)
     }
 
     fn skip(&mut self) -> Result<(), ErrorKind> {

@@ -43,10 +43,8 @@ pub(super) fn needed(model: &dyn Model, recording: &Recording) -> u64 {
 /// How many parameters act on each channel in the longest run, from where fits begin; nothing where the model predicts nothing there.
 fn acting(model: &dyn Model, recording: &Recording) -> Option<Vec<usize>> {
     let run = recording.runs.iter().max_by_key(|run| run.len())?;
-    let starts = |scope: Scope| -> Vec<f64> {
-        model.spec().parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
-    };
-    let (shared, mut nuisance) = (starts(Scope::Shared), starts(Scope::PerRun));
+    let spec = model.spec();
+    let (shared, mut nuisance) = (spec.starts(Scope::Shared), spec.starts(Scope::PerRun));
     model.nuisance_start(run, &mut nuisance);
     let (all_shared, all_nuisance): (Vec<usize>, Vec<usize>) =
         ((0..shared.len()).collect(), (0..nuisance.len()).collect());

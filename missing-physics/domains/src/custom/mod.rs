@@ -252,8 +252,7 @@ fn experiments(
     let mut known = vec![Column { name: "run", what: "label of the run", label: true }];
     known.extend(inputs.iter().map(|q| number(&q.name, "a known input")));
     let table = header.table("experiments", &known)?;
-    let nuisance: Vec<f64> =
-        spec.parameters.iter().filter(|p| p.scope == Scope::PerRun).map(|p| p.start).collect();
+    let nuisance = spec.starts(Scope::PerRun);
     let experiment = |mut run: Run| {
         run.outputs = vec![vec![0.0; run.len()]; channels];
         let constant = |column: &[f64]| column.windows(2).all(|w| w[0] == w[1]);
@@ -325,9 +324,7 @@ mod tests {
         let loaded = load_with(&source("custom"), line.clone(), false).unwrap();
         let (model, run) = (&loaded.model, &loaded.recording.runs[0]);
         // All that is beside the slope is off.
-        let parameters = &model.spec().parameters;
-        let mut shared: Vec<f64> =
-            parameters.iter().filter(|p| p.scope == Scope::Shared).map(|p| p.start).collect();
+        let mut shared = model.spec().starts(Scope::Shared);
         shared[0] = 1.5;
         let (mut out, mut slope) = (vec![0.0; 9], vec![0.0; 9]);
         model.jacobian(run, &shared, &[], &[0], &[], &mut out, &mut slope).unwrap();

@@ -212,8 +212,7 @@ impl Model for LiquidTiltModel {
         }
         let Some(at) = self.layout.volume else { return };
         // The volume whose torque is nearest, on a grid: the surface has more than one valley.
-        let mut shared: Vec<f64> =
-            self.spec.parameters.iter().filter(|p| p.scope == Scope::Shared).map(|p| p.start).collect();
+        let mut shared = self.spec.starts(Scope::Shared);
         shared[self.layout.slip_row.slot] = -1.0;
         let capacity = self.setup.vessel.capacity_m3();
         let mut out = vec![0.0; 3 * run.len()];

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use missing_physics::data::{Recording, Run};
-use missing_physics::model::{Experiment, Model as _};
+use missing_physics::model::{Experiment, Model as _, Scope};
 
 use super::model::MotionModel;
 use super::scales::range;
@@ -130,7 +130,10 @@ fn from_rest(first: &Run, times: Vec<f64>) -> Run {
 fn stays_near(model: &MotionModel, recording: &Recording, run: &Run) -> bool {
     let rows = run.len();
     let mut out = vec![0.0; rows * recording.channels.len()];
-    let Ok(()) = model.predict(run, &model.unrepaired(), &model.at_rest(run), &mut out) else { return false };
+    let Ok(()) = model.predict(run, &model.spec().starts(Scope::Shared), &model.at_rest(run), &mut out)
+    else {
+        return false;
+    };
     out.chunks(rows).enumerate().all(|(channel, predicted)| {
         let [low, high] = range(recording.runs.iter().flat_map(|r| r.outputs[channel].iter().copied()));
         let more = BEYOND * (high - low);

@@ -1,7 +1,7 @@
 //! How a deviation of the start grows: which windows are too long to be followed.
 
 use missing_physics::data::{Recording, Run};
-use missing_physics::model::{Model as _, Scope};
+use missing_physics::model::Model as _;
 
 use super::model::MotionModel;
 use super::windows::cut;
@@ -32,10 +32,7 @@ pub(super) fn too_long(
 /// The largest deviation of an output in a window, in parts of its spread, that a deviation of a state at the start brings, in parts of
 /// that state's size; infinite where the motion cannot be followed to the window's end.
 fn growth(free: &MotionModel, recording: &Recording, window: &Run, shared: &[f64], sizes: &[f64]) -> f64 {
-    let parameters = &free.spec().parameters;
-    let mut nuisance: Vec<f64> =
-        parameters.iter().filter(|p| p.scope == Scope::PerRun).map(|p| p.start).collect();
-    free.nuisance_start(window, &mut nuisance);
+    let nuisance = free.nuisance(window);
     let first = nuisance.len() - sizes.len();
     let states: Vec<usize> = (first..nuisance.len()).collect();
     let n = window.len();

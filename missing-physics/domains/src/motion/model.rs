@@ -53,10 +53,6 @@ pub struct MotionModel {
     /// Nuisance slots of the recording's parameters of each run, and of the states that are free at its start.
     per_run: Vec<Option<usize>>,
     free_states: Vec<Option<usize>>,
-    /// Middle of each joint's range, and its typical speed and acceleration.
-    middles: Vec<f64>,
-    speeds: Vec<f64>,
-    accelerations: Vec<f64>,
     pace: Pace,
     scales: Scales,
     /// Where runs are cut into windows: the runs.
@@ -113,7 +109,7 @@ impl MotionModel {
             }
             (effects.builder.build_unchecked(), effects.roles)
         };
-        let off = spec.parameters.iter().filter(|p| p.scope == Scope::Shared).map(|p| p.start).collect();
+        let off = spec.starts(Scope::Shared);
         let mut next = 0;
         let mut slot = |taken: bool| {
             taken.then(|| {
@@ -125,28 +121,12 @@ impl MotionModel {
             equations.parameters.iter().map(|p| slot(p.per_run && !p.known && cut.is_none())).collect();
         let free_states =
             equations.states.iter().map(|s| slot(cut.is_some() || s.start == Start::Free)).collect();
-        let middles = scales.joints.iter().map(|j| 0.5 * (j.range[0] + j.range[1])).collect();
-        let speeds = scales.joints.iter().map(|j| j.speed).collect();
         let whole = |run: &Run| Whole {
             label: run.label.clone(),
             begin_s: run.inputs[0].first().copied().unwrap_or(0.0),
         };
         let cut = cut.map(|runs| runs.iter().map(whole).collect());
-        let accelerations = scales.joints.iter().map(|j| j.acceleration).collect();
-        Self {
-            equations,
-            spec,
-            roles,
-            off,
-            per_run,
-            free_states,
-            middles,
-            speeds,
-            accelerations,
-            pace,
-            scales,
-            cut,
-        }
+        Self { equations, spec, roles, off, per_run, free_states, pace, scales, cut }
     }
 
     /// The same model under equations that only take their inputs otherwise.
@@ -165,16 +145,16 @@ impl MotionModel {
         rubbing
     }
 
-    /// Shared parameters with every mechanism off.
-    pub(super) fn unrepaired(&self) -> Vec<f64> {
-        self.off.clone()
+    /// A run's nuisance parameters, from where fits begin.
+    pub(super) fn nuisance(&self, run: &Run) -> Vec<f64> {
+        let mut nuisance = self.spec.starts(Scope::PerRun);
+        self.nuisance_start(run, &mut nuisance);
+        nuisance
     }
 
-    /// Nuisance parameters of a run that begins where another did, with no joint moving.
+    /// The same of a run that begins where another did, with no joint moving.
     pub(super) fn at_rest(&self, run: &Run) -> Vec<f64> {
-        let own = |p: &&missing_physics::model::Parameter| p.scope == Scope::PerRun;
-        let mut nuisance: Vec<f64> = self.spec.parameters.iter().filter(own).map(|p| p.start).collect();
-        self.nuisance_start(run, &mut nuisance);
+        let mut nuisance = self.nuisance(run);
         for joint in &self.equations.joints {
             if let Some(slot) = self.free_states[joint.velocity] {
                 nuisance[slot] = 0.0;
@@ -265,9 +245,7 @@ impl MotionModel {
             values: shared,
             on: &on,
             run: windows::of_run(run),
-            middles: &self.middles,
-            speeds: &self.speeds,
-            accelerations: &self.accelerations,
+            joints: &self.scales.joints,
         };
         shared.setting(values)
     }

@@ -9,6 +9,7 @@ use joint_laws::signal::Drive;
 use super::effects::{OfInput, OfJoint, OfOutput, Role};
 use super::equations::Equations;
 use super::machine::{Force, JointLaws};
+use super::scales;
 
 /// All that parameters decide.
 pub(super) struct Setting<T> {
@@ -38,11 +39,8 @@ pub(super) struct Shared<'a, T> {
     pub(super) on: &'a dyn Fn(usize) -> bool,
     /// The number of the run, where runs are cut into windows.
     pub(super) run: usize,
-    /// Middle of each joint's range: a stop stands on the side where its position is.
-    pub(super) middles: &'a [f64],
-    /// Typical speed and acceleration of each joint.
-    pub(super) speeds: &'a [f64],
-    pub(super) accelerations: &'a [f64],
+    /// How each joint moves.
+    pub(super) joints: &'a [scales::OfJoint],
 }
 
 impl<T: Number> Shared<'_, T> {
@@ -109,7 +107,7 @@ impl<T: Number> Shared<'_, T> {
                 let law = dry.get_or_insert(without);
                 law.stribeck_level = value;
                 let fades = law.stribeck_speed.re();
-                setting.no_slower_than(fades / self.accelerations[joint]);
+                setting.no_slower_than(fades / self.joints[joint].acceleration);
             }
             OfJoint::LoadFraction => dry.get_or_insert(without).load_fraction = value,
             OfJoint::Damping(power) => laws.forces.push(Force::Damping(power, value)),
@@ -119,11 +117,13 @@ impl<T: Number> Shared<'_, T> {
                 let phase = self.of_joint(joint, OfJoint::CogPhase);
                 let periods = self.of_joint(joint, OfJoint::CogPeriods);
                 laws.forces.push(Force::Cogging([value, phase, periods]));
-                setting.no_slower_than((periods.re() * self.speeds[joint]).recip());
+                setting.no_slower_than((periods.re() * self.joints[joint].speed).recip());
             }
             OfJoint::StopStiffness => {
                 let at = self.of_joint(joint, OfJoint::StopPosition);
-                let above = at.re() > self.middles[joint];
+                // A stop stands on the side of the middle where its position is.
+                let [low, high] = self.joints[joint].range;
+                let above = at.re() > 0.5 * (low + high);
                 laws.forces.push(Force::Stop(at, value, above, setting.edges.len()));
                 setting.edges.push(Edge { state: states.position, at });
                 setting.no_slower_than(value.re().max(0.0).sqrt().recip());
@@ -138,7 +138,7 @@ impl<T: Number> Shared<'_, T> {
                 setting.edges.push(Edge { state: states.velocity, at: T::from(0.0) });
                 setting.edges.push(Edge { state, at: T::from(0.0) });
                 setting.no_slower_than(value.re().max(0.0).sqrt().recip());
-                setting.no_slower_than(yields.re() / self.speeds[joint]);
+                setting.no_slower_than(yields.re() / self.joints[joint].speed);
             }
             // They shape what others switch on; a gap is the drive's.
             OfJoint::StribeckSpeed
@@ -221,11 +221,8 @@ mod tests {
         (scales.step_s, scales.joints[0].acceleration) = (0.005, 20.0);
         let pace = |step_s| Pace { method: Method::Kutta, step_s };
         let mut model = MotionModel::baseline(all, pace(0.005)).full(scales, &starts, None);
-        let of = |model: &MotionModel, scope| {
-            let mine = model.spec().parameters.iter().filter(|p| p.scope == scope);
-            mine.map(|p| p.start).collect::<Vec<f64>>()
-        };
-        let (mut shared, nuisance) = (of(&model, Scope::Shared), of(&model, Scope::PerRun));
+        let spec = model.spec();
+        let (mut shared, nuisance) = (spec.starts(Scope::Shared), spec.starts(Scope::PerRun));
         let stribeck = model.spec().mechanisms.iter().find(|m| m.id == "stribeck-friction").unwrap();
         let slots = model.spec().slots();
         let [level, speed] = stribeck.parameters[..] else { panic!("two parameters") };

@@ -4,7 +4,7 @@
 use joint_laws::integrate::Method;
 use missing_physics::data::{Recording, Run};
 use missing_physics::fit::least_squares;
-use missing_physics::model::{Experiment, Model as _};
+use missing_physics::model::{Experiment, Model as _, Scope};
 use missing_physics::noise::rough_sigma;
 
 use super::equations::Equations;
@@ -82,8 +82,8 @@ fn same_motion(equations: &Equations, tuned: &Tuned, exact: &Recording) -> bool 
     let all: usize = tuned.recording.runs.iter().map(Run::len).sum();
     let sigmas: Vec<f64> =
         (0..tuned.recording.channels.len()).map(|c| sigma(&tuned.recording, &window, c)).collect();
-    let starts = shared_starts(model);
-    let nuisance = nuisance(model, &window);
+    let starts = model.spec().starts(Scope::Shared);
+    let nuisance = model.nuisance(&window);
     let predict = |model: &MotionModel, run: &Run, shared: &[f64]| -> Option<Vec<Vec<f64>>> {
         let mut out = vec![0.0; run.len() * sigmas.len()];
         model.predict(run, shared, &nuisance, &mut out).ok()?;
@@ -114,7 +114,7 @@ fn same_motion(equations: &Equations, tuned: &Tuned, exact: &Recording) -> bool 
 fn followed(equations: Equations, recording: Recording, steps: bool) -> Result<Tuned, String> {
     let mut remarks = Vec::new();
     let mut model = MotionModel::baseline(equations, first_pace(&recording));
-    let starts: Vec<f64> = shared_starts(&model);
+    let starts: Vec<f64> = model.spec().starts(Scope::Shared);
     resolve(&mut model, &recording, &starts)?;
     let (mut fitted, followed) = windows(&model, &recording, starts)?;
     if let Some(length) = followed {
@@ -182,18 +182,6 @@ fn by_the_rows(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -
     }
 }
 
-fn shared_starts(model: &MotionModel) -> Vec<f64> {
-    let shared = |p: &&missing_physics::model::Parameter| p.scope == missing_physics::model::Scope::Shared;
-    model.spec().parameters.iter().filter(shared).map(|p| p.start).collect()
-}
-
-fn nuisance(model: &MotionModel, run: &Run) -> Vec<f64> {
-    let own = |p: &&missing_physics::model::Parameter| p.scope == missing_physics::model::Scope::PerRun;
-    let mut start: Vec<f64> = model.spec().parameters.iter().filter(own).map(|p| p.start).collect();
-    model.nuisance_start(run, &mut start);
-    start
-}
-
 fn median_step(recording: &Recording) -> f64 {
     let mut steps: Vec<f64> =
         recording.runs.iter().flat_map(|r| r.inputs[0].windows(2).map(|w| w[1] - w[0])).collect();
@@ -240,7 +228,7 @@ fn resolve_by(
     shared: &[f64],
 ) -> Result<(), String> {
     let mut pace = first_pace(recording);
-    let start = nuisance(model, run);
+    let start = model.nuisance(run);
     let n = run.len();
     let rows: usize = recording.runs.iter().map(Run::len).sum();
     let sigmas: Vec<f64> = (0..recording.channels.len()).map(|c| sigma(recording, run, c)).collect();
@@ -274,7 +262,7 @@ fn resolve_by(
 /// From which states and by which parameters a motion was followed, in words.
 fn begun(model: &MotionModel, run: &Run, shared: &[f64]) -> String {
     let equations = model.equations();
-    let states = model.begins(run, &nuisance(model, run));
+    let states = model.begins(run, &model.nuisance(run));
     let named = |name: &str, value: f64| format!("{name} = {}", (value * 1e6).round() / 1e6);
     let states = equations.states.iter().zip(states).map(|(s, v)| named(&s.name, v));
     let parameters = equations.parameters.iter().zip(model.stated(shared)).map(|(p, v)| named(&p.name, v));
@@ -350,7 +338,7 @@ fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) -> Result<S
     let states = model.equations().states.len();
     let (mut all, mut rates) = (vec![Vec::new(); states], vec![Vec::new(); states]);
     for run in &recording.runs {
-        let course = model.course(run, shared, &nuisance(model, run))?;
+        let course = model.course(run, shared, &model.nuisance(run))?;
         for k in 0..states {
             all[k].extend(&course.states[k]);
             rates[k].extend(&course.rates[k]);

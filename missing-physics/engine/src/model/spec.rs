@@ -162,6 +162,11 @@ impl Spec {
         self.parameters.iter().filter(|p| p.scope == scope).count()
     }
 
+    /// Where each parameter with the given scope starts, in order.
+    pub fn starts(&self, scope: Scope) -> Vec<f64> {
+        self.parameters.iter().filter(|p| p.scope == scope).map(|p| p.start).collect()
+    }
+
     /// Position of each parameter among those of its scope.
     pub fn slots(&self) -> Vec<usize> {
         let (mut shared, mut nuisance) = (0, 0);

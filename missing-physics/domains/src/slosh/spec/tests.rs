@@ -10,8 +10,7 @@ use super::*;
 fn friction_and_eddies_are_those_of_the_wave_and_not_of_a_reading_that_lags() {
     let cylinder = UprightCylinder::new(0.035, 0.05, 9.81).unwrap();
     let (spec, p) = build(&GLASS, &cylinder, 1e-3, 1e-6);
-    let mut shared: Vec<f64> =
-        spec.parameters.iter().filter(|q| q.scope == Scope::Shared).map(|q| q.start).collect();
+    let mut shared = spec.starts(Scope::Shared);
     (shared[p.friction.slot], shared[p.quadratic.slot]) = (2e-5, 30.0);
     let said = |shared: &[f64], id: &str| {
         let mechanism = spec.mechanisms.iter().find(|m| m.id == id).unwrap();
