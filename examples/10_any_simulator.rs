@@ -3,6 +3,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::time::Instant;
 
 use missing_physics::engine::Options;
 use missing_physics::observer::Silent;
@@ -31,23 +32,36 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             say: None,
             verbose: false,
         };
-        println!("== {title}\n{}", diagnose(&arguments, &Silent)?.text);
+        let begun = Instant::now();
+        let text = diagnose(&arguments, &Silent)?.text;
+        println!("== {title}: {:.0} s\n{text}", begun.elapsed().as_secs_f64());
         Ok(())
     };
     println!("Hidden: dry friction, 0.04 rad/s^2.\n");
-    if python("json") {
-        ask("pendulum.py, Python's standard library", &swing)?;
-    } else {
-        println!("== pendulum.py: python3 is not installed, not tried\n");
+    if !python("json") {
+        println!("python3 is not installed: nothing was tried");
+        return Ok(());
     }
+    ask("pendulum.py, Python's standard library", &swing)?;
+    // Another program, and perhaps another header, beside the same table.
+    let beside = |title: &str, header: &Path, program: &Path| -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        std::fs::copy(header, folder.path().join("recording.toml"))?;
+        std::fs::copy(swing.join("data.csv"), folder.path().join("data.csv"))?;
+        std::fs::copy(program, folder.path().join("pendulum.py"))?;
+        ask(title, folder.path())
+    };
+    let [stated, forces] = ["recordings/swing", "docs/forces"].map(|f| root.join(f).join("recording.toml"));
+    let title = "docs/forces/pendulum.py, which knows of no friction and lets forces act on its joint";
+    beside(title, &forces, &root.join("docs/forces/pendulum.py"))?;
     if examples::small() || !python("mujoco") {
         println!("== MuJoCo: not installed, or --small: not tried");
         return Ok(());
     }
-    let folder = tempfile::tempdir()?;
-    for file in ["recording.toml", "data.csv"] {
-        std::fs::copy(swing.join(file), folder.path().join(file))?;
-    }
-    std::fs::copy(root.join("docs/mujoco/pendulum.py"), folder.path().join("pendulum.py"))?;
-    ask("docs/mujoco/pendulum.py, MuJoCo", folder.path())
+    beside("docs/mujoco/pendulum.py, MuJoCo", &stated, &root.join("docs/mujoco/pendulum.py"))?;
+    beside(
+        "docs/mujoco/forces.py, MuJoCo, which knows of no friction",
+        &forces,
+        &root.join("docs/mujoco/forces.py"),
+    )
 }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use missing_physics_domains::custom::{Failure, Questions, Simulator as Simulates, fill};
+use missing_physics_domains::custom::{Failure, JointForce, Questions, Simulator as Simulates, fill};
 use numpy::PyArray1;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -76,13 +76,33 @@ impl Function {
         self.give_up("stopped".into());
     }
 
+    /// What the function answers; where it has joints, it gets as a third argument what acts on each of them.
+    fn answer<'py, F: IntoPyObject<'py>>(
+        &self,
+        py: Python<'py>,
+        parameters: &Bound<'py, PyDict>,
+        asked: &Questions<'_>,
+        of_joint: impl Fn(&[&JointForce]) -> F,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let call = self.call.bind(py);
+        if asked.joints.is_empty() {
+            return call.call1((parameters, inputs(py, asked)?));
+        }
+        let forces = PyDict::new(py);
+        for (k, name) in asked.joints.iter().enumerate() {
+            let of_sets: Vec<&JointForce> = asked.forces.iter().filter_map(|set| set.get(k)).collect();
+            forces.set_item(name, of_joint(&of_sets))?;
+        }
+        call.call1((parameters, inputs(py, asked)?, forces))
+    }
+
     /// One set of parameters: a number a name, a column a channel.
     fn one(&self, py: Python<'_>, asked: &Questions<'_>, set: &[f64]) -> Result<Vec<f64>, Wrong> {
         let parameters = PyDict::new(py);
         for (name, value) in asked.parameters.iter().zip(set) {
             parameters.set_item(name, value)?;
         }
-        let answer = self.call.bind(py).call1((parameters, inputs(py, asked)?))?;
+        let answer = self.answer(py, &parameters, asked, |forces| forces.first().map(|acts| texts(acts)))?;
         let mut out = vec![0.0; asked.rows * asked.channels.len()];
         for (name, out) in asked.channels.iter().zip(out.chunks_mut(asked.rows.max(1))) {
             let values = column(&channel(&answer, asked.channels, name)?, name)?;
@@ -100,7 +120,8 @@ impl Function {
         }
         // Without parameters nothing else says how many answers are expected.
         let count = asked.sets.len();
-        let answer = self.call.bind(py).call1((parameters, inputs(py, asked)?))?;
+        let all = |forces: &[&JointForce]| forces.iter().copied().map(texts).collect::<Vec<_>>();
+        let answer = self.answer(py, &parameters, asked, all)?;
         let mut outs = vec![vec![0.0; asked.rows * asked.channels.len()]; count];
         for (c, name) in asked.channels.iter().enumerate() {
             let all = rows(&channel(&answer, asked.channels, name)?, name)?;
@@ -140,6 +161,11 @@ impl Function {
             }
         }
     }
+}
+
+/// A force and a friction as Python gets them.
+fn texts(acts: &JointForce) -> (String, String) {
+    (acts.force.clone(), acts.friction.clone())
 }
 
 /// The inputs of a run, each an array of its own.
@@ -187,7 +213,11 @@ impl Simulates for Function {
             let answers = if self.batched {
                 self.all(py, questions)
             } else {
-                questions.sets.iter().map(|set| self.one(py, questions, set)).collect()
+                let each = (0..questions.sets.len()).map(|k| {
+                    let forces = questions.forces.get(k..=k).unwrap_or_default();
+                    self.one(py, &Questions { forces, ..*questions }, &questions.sets[k])
+                });
+                each.collect()
             };
             answers.map_err(|wrong| self.failure(py, wrong))
         })

@@ -16,6 +16,8 @@ pub mod grain_pour;
 pub mod indentation;
 #[cfg(feature = "liquid-tilt")]
 pub mod liquid_tilt;
+#[cfg(any(feature = "custom", feature = "motion"))]
+mod mechanics;
 #[cfg(any(feature = "custom", feature = "dough-roll", feature = "liquid-tilt"))]
 mod memo;
 #[cfg(feature = "motion")]

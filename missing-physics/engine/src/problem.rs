@@ -43,6 +43,8 @@ pub(crate) struct ParameterTable {
 
 /// Models with more mechanisms than this know many.
 const MANY: usize = 20;
+/// The same where a program is asked, each of whose answers takes milliseconds.
+const MANY_FOR_A_PROGRAM: usize = 8;
 
 /// Whiteners of neighbouring shapes.
 type Page = Box<[OnceLock<Whitener>]>;
@@ -177,7 +179,8 @@ impl<'a> Problem<'a> {
 
     /// Whether the model knows so many mechanisms that what is tried for them has to be cheap.
     pub(crate) fn knows_many(&self) -> bool {
-        self.spec().mechanisms.len() > MANY
+        let most = if self.model.extensions().program.is_some() { MANY_FOR_A_PROGRAM } else { MANY };
+        self.spec().mechanisms.len() > most
     }
 
     pub(crate) fn channels(&self) -> usize {

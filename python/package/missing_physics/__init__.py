@@ -12,6 +12,7 @@ from . import bayes_sim, bounce_audio, errors, granular_infer, hertz_contact, li
 from ._diagnose import diagnose, domains
 from ._diagnosis import Diagnosis, Estimate, MechanismReport, Prediction, Repaired, RunCurves
 from ._engine import version as _version
+from ._forces import Force, Joint
 from ._model import Mechanism, Model, Parameter
 from ._prove import Proof, prove
 from .errors import MissingPhysicsError, NoPrediction
@@ -21,6 +22,8 @@ __version__ = _version()
 __all__ = [
     "Diagnosis",
     "Estimate",
+    "Force",
+    "Joint",
     "Mechanism",
     "MechanismReport",
     "MissingPhysicsError",

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from . import _engine
+from ._forces import Force, Joint, forces
 from ._recording import Run, Runs, Table, labelled, memory
 from .errors import DiagnosisError, RecordingError
 
-#: ``predict(parameters, inputs)``: numbers by name and columns by name in, columns of the channels by name out.
-Predict = Callable[[dict[str, Any], dict[str, Any]], Any]
+#: ``predict(parameters, inputs)``: numbers by name and columns by name in, columns of the channels by name out. With joints, a third argument
+#: holds what acts on each.
+Predict = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,10 @@ class Model:
 
     Which columns of the runs are ``inputs`` (known exactly; noise may be correlated along the first) and which are ``channels``
     (measured) is asked of ``predict`` where it is not said. ``step`` is that of derivatives, in scales of a parameter: well above
-    the simulator's own rounding. ``noise`` holds one sigma of a channel where there was a calibration. ``file`` writes the simulator's
+    the simulator's own rounding. With ``joints``, ``predict(parameters, inputs, forces)`` also gets a dict of :class:`Force` by the joints'
+    names (lists of them, one a set, with ``batched``), applies them, and is asked about friction, springs and stops that it knows nothing
+    of. ``acts`` says which inputs drive it, and what they are between rows (``{"command_v": "hold"}``, or ``"linear"``): gains, delays,
+    lags, dead zones and saturations of these are tried. ``noise`` holds one sigma of a channel where there was a calibration. ``file`` writes the simulator's
     own file at given parameters, where it has one (MJCF), for :meth:`Repaired.file`.
     """
 
@@ -99,6 +104,8 @@ class Model:
     baseline: str = ""
     batched: bool = False
     step: float = 1e-3
+    joints: Sequence[Joint] = ()
+    acts: Mapping[str, str] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     file: Callable[[dict[str, float]], str] | None = None
@@ -114,7 +121,8 @@ class Model:
         if not channels:
             if self.batched:
                 raise DiagnosisError("a batched model says which columns are its channels, and this one has none")
-            answer = self.predict(self._starts(), table.first())
+            none = {joint.name: Force(("0", "0")) for joint in self.joints}
+            answer = self.predict(self._starts(), table.first(), *([none] if none else []))
             if not isinstance(answer, Mapping):
                 raise DiagnosisError("a model that returns an array alone says which column is its channel")
             channels = [str(name) for name in answer]
@@ -132,7 +140,7 @@ class Model:
         inputs, channels = self._columns(table, channels)
         header: dict[str, Any] = {
             "domain": "custom",
-            "input": [self._quantity(name) for name in inputs],
+            "input": [{**self._quantity(name), **({"acts": self.acts[name]} if name in self.acts else {})} for name in inputs],
             "channel": [self._quantity(name) for name in channels],
             "simulator": {"step": float(self.step)},
         }
@@ -140,6 +148,8 @@ class Model:
             header["parameter"] = [parameter._header("start") for parameter in self.parameters]
         if self.mechanisms:
             header["mechanism"] = [mechanism._header() for mechanism in self.mechanisms]
+        if self.joints:
+            header["joint"] = [joint._header() for joint in self.joints]
         if self.noise:
             header["noise"] = {name: float(sigma) for name, sigma in self.noise.items()}
         if self.baseline:
@@ -150,7 +160,10 @@ class Model:
         return {"name": name, "unit": self.units.get(name, _engine.unit_of(name))}
 
     def _simulator(self) -> _engine.Simulator:
-        return _engine.Simulator(self.predict, self.batched)
+        if not self.joints:
+            return _engine.Simulator(self.predict, self.batched)
+        predict = self.predict
+        return _engine.Simulator(lambda parameters, inputs, acts: predict(parameters, inputs, forces(acts)), self.batched)
 
 
 def _only(runs: Runs, wanted: Sequence[str]) -> Runs:

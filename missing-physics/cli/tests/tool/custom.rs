@@ -374,3 +374,21 @@ fn python_a_program_is_asked_and_its_missing_friction_named() {
     // 0.04 rad/s^2 is hidden.
     assert!(friction[0].as_f64().unwrap() < 0.04 && friction[1].as_f64().unwrap() > 0.04, "{friction}");
 }
+
+/// A program that knows of no friction, and lets forces act on its joint: what is hidden is named from motion's list.
+#[test]
+#[ignore = "needs python3"]
+fn python_a_friction_that_the_program_knows_nothing_of_is_named() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["docs/forces/recording.toml", "docs/forces/pendulum.py", "recordings/swing/data.csv"] {
+        let from = root.join(file);
+        std::fs::copy(&from, folder.path().join(from.file_name().unwrap())).unwrap();
+    }
+    let answer = diagnose(folder.path()).unwrap();
+    assert_eq!(answer["verdict"], "explained");
+    assert_eq!(answer["chosen"], serde_json::json!(["coulomb-friction"]));
+    let friction = &answer["mechanisms"][0]["parameters"][0]["ci95"];
+    // 0.04 rad/s^2 is hidden.
+    assert!(friction[0].as_f64().unwrap() < 0.04 && friction[1].as_f64().unwrap() > 0.04, "{friction}");
+}

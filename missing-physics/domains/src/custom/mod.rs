@@ -2,6 +2,7 @@
 
 mod answer;
 mod declare;
+mod machine;
 mod model;
 mod process;
 mod sensors;
@@ -19,6 +20,7 @@ use crate::plausible;
 use crate::reading::{calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Source, Table, quoted};
 pub use answer::{Failure, fill, read_answer, read_batch};
+pub use machine::JointForce;
 use model::{CustomModel, Program, Simulation};
 use process::Pool;
 pub use process::end_all;
@@ -47,7 +49,10 @@ impl Domain for Custom {
         &[
             ("run, the inputs, the channels", "one row a measurement; names as in [[input]] and [[channel]]"),
             ("sim_<channel>", "what the simulation says of each channel, where no program is named"),
-            ("[[input]] name, unit", "known exactly; noise may be correlated along the first, if it rises"),
+            (
+                "[[input]] name, unit, acts",
+                "known exactly; noise may be correlated along the first, if it rises; acts = \"hold\" or \"linear\": drives the program",
+            ),
             ("[[channel]] name, unit", "measured"),
             ("baseline", "optional: what the simulation is, in a sentence"),
             (
@@ -62,6 +67,10 @@ impl Domain for Custom {
             (
                 "[[mechanism]] id, name, explanation, equation, reference, confused_with",
                 "what may have been left out",
+            ),
+            (
+                "[[joint]] name, position, typical_force, force_unit, range, speed, driven, turns, without",
+                "a joint of the program, which takes further forces: the mechanisms of motion's joints are tried",
             ),
             ("[[mechanism.parameter]] name, unit, off, lower, upper, scale, per_run", "off at `off` (0)"),
             (
@@ -146,15 +155,17 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
             extent: along.then(extent),
         },
     );
+    let machine = machine::declare(header, &mut b, &inputs, &channels, &runs)?;
     let sensors = sensors::add(&mut b, &channels, &inputs, &runs);
     let experiments = experiments(header, &inputs, channels.len(), b.so_far(), program.is_some())?;
     let simulation = match program {
         Some(simulator) => {
-            let program = Program::new(simulator, &inputs, &channels, parameters, relative_step);
+            let program = Program::new(simulator, &inputs, &channels, parameters, machine, relative_step);
             Simulation::Program(Box::new(program))
         }
-        None if !parameters.is_empty() => {
-            let expected = "a program, for the parameters and mechanisms that are declared";
+        None if !parameters.is_empty() || !machine.is_empty() => {
+            let expected =
+                "a program, for the parameters, mechanisms, joints and acting inputs that are declared";
             return Err(header.section("simulator")?.unfit("command", "absent", expected));
         }
         None => Simulation::Precomputed(precomputed(&table, &simulated)?),

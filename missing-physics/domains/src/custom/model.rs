@@ -12,6 +12,7 @@ use missing_physics::model::{
 };
 
 use super::answer::Failure;
+use super::machine::{JointForce, Machine};
 use super::sensors::Sensors;
 use super::simulator::{Questions, Simulator};
 use super::terms::Candidate;
@@ -47,6 +48,8 @@ pub(super) struct Program {
     /// Names of the channels, as the program answers them.
     channels: Vec<String>,
     parameters: Names,
+    /// What acts on its joints and inputs.
+    machine: Machine,
     /// Predictions by run, a hash of its inputs, number of rows, and the bits of the parameters.
     predictions: Memo<Asked, Arc<Vec<f64>>>,
     /// By how much the answers to one question may differ, relative to the largest number of a channel.
@@ -74,6 +77,7 @@ impl Program {
         inputs: &[Quantity],
         channels: &[Quantity],
         parameters: Names,
+        machine: Machine,
         relative_step: f64,
     ) -> Self {
         let names = |quantities: &[Quantity]| quantities.iter().map(|q| q.name.clone()).collect();
@@ -83,6 +87,7 @@ impl Program {
             inputs,
             channels,
             parameters,
+            machine,
             predictions: Memo::new(MOST_NUMBERS),
             tolerance: BEYOND_STEP * relative_step,
             asked_twice: AtomicBool::new(false),
@@ -123,25 +128,48 @@ impl Program {
         Ok(())
     }
 
-    /// The parameters' values in the order of their names.
+    /// The parameters' values in the order of their names, then those of what acts on its inputs and joints.
     fn values(&self, shared: &[f64], nuisance: &[f64]) -> Vec<f64> {
         let value = |(_, scope, slot): &(String, Scope, usize)| match scope {
             Scope::Shared => shared[*slot],
             Scope::PerRun => nuisance[*slot],
         };
-        self.parameters.iter().map(value).collect()
+        self.parameters.iter().map(value).chain(self.machine.values(shared)).collect()
     }
 
     /// As many answers as there are sets, each with all rows of all channels.
     fn ask(&self, run: &Run, rows: usize, sets: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Failure> {
+        // Sets with the same inputs are asked for at once.
+        let (first, last) = (self.parameters.len(), self.parameters.len() + self.machine.of_inputs());
+        let alike = |a: &Vec<f64>, b: &Vec<f64>| a[first..last] == b[first..last];
+        let answers = sets.chunk_by(alike).map(|sets| self.ask_alike(run, rows, sets));
+        Ok(answers.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    /// The same of sets at which the inputs act alike.
+    fn ask_alike(&self, run: &Run, rows: usize, sets: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Failure> {
         let names: Vec<&str> = self.parameters.iter().map(|(name, ..)| name.as_str()).collect();
-        let columns = run.inputs.iter().map(Vec::as_slice);
+        let (stated, further): (Vec<Vec<f64>>, Vec<&[f64]>) = sets
+            .iter()
+            .map(|set| {
+                let (stated, further) = set.split_at(names.len());
+                (stated.to_vec(), further)
+            })
+            .unzip();
+        if let Some(why) = further.iter().find_map(|values| self.machine.unknown(values)) {
+            return Err(Failure::NoPrediction(why));
+        }
+        let acting = further.first().and_then(|values| self.machine.inputs(values, run));
+        let columns = acting.as_ref().unwrap_or(&run.inputs).iter().map(Vec::as_slice);
         let inputs: Vec<(&str, &[f64])> = self.inputs.iter().map(String::as_str).zip(columns).collect();
+        let forces: Vec<Vec<JointForce>> = further.iter().map(|values| self.machine.forces(values)).collect();
         let answers = self.simulator.predict(&Questions {
             run: &run.label,
             parameters: &names,
-            sets,
+            sets: &stated,
             inputs: &inputs,
+            joints: self.machine.joints(),
+            forces: &forces,
             channels: &self.channels,
             rows: rows / self.channels.len().max(1),
         })?;
@@ -277,8 +305,12 @@ impl Model for CustomModel {
 
 impl MultimodalModel for CustomModel {
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        let first = self.spec.mechanisms[mechanism].parameters.first();
-        first.map_or_else(Vec::new, |first| self.sensors.starts(*first))
+        let own = &self.spec.mechanisms[mechanism].parameters;
+        let mut starts = own.first().map_or_else(Vec::new, |first| self.sensors.starts(*first));
+        if let Simulation::Program(program) = &self.simulation {
+            starts.extend(program.machine.starts(own));
+        }
+        starts
     }
 }
 

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::answer::{Failure, read_answer, read_batch};
+use super::machine::JointForce;
 use super::simulator::{Questions, Simulator};
 use crate::recording::quoted;
 
@@ -36,10 +37,24 @@ struct Request<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     batch: Option<Vec<Values<'a>>>,
     inputs: BTreeMap<&'a str, &'a [f64]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    forces: Option<Forces<'a>>,
 }
 
 /// Parameters by name.
 type Values<'a> = BTreeMap<&'a str, f64>;
+
+/// What acts on the joints by name, for one set of parameters or for each of a batch.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Forces<'a> {
+    One(BTreeMap<&'a str, &'a JointForce>),
+    Batch(Vec<BTreeMap<&'a str, &'a JointForce>>),
+}
+
+fn by_joint<'a>(joints: &'a [String], forces: &'a [JointForce]) -> BTreeMap<&'a str, &'a JointForce> {
+    joints.iter().map(String::as_str).zip(forces).collect()
+}
 
 /// How a simulator is started.
 #[derive(Debug, Clone)]
@@ -146,30 +161,36 @@ impl Pool {
 
 impl Simulator for Pool {
     fn predict(&self, questions: &Questions<'_>) -> Result<Vec<Vec<f64>>, Failure> {
-        let Questions { run, parameters, sets, inputs, channels, rows } = *questions;
+        let Questions { run, parameters, sets, inputs, joints, forces, channels, rows } = *questions;
         let named = |values: &Vec<f64>| -> Values<'_> {
             parameters.iter().copied().zip(values.iter().copied()).collect()
         };
         let inputs: BTreeMap<&str, &[f64]> = inputs.iter().copied().collect();
         let numbers = rows * channels.len();
-        let answer = |sets: &[Vec<f64>]| -> Result<Vec<Vec<f64>>, Failure> {
+        let answer = |(sets, forces): (&[Vec<f64>], &[Vec<JointForce>])| -> Result<Vec<Vec<f64>>, Failure> {
             let limit = self.start.limit;
-            if let [alone] = sets {
+            if let ([alone], [acts]) = (sets, forces) {
+                let forces = (!joints.is_empty()).then(|| Forces::One(by_joint(joints, acts)));
                 let parameters = Some(named(alone));
-                let request = |id| Request { id, run, parameters, batch: None, inputs: inputs.clone() };
+                let request =
+                    |id| Request { id, run, parameters, batch: None, inputs: inputs.clone(), forces };
                 let read = |line: &str, id| {
                     let mut out = vec![0.0; numbers];
                     read_answer(line, id, channels, &mut out).map(|()| out)
                 };
                 return Ok(vec![self.ask(request, limit, read)?]);
             }
+            let forces = (!joints.is_empty())
+                .then(|| Forces::Batch(forces.iter().map(|acts| by_joint(joints, acts)).collect()));
             let batch = Some(sets.iter().map(named).collect());
-            let request = |id| Request { id, run, parameters: None, batch, inputs: inputs.clone() };
+            let request = |id| Request { id, run, parameters: None, batch, inputs: inputs.clone(), forces };
             let limit = limit.saturating_mul(u32::try_from(sets.len()).unwrap_or(u32::MAX));
             let read = |line: &str, id| read_batch(line, id, channels, numbers, sets.len());
             self.ask(request, limit, read)?.into_iter().collect()
         };
-        let answers: Result<Vec<_>, Failure> = sets.chunks(self.start.batch.max(1)).map(answer).collect();
+        let most = self.start.batch.max(1);
+        let answers: Result<Vec<_>, Failure> =
+            sets.chunks(most).zip(forces.chunks(most)).map(answer).collect();
         Ok(answers?.concat())
     }
 
@@ -391,7 +412,8 @@ mod tests {
         });
         let alone = [vec![]];
         let (run, parameters, sets, inputs) = ("a", &[][..], &alone[..], &[][..]);
-        let asked = Questions { run, parameters, sets, inputs, channels: &[], rows: 0 };
+        let forces = &[Vec::new()];
+        let asked = Questions { run, parameters, sets, inputs, joints: &[], forces, channels: &[], rows: 0 };
         assert_eq!(pool.predict(&asked).ok(), Some(vec![vec![]]));
         std::thread::sleep(Duration::from_secs(2));
         assert!(!folder.path().join("said").exists());
@@ -414,7 +436,9 @@ mod tests {
             std::thread::spawn(move || {
                 let alone = [vec![]];
                 let (run, parameters, sets, inputs) = ("a", &[][..], &alone[..], &[][..]);
-                let asked = Questions { run, parameters, sets, inputs, channels: &[], rows: 0 };
+                let forces = &[Vec::new()];
+                let asked =
+                    Questions { run, parameters, sets, inputs, joints: &[], forces, channels: &[], rows: 0 };
                 let _ = done.send(pool.predict(&asked));
             });
         }

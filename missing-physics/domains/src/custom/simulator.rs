@@ -1,6 +1,7 @@
 //! What predicts a recording of the domain `custom`: a program that is started, or a function of the program that diagnoses.
 
 use super::answer::Failure;
+use super::machine::JointForce;
 
 /// Questions to a simulator: one run, at some sets of parameters.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +14,10 @@ pub struct Questions<'a> {
     pub sets: &'a [Vec<f64>],
     /// Names of the inputs, and the run's columns of them.
     pub inputs: &'a [(&'a str, &'a [f64])],
+    /// Names of the joints on which something may act beside what the simulator knows.
+    pub joints: &'a [String],
+    /// For each set of parameters, what acts on each of them.
+    pub forces: &'a [Vec<JointForce>],
     /// Names of the channels.
     pub channels: &'a [String],
     /// Number of rows of the run.

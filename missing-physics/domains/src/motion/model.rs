@@ -8,12 +8,13 @@ use missing_physics::model::{
     Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec, WindowedModel,
 };
 
-use super::effects::{Effects, OfJoint, Role};
+use super::effects::{Effects, Role};
 use super::equations::{Equations, Start};
 use super::machine::Driven;
 use super::scales::Scales;
 use super::setting::{Setting, Shared};
 use super::windows;
+use crate::mechanics::JointEffect;
 
 /// Steps of the integration in the shortest time in which a law changes.
 const STEPS_IN_SHORTEST: f64 = 2.0;
@@ -138,8 +139,8 @@ impl MotionModel {
     pub(super) fn rubbing(&self, shared: &[f64]) -> Vec<f64> {
         let mut rubbing = shared.to_vec();
         for (role, value) in self.roles.iter().zip(&mut rubbing) {
-            if let Role::Joint(joint, OfJoint::Coulomb) = *role {
-                *value = RUBS * self.scales.joints[joint].acceleration;
+            if let Role::Joint(joint, JointEffect::Coulomb) = *role {
+                *value = RUBS * self.scales.joints[joint].force;
             }
         }
         rubbing
@@ -554,10 +555,12 @@ impl JointLimits for MotionModel {
         let first = *self.spec.mechanisms[mechanism].parameters.first()?;
         let slot =
             |index: usize| self.spec.parameters[..index].iter().filter(|p| p.scope == Scope::Shared).count();
-        let Role::Joint(joint, OfJoint::StopPosition) = *self.roles.get(slot(first))? else { return None };
-        let at = self.roles.iter().position(|r| *r == Role::Joint(joint, OfJoint::StopStiffness))?;
+        let Role::Joint(joint, JointEffect::StopPosition) = *self.roles.get(slot(first))? else {
+            return None;
+        };
+        let at = self.roles.iter().position(|r| *r == Role::Joint(joint, JointEffect::StopStiffness))?;
         let sizes = &self.scales.joints[joint];
-        let least = STIFFER * sizes.acceleration / sizes.reach;
+        let least = STIFFER * sizes.force / sizes.reach;
         (shared[at] < least)
             .then(|| format!("a stop of {:.3} 1/s^2 gives way like the joint's own spring", shared[at]))
     }

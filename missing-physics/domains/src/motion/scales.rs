@@ -1,12 +1,13 @@
 //! How large a machine's motions, inputs and readings are: what effects and their bounds are measured by.
 
 use super::equations::Equations;
+use crate::mechanics::{JointSizes, JointUnits};
 
 /// Sizes of a recording.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scales {
     pub(super) states: Vec<f64>,
-    pub(super) joints: Vec<OfJoint>,
+    pub(super) joints: Vec<JointSizes>,
     pub(super) inputs: Vec<Range>,
     pub(super) outputs: Vec<Range>,
     /// Smallest and largest value of each level.
@@ -21,29 +22,6 @@ pub(super) struct Scales {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Range {
     pub(super) range: [f64; 2],
-}
-
-/// Sizes of a joint's motion.
-#[derive(Debug, Clone, Default)]
-pub(super) struct OfJoint {
-    /// Root mean square of the acceleration.
-    pub(super) acceleration: f64,
-    /// Root mean square of the speed.
-    pub(super) speed: f64,
-    /// Largest modulus of the position.
-    pub(super) reach: f64,
-    /// Smallest and largest position.
-    pub(super) range: [f64; 2],
-    pub(super) position_unit: String,
-    pub(super) speed_unit: String,
-    pub(super) force_unit: String,
-}
-
-impl OfJoint {
-    /// The smallest displacement at which a spring can be seen to yield: a part of what passes between rows. Below it is dry friction.
-    pub(super) fn least_yield(&self, step_s: f64) -> f64 {
-        (0.25 * self.speed * step_s).clamp(1e-4 * self.reach, 0.03 * self.reach)
-    }
 }
 
 /// Smallest and largest of the finite values; a unit apart where they are all the same.
@@ -93,18 +71,33 @@ impl Scales {
                 let unit = super::units::text(&equations.states[joint.position].name);
                 let of =
                     |suffix: &str| if unit.is_empty() { String::new() } else { format!("{unit}/{suffix}") };
-                OfJoint {
-                    acceleration: rms(&rates[joint.velocity]),
+                let position = &unit;
+                let units = JointUnits {
+                    speed: of("s"),
+                    force: of("s^2"),
+                    damping: ["1/s".to_owned(), per(position), format!("s/({position})^2")],
+                    stiffness: [
+                        "1/s^2".to_owned(),
+                        format!("1/(s^2 {position})"),
+                        format!("1/(s^2 {position}^2)"),
+                    ],
+                    position: unit.clone(),
+                };
+                JointSizes {
+                    force: rms(&rates[joint.velocity]),
                     speed: rms(&states[joint.velocity]),
                     reach: low.abs().max(high.abs()).max(1e-9),
                     range: [low, high],
-                    speed_unit: of("s"),
-                    force_unit: of("s^2"),
-                    position_unit: unit,
+                    units,
                 }
             })
             .collect();
         self.levels = equations.levels.iter().map(|&l| range(states[l].iter().copied())).collect();
         self
     }
+}
+
+/// One over a unit.
+fn per(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!("1/{unit}") }
 }

@@ -6,10 +6,10 @@ use joint_laws::integrate::{Ceiling, Edge};
 use joint_laws::sensor::Sensor;
 use joint_laws::signal::Drive;
 
-use super::effects::{OfInput, OfJoint, OfOutput, Role};
+use super::effects::{OfOutput, Role};
 use super::equations::Equations;
 use super::machine::{Force, JointLaws};
-use super::scales;
+use crate::mechanics::{InputEffect, JointEffect, JointSizes};
 
 /// All that parameters decide.
 pub(super) struct Setting<T> {
@@ -40,12 +40,12 @@ pub(super) struct Shared<'a, T> {
     /// The number of the run, where runs are cut into windows.
     pub(super) run: usize,
     /// How each joint moves.
-    pub(super) joints: &'a [scales::OfJoint],
+    pub(super) joints: &'a [JointSizes],
 }
 
 impl<T: Number> Shared<'_, T> {
     /// The value of a parameter of a joint.
-    fn of_joint(&self, joint: usize, what: OfJoint) -> T {
+    fn of_joint(&self, joint: usize, what: JointEffect) -> T {
         let at = self.roles.iter().position(|r| *r == Role::Joint(joint, what));
         at.map_or(T::from(0.0), |slot| self.values[slot])
     }
@@ -77,7 +77,7 @@ impl<T: Number> Shared<'_, T> {
                     }
                 }
                 _ if !(self.on)(slot) => {}
-                Role::Joint(joint, OfJoint::Gap) => {
+                Role::Joint(joint, JointEffect::Gap) => {
                     if let Some(drive) = equations.joints[joint].drive {
                         setting.drives[drive].0.play = Some((value, zero));
                     }
@@ -95,32 +95,32 @@ impl<T: Number> Shared<'_, T> {
         setting
     }
 
-    fn joint(&self, setting: &mut Setting<T>, joint: usize, what: OfJoint, value: T) {
+    fn joint(&self, setting: &mut Setting<T>, joint: usize, what: JointEffect, value: T) {
         let states = &self.equations.joints[joint];
         let laws = &mut setting.laws[joint];
-        let without = DryFriction::none(self.of_joint(joint, OfJoint::StribeckSpeed));
+        let without = DryFriction::none(self.of_joint(joint, JointEffect::StribeckSpeed));
         let dry = &mut laws.dry;
         match what {
-            OfJoint::Coulomb => dry.get_or_insert(without).level = value,
-            OfJoint::Asymmetry => dry.get_or_insert(without).forward_less_backward = value,
-            OfJoint::StribeckLevel => {
+            JointEffect::Coulomb => dry.get_or_insert(without).level = value,
+            JointEffect::Asymmetry => dry.get_or_insert(without).forward_less_backward = value,
+            JointEffect::StribeckLevel => {
                 let law = dry.get_or_insert(without);
                 law.stribeck_level = value;
                 let fades = law.stribeck_speed.re();
-                setting.no_slower_than(fades / self.joints[joint].acceleration);
+                setting.no_slower_than(fades / self.joints[joint].force);
             }
-            OfJoint::LoadFraction => dry.get_or_insert(without).load_fraction = value,
-            OfJoint::Damping(power) => laws.forces.push(Force::Damping(power, value)),
-            OfJoint::Stiffness(power) => laws.forces.push(Force::Stiffness(power, value)),
-            OfJoint::Constant => laws.forces.push(Force::Constant(value)),
-            OfJoint::CogAmplitude => {
-                let phase = self.of_joint(joint, OfJoint::CogPhase);
-                let periods = self.of_joint(joint, OfJoint::CogPeriods);
+            JointEffect::LoadFraction => dry.get_or_insert(without).load_fraction = value,
+            JointEffect::Damping(power) => laws.forces.push(Force::Damping(power, value)),
+            JointEffect::Stiffness(power) => laws.forces.push(Force::Stiffness(power, value)),
+            JointEffect::Constant => laws.forces.push(Force::Constant(value)),
+            JointEffect::CogAmplitude => {
+                let phase = self.of_joint(joint, JointEffect::CogPhase);
+                let periods = self.of_joint(joint, JointEffect::CogPeriods);
                 laws.forces.push(Force::Cogging([value, phase, periods]));
                 setting.no_slower_than((periods.re() * self.joints[joint].speed).recip());
             }
-            OfJoint::StopStiffness => {
-                let at = self.of_joint(joint, OfJoint::StopPosition);
+            JointEffect::StopStiffness => {
+                let at = self.of_joint(joint, JointEffect::StopPosition);
                 // A stop stands on the side of the middle where its position is.
                 let [low, high] = self.joints[joint].range;
                 let above = at.re() > 0.5 * (low + high);
@@ -128,9 +128,9 @@ impl<T: Number> Shared<'_, T> {
                 setting.edges.push(Edge { state: states.position, at });
                 setting.no_slower_than(value.re().max(0.0).sqrt().recip());
             }
-            OfJoint::Inertia => laws.inertia = Some(value),
-            OfJoint::YieldStiffness => {
-                let yields = self.of_joint(joint, OfJoint::Yield);
+            JointEffect::Inertia => laws.inertia = Some(value),
+            JointEffect::YieldStiffness => {
+                let yields = self.of_joint(joint, JointEffect::Yield);
                 let state = self.equations.states.len() + setting.further_states;
                 setting.further_states += 1;
                 let edge = setting.edges.len();
@@ -141,12 +141,12 @@ impl<T: Number> Shared<'_, T> {
                 setting.no_slower_than(yields.re() / self.joints[joint].speed);
             }
             // They shape what others switch on; a gap is the drive's.
-            OfJoint::StribeckSpeed
-            | OfJoint::CogPhase
-            | OfJoint::CogPeriods
-            | OfJoint::StopPosition
-            | OfJoint::Yield
-            | OfJoint::Gap => {}
+            JointEffect::StribeckSpeed
+            | JointEffect::CogPhase
+            | JointEffect::CogPeriods
+            | JointEffect::StopPosition
+            | JointEffect::Yield
+            | JointEffect::Gap => {}
         }
     }
 }
@@ -158,23 +158,23 @@ impl<T: Number> Setting<T> {
         }
     }
 
-    fn input(&mut self, input: usize, what: OfInput, value: T) {
+    fn input(&mut self, input: usize, what: InputEffect, value: T) {
         let (drive, delayed) = &mut self.drives[input];
         match what {
-            OfInput::Gain => drive.gain = value,
-            OfInput::Offset => drive.offset = value,
-            OfInput::Delay => {
+            InputEffect::Gain => drive.gain = value,
+            InputEffect::Offset => drive.offset = value,
+            InputEffect::Delay => {
                 drive.delay_s = value;
                 *delayed = true;
             }
-            OfInput::Lag => {
+            InputEffect::Lag => {
                 drive.lag_s = Some(value);
                 *delayed = true;
                 self.no_slower_than(value.re());
             }
-            OfInput::Upper => drive.upper = value,
-            OfInput::Lower => drive.lower = value,
-            OfInput::DeadZone => drive.dead_zone = value,
+            InputEffect::Upper => drive.upper = value,
+            InputEffect::Lower => drive.lower = value,
+            InputEffect::DeadZone => drive.dead_zone = value,
         }
     }
 
@@ -218,7 +218,7 @@ mod tests {
             kind: 0,
         };
         let mut scales = Scales::of_example(&all);
-        (scales.step_s, scales.joints[0].acceleration) = (0.005, 20.0);
+        (scales.step_s, scales.joints[0].force) = (0.005, 20.0);
         let pace = |step_s| Pace { method: Method::Kutta, step_s };
         let mut model = MotionModel::baseline(all, pace(0.005)).full(scales, &starts, None);
         let spec = model.spec();

@@ -3,9 +3,10 @@
 use missing_physics::data::Run;
 use missing_physics::model::{Mechanism, Scope, Spec};
 
-use super::effects::{OfInput, OfJoint, OfOutput, Role};
+use super::effects::{OfOutput, Role};
 use super::equations::{Equations, Start};
 use super::scales::Scales;
+use crate::mechanics;
 
 /// Fills in the free states at a run's start (of which the recording may know some): what is measured as it stands from the first rows, its derivative from their slope.
 pub(super) fn states(
@@ -70,58 +71,18 @@ pub(super) fn mechanism(
     let own = &mechanism.parameters;
     let Some(&first) = own.first() else { return Vec::new() };
     match role(first) {
-        Role::Joint(joint, what) => {
-            let s = &scales.joints[joint];
-            let (force, [low, high]) = (s.acceleration, s.range);
-            match what {
-                OfJoint::Coulomb | OfJoint::Asymmetry | OfJoint::Constant => {
-                    [1e-3, 0.01, 0.1, 0.4].map(|f| vec![(first, f * force)]).to_vec()
-                }
-                OfJoint::StribeckLevel => [0.01, 0.05, 0.3]
-                    .iter()
-                    .flat_map(|v| [3e-3, 0.05, 0.3].map(|f| vec![(first, f * force), (own[1], v * s.speed)]))
-                    .collect(),
-                OfJoint::LoadFraction => [0.05, 0.3].map(|f| vec![(first, f)]).to_vec(),
-                // In proportion to its amplitude, a wave of any phase is a sum of these two: the better one leads to it.
-                OfJoint::CogAmplitude => (1..=24)
-                    .flat_map(|n| {
-                        [0.5, 0.5 + std::f64::consts::FRAC_PI_2]
-                            .map(|phase| vec![(first, 0.02 * force), (own[1], phase), (own[2], f64::from(n))])
-                    })
-                    .collect(),
-                OfJoint::Gap => [0.003, 0.01, 0.03, 0.1].map(|f| vec![(first, f * (high - low))]).to_vec(),
-                OfJoint::StopPosition => [0.99, 0.95, 0.88, 0.75, 0.01, 0.05, 0.12, 0.25]
-                    .iter()
-                    .flat_map(|at| {
-                        [3.0, 30.0]
-                            .map(|k| vec![(first, low + at * (high - low)), (own[1], k * force / s.reach)])
-                    })
-                    .collect(),
-                OfJoint::YieldStiffness => [3e-3, 0.02, 0.1, 0.4]
-                    .iter()
-                    .map(|y| (y * s.reach).max(s.least_yield(scales.step_s)))
-                    .map(|y| vec![(first, 0.05 * force / y), (own[1], y)])
-                    .collect(),
-                _ => Vec::new(),
-            }
+        Role::Joint(joint, effect) => {
+            let sizes = &scales.joints[joint];
+            mechanics::joint_starts(effect, own, sizes, sizes.least_yield(scales.step_s))
         }
-        Role::Input(input, what) => {
-            let [low, high] = scales.inputs[input].range;
-            match what {
-                OfInput::Delay | OfInput::Lag => late(first, scales),
-                OfInput::Upper => bounds(first, own[1], low, high),
-                OfInput::DeadZone => {
-                    let most = low.abs().max(high.abs());
-                    [0.01, 0.05, 0.15, 0.4].map(|f| vec![(first, f * most)]).to_vec()
-                }
-                _ => Vec::new(),
-            }
+        Role::Input(input, effect) => {
+            mechanics::input_starts(effect, own, scales.inputs[input].range, scales.step_s)
         }
         Role::Output(output, what) => {
             let [low, high] = scales.outputs[output].range;
             match what {
-                OfOutput::Delay | OfOutput::Lag => late(first, scales),
-                OfOutput::Upper => bounds(first, own[1], low, high),
+                OfOutput::Delay | OfOutput::Lag => mechanics::late(first, scales.step_s),
+                OfOutput::Upper => mechanics::two_bounds(first, own[1], low, high),
                 _ => Vec::new(),
             }
         }
@@ -131,23 +92,6 @@ pub(super) fn mechanism(
         }
         _ => Vec::new(),
     }
-}
-
-/// Delays and lags of a few rows.
-fn late(parameter: usize, scales: &Scales) -> Vec<Vec<(usize, f64)>> {
-    [0.5, 2.0, 8.0, 30.0].map(|rows| vec![(parameter, rows * scales.step_s)]).to_vec()
-}
-
-/// One bound, the other, or both within a range.
-fn bounds(upper: usize, lower: usize, low: f64, high: f64) -> Vec<Vec<(usize, f64)>> {
-    let span = high - low;
-    [0.03, 0.12, 0.3]
-        .iter()
-        .flat_map(|cut| {
-            let (above, below) = ((upper, high - cut * span), (lower, low + cut * span));
-            [vec![above], vec![below], vec![above, below]]
-        })
-        .collect()
 }
 
 /// The slot of each shared parameter by its index.

@@ -1,0 +1,130 @@
+//! What acts on joints and inputs of any machine, whoever integrates its motion: which parameters each mechanism has, what it is in words,
+//! and where fits of it begin.
+
+mod input;
+mod joint;
+mod starts;
+
+use missing_physics::model::{Mechanism, ParameterRef};
+
+pub(crate) use input::inputs;
+pub(crate) use joint::joints;
+pub(crate) use starts::{input_starts, joint_starts, late, two_bounds};
+
+/// What a parameter is of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum JointEffect {
+    Coulomb,
+    Asymmetry,
+    StribeckLevel,
+    StribeckSpeed,
+    /// The power of the speed, less one.
+    Damping(usize),
+    LoadFraction,
+    /// The power of the position, less one.
+    Stiffness(usize),
+    Constant,
+    CogAmplitude,
+    CogPhase,
+    CogPeriods,
+    Gap,
+    StopPosition,
+    StopStiffness,
+    Inertia,
+    YieldStiffness,
+    Yield,
+}
+
+/// What a parameter is of an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum InputEffect {
+    Gain,
+    Offset,
+    Delay,
+    Lag,
+    Upper,
+    Lower,
+    DeadZone,
+}
+
+/// Sizes of a joint's motion: what effects and their bounds are measured by.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct JointSizes {
+    /// Root mean square of the force, in the unit of forces.
+    pub(crate) force: f64,
+    /// Root mean square of the speed.
+    pub(crate) speed: f64,
+    /// Largest modulus of the position.
+    pub(crate) reach: f64,
+    /// Smallest and largest position.
+    pub(crate) range: [f64; 2],
+    pub(crate) units: JointUnits,
+}
+
+/// Units of a joint.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct JointUnits {
+    pub(crate) position: String,
+    pub(crate) speed: String,
+    pub(crate) force: String,
+    /// Of a force by the speed, by its square and by its cube.
+    pub(crate) damping: [String; 3],
+    /// Of a force by the position, by its square and by its cube.
+    pub(crate) stiffness: [String; 3],
+}
+
+impl JointSizes {
+    /// The smallest displacement at which a spring can be seen to yield: a part of what passes between rows. Below it is dry friction.
+    pub(crate) fn least_yield(&self, step_s: f64) -> f64 {
+        (0.25 * self.speed * step_s).clamp(1e-4 * self.reach, 0.03 * self.reach)
+    }
+}
+
+/// Which mechanisms make sense for a joint.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct JointHas {
+    /// The force of its drive is known.
+    pub(crate) drive: bool,
+    /// It follows the command of a position, so that there can be play between the two.
+    pub(crate) follows: bool,
+    /// It rotates, so that effects periodic in the angle make sense.
+    pub(crate) turns: bool,
+    /// Where a spring that yields can be followed: the smallest displacement at which it does.
+    pub(crate) least_yield: Option<f64>,
+    /// All accelerations can be made smaller by one factor.
+    pub(crate) inertia: bool,
+}
+
+/// Takes mechanisms down: of one joint, or of one input.
+pub(crate) trait Declares<E> {
+    /// Whether a mechanism is to be tried.
+    fn wants(&self, kind: &str) -> bool;
+
+    /// A shared parameter: what it is, its name, unit, where it is off, its bounds and its scale.
+    fn parameter(
+        &mut self,
+        effect: E,
+        name: &str,
+        unit: &str,
+        off: f64,
+        bounds: [f64; 2],
+        scale: f64,
+    ) -> ParameterRef;
+
+    /// A mechanism with its parameters; its name, what it is, its equation and its source; what it is easily confused with.
+    fn mechanism(
+        &mut self,
+        kind: &str,
+        parameters: &[ParameterRef],
+        text: [&str; 4],
+        confused: &[&str],
+    ) -> &mut Mechanism;
+}
+
+/// Non-negative numbers.
+const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
+const ARMSTRONG: &str =
+    "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7";
+const TEXTBOOK: &str = "textbook mechanics";
+/// Source of what drives and sensors do.
+pub(crate) const CONTROL: &str = "Astrom and Murray, Feedback Systems, 2nd ed. 2021";

@@ -1,0 +1,75 @@
+//! Where fits of a mechanism begin: lists of shared parameters, by their indices, with values.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::{InputEffect, JointEffect, JointSizes};
+
+/// Starts.
+type Starts = Vec<Vec<(usize, f64)>>;
+
+/// Starts of a joint's mechanism whose parameters are `own`, the first of which is `effect`; `least_yield` is the smallest displacement at
+/// which a spring yields.
+pub(crate) fn joint_starts(effect: JointEffect, own: &[usize], s: &JointSizes, least_yield: f64) -> Starts {
+    let Some(&first) = own.first() else { return Vec::new() };
+    let (force, [low, high]) = (s.force, s.range);
+    match effect {
+        JointEffect::Coulomb | JointEffect::Asymmetry | JointEffect::Constant => {
+            [1e-3, 0.01, 0.1, 0.4].map(|f| vec![(first, f * force)]).to_vec()
+        }
+        JointEffect::StribeckLevel => [0.01, 0.05, 0.3]
+            .iter()
+            .flat_map(|v| [3e-3, 0.05, 0.3].map(|f| vec![(first, f * force), (own[1], v * s.speed)]))
+            .collect(),
+        JointEffect::LoadFraction => [0.05, 0.3].map(|f| vec![(first, f)]).to_vec(),
+        // In proportion to its amplitude, a wave of any phase is a sum of these two: the better one leads to it.
+        JointEffect::CogAmplitude => (1..=24)
+            .flat_map(|n| {
+                [0.5, 0.5 + FRAC_PI_2]
+                    .map(|phase| vec![(first, 0.02 * force), (own[1], phase), (own[2], f64::from(n))])
+            })
+            .collect(),
+        JointEffect::Gap => [0.003, 0.01, 0.03, 0.1].map(|f| vec![(first, f * (high - low))]).to_vec(),
+        JointEffect::StopPosition => [0.99, 0.95, 0.88, 0.75, 0.01, 0.05, 0.12, 0.25]
+            .iter()
+            .flat_map(|at| {
+                [3.0, 30.0].map(|k| vec![(first, low + at * (high - low)), (own[1], k * force / s.reach)])
+            })
+            .collect(),
+        JointEffect::YieldStiffness => [3e-3, 0.02, 0.1, 0.4]
+            .iter()
+            .map(|y| (y * s.reach).max(least_yield))
+            .map(|y| vec![(first, 0.05 * force / y), (own[1], y)])
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Starts of an input's mechanism whose parameters are `own`, the first of which is `effect`.
+pub(crate) fn input_starts(effect: InputEffect, own: &[usize], [low, high]: [f64; 2], step_s: f64) -> Starts {
+    match (effect, own) {
+        (InputEffect::Delay | InputEffect::Lag, [first, ..]) => late(*first, step_s),
+        (InputEffect::Upper, [upper, lower, ..]) => two_bounds(*upper, *lower, low, high),
+        (InputEffect::DeadZone, [first, ..]) => {
+            let most = low.abs().max(high.abs());
+            [0.01, 0.05, 0.15, 0.4].map(|f| vec![(*first, f * most)]).to_vec()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Delays and lags of a few rows.
+pub(crate) fn late(parameter: usize, step_s: f64) -> Starts {
+    [0.5, 2.0, 8.0, 30.0].map(|rows| vec![(parameter, rows * step_s)]).to_vec()
+}
+
+/// One bound, the other, or both within a range.
+pub(crate) fn two_bounds(upper: usize, lower: usize, low: f64, high: f64) -> Starts {
+    let span = high - low;
+    [0.03, 0.12, 0.3]
+        .iter()
+        .flat_map(|cut| {
+            let (above, below) = ((upper, high - cut * span), (lower, low + cut * span));
+            [vec![above], vec![below], vec![above, below]]
+        })
+        .collect()
+}
