@@ -207,12 +207,16 @@ pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
     )
 }
 
+/// The part of the misfit from which on a set is named, if it alone is needed.
+const NEARLY_ALL: f64 = 0.9;
+
 /// What comes closest where nothing explains the data, and what its parameters would be.
 pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     let Some(closest) = &d.closest else { return Vec::new() };
     let share = 100.0 * floored(closest.share.max(0.0));
-    let words =
-        format!("{} takes away {share:.0} % of the misfit, too little to be named", named(d, &closest.ids));
+    // What takes away nearly all is not named where other sets do as well, or where less of it does.
+    let why = if closest.share < NEARLY_ALL { "too little to be named" } else { "but others do as well" };
+    let words = format!("{} takes away {share:.0} % of the misfit, {why}", named(d, &closest.ids));
     let parameters = closest.parameters.iter().map(|e| format!("{}, if it is at work", estimate(e)));
     std::iter::once(words).chain(parameters).collect()
 }

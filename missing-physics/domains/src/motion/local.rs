@@ -1,10 +1,11 @@
-//! What a force, or a flow, does that acts at some rows only; and the positions and speeds along which it may act.
+//! What a force, a resistance or a flow does that acts at some rows only; and the positions and speeds along which it may act.
 
 use joint_laws::integrate::Machine as _;
 use missing_physics::data::Run;
 use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
 use nalgebra::{DMatrix, DVector};
 
+use super::equations::Joint;
 use super::model::MotionModel;
 use super::units;
 
@@ -18,6 +19,8 @@ struct Linear {
     /// How a deviation of the states changes their derivatives, and the outputs.
     rates: DMatrix<f64>,
     outputs: DMatrix<f64>,
+    /// How what may be acted on changes the derivatives.
+    pushes: Vec<DVector<f64>>,
 }
 
 impl MotionModel {
@@ -52,12 +55,25 @@ impl MotionModel {
     /// The linearisation at each row of a run.
     fn linear(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Vec<Linear>, PredictError> {
         let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
+        let (joints, levels) = (self.equations().joints.len(), &self.equations().levels);
         let sizes = self.state_sizes();
         let mut all = Vec::with_capacity(run.len());
         let (mut beside, mut rates) = (Vec::new(), vec![[0.0; 2]; states]);
         self.along(run, shared, nuisance, |machine, t, x| {
-            let mut here =
-                Linear { rates: DMatrix::zeros(states, states), outputs: DMatrix::zeros(outputs, states) };
+            let mut here = Linear {
+                rates: DMatrix::zeros(states, states),
+                outputs: DMatrix::zeros(outputs, states),
+                pushes: vec![DVector::zeros(states); joints + levels.len()],
+            };
+            let mut direction = vec![0.0; x.len()];
+            for (k, push) in here.pushes.iter_mut().enumerate() {
+                if k < joints {
+                    machine.pushed(k, t, x, &mut direction);
+                    push.copy_from_slice(&direction[..states]);
+                } else {
+                    push[levels[k - joints]] = 1.0;
+                }
+            }
             let mut room = vec![0.0; x.len()];
             let mut read = vec![[0.0; 2]; outputs];
             for state in 0..states {
@@ -84,7 +100,7 @@ impl MotionModel {
         Ok(all)
     }
 
-    /// What an amount at each row, added to a state's derivative, does to the outputs, channel after channel.
+    /// What an amount at each row, of what may be acted on, does to the outputs, channel after channel.
     fn deviation(&self, run: &Run, linear: &[Linear], acted_on: usize, amounts: &[f64]) -> Vec<f64> {
         let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
         let n = run.len();
@@ -94,7 +110,8 @@ impl MotionModel {
         for row in first.max(1)..linear.len() {
             let half_s = 0.5 * (run.inputs[0][row] - run.inputs[0][row - 1]);
             for k in [row - 1, row] {
-                moved(&mut deviation, &linear[k].rates, (acted_on, amounts[k]), half_s);
+                let push = (&linear[k].pushes[acted_on], amounts[k]);
+                moved(&mut deviation, &linear[k].rates, push, half_s);
             }
             let read = &linear[row].outputs * &deviation;
             for (c, value) in read.iter().enumerate() {
@@ -106,9 +123,14 @@ impl MotionModel {
 }
 
 /// How a deviation moves on over a time under constant rates of change of it.
-fn moved(deviation: &mut DVector<f64>, rates: &DMatrix<f64>, acts: (usize, f64), time_s: f64) {
+fn moved(
+    deviation: &mut DVector<f64>,
+    rates: &DMatrix<f64>,
+    (push, amount): (&DVector<f64>, f64),
+    time_s: f64,
+) {
     let mut term = rates * &*deviation;
-    term[acts.0] += acts.1;
+    term.axpy(amount, push, 1.0);
     term *= time_s;
     *deviation += &term;
     for k in 2..=TERMS {
@@ -136,13 +158,29 @@ fn closed(times: &[f64], column: &[f64]) -> Option<Vec<f64>> {
 }
 
 impl LocalCauses for MotionModel {
+    /// A force or a flow on each joint or level by itself, and a resistance of each joint: what acts on one of them often moves the others
+    /// as well, so that two together would say hardly more than each alone.
     fn unknowns(&self) -> Vec<LocalUnknown> {
-        let components: Vec<Quantity> = self.acted_on().into_iter().map(|a| a.0).collect();
-        if components.is_empty() {
-            return Vec::new();
-        }
-        let name = if self.equations().joints.is_empty() { "a flow" } else { "a force" };
-        vec![LocalUnknown { name: name.into(), components }]
+        let joints = &self.equations().joints;
+        let (joint_count, several) = (joints.len(), self.acted_on().len() > 1);
+        let unknown = |what: &str, of: &str, component: Quantity| {
+            let name = if several { format!("{what} on {of}") } else { what.to_owned() };
+            LocalUnknown { name, components: vec![component] }
+        };
+        let of_state = |(k, (component, state)): (usize, (Quantity, usize))| match joints.get(k) {
+            Some(joint) => unknown("a force", &joint.name, component),
+            None => unknown("a flow", &self.equations().states[state].name, component),
+        };
+        let resistance = |joint: &Joint| {
+            let name = if joint_count > 1 {
+                format!("rate_on_{}_per_s", joint.name)
+            } else {
+                "rate_per_s".to_owned()
+            };
+            unknown("a resistance", &joint.name, Quantity::new(name, "1/s"))
+        };
+        let acted_on = self.acted_on().into_iter().enumerate().map(of_state);
+        acted_on.chain(joints.iter().map(resistance)).collect()
     }
 
     fn response(
@@ -159,20 +197,32 @@ impl LocalCauses for MotionModel {
 
     fn responses(
         &self,
-        (_, component): (usize, usize),
+        (unknown, _): (usize, usize),
         runs: &[Run],
         shared: &[f64],
         nuisance: &[Vec<f64>],
         amounts: &[Vec<Vec<f64>>],
     ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
-        let acted_on = self.acted_on()[component].1;
+        let all_acted_on = self.acted_on();
+        // A resistance is a force against the velocity; joints come first among what is acted on.
+        let resists = unknown >= all_acted_on.len();
+        let acted_on = if resists { unknown - all_acted_on.len() } else { unknown };
+        let state = all_acted_on[acted_on].1;
         let mut all = vec![Vec::with_capacity(runs.len()); amounts.len()];
         for (k, (run, nuisance)) in runs.iter().zip(nuisance).enumerate() {
             let of_run: Vec<&Vec<f64>> = amounts.iter().map(|choice| &choice[k]).collect();
             let acts = of_run.iter().any(|amounts| amounts.iter().any(|a| *a != 0.0));
             let linear = if acts { self.linear(run, shared, nuisance)? } else { Vec::new() };
+            let against: Option<Vec<f64>> = (acts && resists)
+                .then(|| self.course(run, shared, nuisance))
+                .transpose()
+                .map_err(|reason| PredictError { run: run.label.clone(), reason })?
+                .map(|course| course.states[state].iter().map(|v| -v).collect());
             for (all, amounts) in all.iter_mut().zip(of_run) {
-                all.push(self.deviation(run, &linear, acted_on, amounts));
+                let force: Option<Vec<f64>> = against
+                    .as_ref()
+                    .map(|against| amounts.iter().zip(against).map(|(a, by)| a * by).collect());
+                all.push(self.deviation(run, &linear, acted_on, force.as_ref().unwrap_or(amounts)));
             }
         }
         Ok(all)
@@ -208,9 +258,9 @@ mod tests {
     use crate::motion::scales::Scales;
     use missing_physics::model::{Model as _, Scope};
 
-    /// A force that acts at all rows alike is the mechanism `constant-force`, by its derivative.
+    /// A force that acts at all rows alike is the mechanism `constant-force`, by its derivative, and a resistance `viscous-friction`.
     #[test]
-    fn a_force_at_all_rows_is_a_constant_force() {
+    fn what_acts_at_all_rows_is_a_mechanism() {
         let all = Equations::example();
         let scales = Scales::of_example(&all);
         let starts: Vec<f64> = all.parameters.iter().map(|p| p.value).collect();
@@ -230,18 +280,28 @@ mod tests {
             spec.parameters.iter().filter(move |p| p.scope == scope).map(|p| p.start).collect::<Vec<f64>>()
         };
         let (shared, nuisance) = (of(Scope::Shared), of(Scope::PerRun));
-        let constant = spec.mechanisms.iter().find(|m| m.id.starts_with("constant-force")).unwrap();
-        let slot = spec.slots()[constant.parameters[0]];
         let rows = outputs * times.len();
-        let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows]);
-        model.jacobian(&run, &shared, &nuisance, &[slot], &[], &mut out, &mut jacobian).unwrap();
-        let amounts = [vec![1.0; times.len()]];
-        let response =
-            model.response((0, 0), std::slice::from_ref(&run), &shared, &[nuisance], &amounts).unwrap();
-        let largest = jacobian.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        assert!(largest > 0.0);
-        for (a, b) in response[0].iter().zip(&jacobian) {
-            assert!((a - b).abs() < 2e-3 * largest, "{a} {b}");
+        let resistance = model.acted_on().len();
+        for (unknown, id) in [(0, "constant-force"), (resistance, "viscous-friction")] {
+            let like = spec.mechanisms.iter().find(|m| m.id.starts_with(id)).unwrap();
+            let slot = spec.slots()[like.parameters[0]];
+            let (mut out, mut jacobian) = (vec![0.0; rows], vec![0.0; rows]);
+            model.jacobian(&run, &shared, &nuisance, &[slot], &[], &mut out, &mut jacobian).unwrap();
+            let amounts = [vec![1.0; times.len()]];
+            let response = model
+                .response(
+                    (unknown, 0),
+                    std::slice::from_ref(&run),
+                    &shared,
+                    std::slice::from_ref(&nuisance),
+                    &amounts,
+                )
+                .unwrap();
+            let largest = jacobian.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            assert!(largest > 0.0);
+            for (a, b) in response[0].iter().zip(&jacobian) {
+                assert!((a - b).abs() < 2e-3 * largest, "{id}: {a} {b}");
+            }
         }
     }
 }

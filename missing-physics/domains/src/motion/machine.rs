@@ -161,6 +161,20 @@ impl<T: Number> Driven<'_, T> {
     }
 }
 
+impl<T: Number> Driven<'_, T> {
+    /// By how much each state's derivative changes with a force on a joint, whose velocity's changes by one.
+    pub(super) fn pushed(&mut self, joint: usize, t: f64, x: &[T], direction: &mut [T]) {
+        let joint = &self.equations.joints[joint];
+        direction.fill(T::from(0.0));
+        if !joint.reacts.is_empty() {
+            self.look(t, x);
+            self.shares(joint);
+            joint.reacts.iter().for_each(|&state| direction[state] = self.other[state]);
+        }
+        direction[joint.velocity] = T::from(1.0);
+    }
+}
+
 impl<T: Number> Machine<T> for Driven<'_, T> {
     fn contacts(&self) -> &[Contact] {
         &self.contacts
@@ -215,14 +229,7 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
     }
 
     fn direction(&mut self, contact: usize, t: f64, x: &[T], direction: &mut [T]) {
-        let joint = &self.equations.joints[self.joint_of[contact]];
-        direction.fill(T::from(0.0));
-        if !joint.reacts.is_empty() {
-            self.look(t, x);
-            self.shares(joint);
-            joint.reacts.iter().for_each(|&state| direction[state] = self.other[state]);
-        }
-        direction[joint.velocity] = T::from(1.0);
+        self.pushed(self.joint_of[contact], t, x, direction);
     }
 
     fn resistance(&mut self, contact: usize, forward: bool, t: f64, x: &[T]) -> T {

@@ -5,6 +5,7 @@ use crate::answer::Answer;
 use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict};
 use crate::engine::begin::{Begun, rough_sigmas};
 use crate::engine::input::{DiagnoseError, Options};
+use crate::engine::local::beside_a_local_cause;
 use crate::estimate::limits::limits;
 use crate::experiment;
 use crate::fit::prediction::{predictions, residuals};
@@ -107,6 +108,27 @@ impl Course<'_> {
                 (judge, cause)
             }
         };
+        let chosen = cause.as_ref().map(|cause| &cause.chosen.candidate);
+        let chosen = chosen.or(explained.map(|best| ranking.at(best.at)));
+        let all = ranking.all();
+        // One mechanism that takes away nearly all of the misfit has something beside it, which may well be local.
+        let members = chosen
+            .filter(|set| cause.is_none() || set.set.len() > 1)
+            .map(|set| beside_a_local_cause(problem, baseline, all, set, &judge, &white))
+            .transpose()?
+            .flatten();
+        let remark = chosen.filter(|_| members.is_some()).map(|set| {
+            let names = answer.names(&set.set);
+            format!("{names} would act everywhere; less of it and one unknown in a part of the data say clearly more")
+        });
+        let (judge, cause, explained) = match members {
+            None => (judge, cause, explained),
+            Some(members) => {
+                let judge = Judge::new(problem, rule, all, &white, |c| c.set.len() <= members);
+                let cause = judge.main_cause();
+                (judge, cause, None)
+            }
+        };
         let (mut diagnosis, misses) = match (cause, explained) {
             (Some(cause), _) => {
                 let diagnosis = self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?;
@@ -128,6 +150,7 @@ impl Course<'_> {
         let judged = misses.map(|model| contradicting(problem, &model.selection, &model.fit, &white));
         let contradicting = judged.transpose()?.flatten();
         let explained = explained.filter(|_| diagnosis.verdict != Verdict::Partly);
+        diagnosis.remarks.extend(remark);
         diagnosis.remarks.extend(answer.unfitted(&unfitted));
         diagnosis.sets = answer.sets(&ranking, best.as_ref());
         let sigma = match explained {

@@ -3,6 +3,7 @@
 pub(crate) mod begin;
 mod course;
 mod input;
+mod local;
 pub mod stream;
 mod windows;
 

@@ -16,6 +16,9 @@ use crate::problem::Problem;
 
 /// Any subset of the runs fits a little better than all of them: one in which alone a cause acts takes away so much more.
 const SUBSET_GAIN: f64 = 1.6;
+/// What acts at a place or a speed acts there in every run: one that acts at it in some runs only has to be worth so much more than one that
+/// acts at some time.
+const PLACE_GAIN: f64 = 1.5;
 /// What is worth less than the best by this much cannot be told from it (twice a log Bayes factor, "not worth more than a bare mention":
 /// Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): unknowns and variables count in the order in which the model and the
 /// recording have them.
@@ -35,6 +38,10 @@ pub(crate) struct Cause {
     pub(crate) sizes: Vec<(usize, [f64; 2])>,
     /// By how much the sum of squares falls, less what was paid.
     pub(crate) worth: f64,
+    /// What was paid.
+    pub(crate) price: f64,
+    /// Whether it acts alike at all rows of all runs: then it is no local one.
+    pub(crate) everywhere: bool,
     /// By how much that of each channel falls.
     pub(crate) gains: Vec<f64>,
 }
@@ -63,12 +70,13 @@ impl Scene<'_> {
         for kind in [|b: &Best| b.simple.clone(), |b: &Best| b.some_runs.clone()] {
             let beside = if judged.is_empty() { 1.0 } else { SUBSET_GAIN };
             let of_kind = || pairs.iter().zip(&found).filter_map(|(pair, best)| Some((*pair, kind(best)?)));
-            let most = of_kind().map(|(_, found)| found.worth()).fold(f64::NEG_INFINITY, f64::max);
+            let worth = |along: usize, found: &Found| found.worth() / place_in_some_runs(along, found);
+            let most = of_kind().map(|((_, along), f)| worth(along, &f)).fold(f64::NEG_INFINITY, f64::max);
             let enough = most - (1.0 - NEAR) * most.abs();
-            let near: Vec<_> = of_kind().filter(|(_, found)| found.worth() >= enough).collect();
+            let near: Vec<_> = of_kind().filter(|((_, along), f)| worth(*along, f) >= enough).collect();
             let finer = near.into_par_iter().map(|((unknown, along), found)| {
                 let finer = self.finer(unknown, along, found)?;
-                Ok((finer.worth() / beside, unknown, along, finer))
+                Ok((worth(along, &finer) / beside, unknown, along, finer))
             });
             judged.extend(finer.collect::<Result<Vec<_>, PredictError>>()?);
         }
@@ -160,9 +168,16 @@ impl Scene<'_> {
             .collect();
         let gains = gains(self.problem, &self.projection.residual, &after);
         let worth = found.worth();
-        let Found { bins, interval, runs, .. } = found;
-        Ok(Cause { unknown, along, bins, interval, runs, sizes, worth, gains })
+        let Found { bins, interval, form, runs, price, .. } = found;
+        let everywhere = form == Form::Even && interval == (0, bins.len()) && !runs.contains(&false);
+        Ok(Cause { unknown, along, bins, interval, runs, sizes, worth, price, everywhere, gains })
     }
+}
+
+/// What a hypothesis has to be worth more for where it acts: in some runs only, along another variable than the first.
+fn place_in_some_runs(along: usize, found: &Found) -> f64 {
+    let everywhere = found.form == Form::Even && found.interval == (0, found.bins.len());
+    if along > 0 && !everywhere && found.runs.contains(&false) { PLACE_GAIN } else { 1.0 }
 }
 
 /// By how much the sum of squares of each channel falls.

@@ -17,6 +17,63 @@ use crate::problem::{Problem, Selection};
 /// Each channel by itself, with a smooth departure or noise of its own, has to be worth so much more than a single cause.
 const SIMPLER: f64 = 1.2;
 
+/// What is looked at: a baseline's columns, beside which unknowns act along variables.
+struct Ground<'a> {
+    /// By run: of nuisance parameters, of shared ones, and what the baseline leaves.
+    columns: Vec<Vec<Vec<f64>>>,
+    /// How many nuisance and shared parameters there are.
+    sizes: (usize, usize),
+    variables: Vec<Along>,
+    projection: Projection,
+    unknowns: Vec<Unknown<'a>>,
+}
+
+impl<'a> Ground<'a> {
+    fn new(
+        problem: &Problem<'a>,
+        selection: &Selection,
+        baseline: &Fit,
+        sigma: &[f64],
+    ) -> Result<Self, PredictError> {
+        let noise = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
+        let columns: Vec<Vec<Vec<f64>>> = (0..problem.rows.len())
+            .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.nuisance[r]))
+            .collect::<Result<_, _>>()?;
+        let sizes = (selection.nuisance.len(), selection.shared.len());
+        let projection = Projection::new(&columns, sizes);
+        let (variables, unknowns) = (variables(problem, baseline)?, unknowns(problem));
+        Ok(Self { columns, sizes, variables, projection, unknowns })
+    }
+
+    /// The single cause that is worth most.
+    fn cause(&self, problem: &Problem<'_>, fit: &Fit, sigma: &[f64]) -> Result<Option<Cause>, PredictError> {
+        let Self { variables, projection, unknowns, .. } = self;
+        Scene { problem, fit, sigma, projection, variables, unknowns }.best()
+    }
+}
+
+/// A cause that acts in a part of the data only: by how much the sum of squares falls, and what its place and its size cost of that.
+pub(crate) struct LocalCause {
+    pub(crate) gain: f64,
+    pub(crate) price: f64,
+}
+
+/// The single cause that is worth most, where it acts in a part of the data only and the model knows what it does.
+pub(crate) fn local_cause(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    baseline: &Fit,
+    sigma: &[f64],
+) -> Result<Option<LocalCause>, PredictError> {
+    if problem.model.extensions().local_causes.is_none() {
+        return Ok(None);
+    }
+    let ground = Ground::new(problem, selection, baseline, sigma)?;
+    let cause = ground.cause(problem, baseline, sigma)?;
+    let cause = cause.filter(|cause| !cause.everywhere && ground.unknowns[cause.unknown].is_model_s());
+    Ok(cause.map(|cause| LocalCause { gain: cause.gains.iter().sum(), price: cause.price }))
+}
+
 /// Finds where the cause acts, largest share first.
 pub(crate) fn locate(
     problem: &Problem<'_>,
@@ -24,39 +81,30 @@ pub(crate) fn locate(
     baseline: &Fit,
     sigma: &[f64],
 ) -> Result<Vec<Location>, PredictError> {
-    let noise = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
-    let columns: Vec<Vec<Vec<f64>>> = (0..problem.rows.len())
-        .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.nuisance[r]))
-        .collect::<Result<_, _>>()?;
-    let sizes = (selection.nuisance.len(), selection.shared.len());
-    let variables = variables(problem, baseline)?;
+    let ground = Ground::new(problem, selection, baseline, sigma)?;
+    let Ground { columns, sizes, variables, projection, unknowns } = &ground;
     let of_readings: Vec<(usize, &Along, Scan, Interval)> = (0..problem.channels())
         .filter_map(|channel| {
-            let (along, scan, best) = best_interval(problem, &columns, sizes, channel, &variables)?;
+            let (along, scan, best) = best_interval(problem, columns, *sizes, channel, variables)?;
             (best.gain > 0.0).then_some((channel, along, scan, best))
         })
         .collect();
     let worth = of_readings.iter().map(|(.., interval)| interval.worth).sum::<f64>();
-    let projection = Projection::new(&columns, sizes);
-    let unknowns = unknowns(problem);
-    let scene = Scene {
-        problem,
-        fit: baseline,
-        sigma,
-        projection: &projection,
-        variables: &variables,
-        unknowns: &unknowns,
-    };
-    let cause = scene.best()?.filter(|cause| worth <= SIMPLER * cause.worth);
-    let events = events(problem, baseline, sigma, &projection, &unknowns)?;
-    let places = Places { problem, columns: &columns, sigma };
+    let cause = ground.cause(problem, baseline, sigma)?;
+    let cause = cause.filter(|cause| worth <= SIMPLER * cause.worth);
+    let events = events(problem, baseline, sigma, projection, unknowns)?;
+    let places = Places { problem, columns, sigma };
     let found = match (cause, events) {
         (cause, Some(events))
             if events.worth > SIMPLER * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth) =>
         {
             places.of_events(&unknowns[events.unknown], &variables[0], &events)
         }
-        (Some(cause), _) => places.of_cause(&unknowns[cause.unknown], &variables[cause.along], &cause),
+        (Some(cause), _) => {
+            let along = &variables[cause.along];
+            let span = places.one_stretch(along, &cause);
+            places.of_cause(&unknowns[cause.unknown], along, &cause, span.map(|span| (&variables[0], span)))
+        }
         (None, _) => {
             let of_channel =
                 |(channel, along, scan, Interval { gain, bins, .. }): &(usize, &Along, Scan, Interval)| {
@@ -186,8 +234,38 @@ impl Places<'_> {
         }
     }
 
+    /// Where a cause acts in one of several runs, and there in neighbouring rows only: from when to when. What happens once has a time
+    /// rather than a place.
+    fn one_stretch(&self, along: &Along, cause: &Cause) -> Option<[f64; 2]> {
+        let recording = &self.problem.recording;
+        let time = recording
+            .noise_along
+            .filter(|k| *k == 0 && along.quantity.name != recording.variables[0].name)?;
+        let within = Within { along, bins: &cause.bins, interval: cause.interval };
+        let acts = |run: &usize| {
+            cause.runs[*run] && (0..along.values[*run].len()).any(|row| within.holds(*run, row))
+        };
+        let mut runs = (0..cause.runs.len()).filter(acts);
+        let (run, None) = (runs.next()?, runs.next()) else { return None };
+        if cause.runs.len() < 2 {
+            return None;
+        }
+        let rows: Vec<usize> = (0..along.values[run].len()).filter(|&row| within.holds(run, row)).collect();
+        let (first, last) = (*rows.first()?, *rows.last()?);
+        let times = &recording.runs[run].inputs[time];
+        (last - first + 1 == rows.len()).then(|| [times[first], times[last]])
+    }
+
     /// A place for each channel that a cause makes better.
-    fn of_cause(&self, unknown: &Unknown<'_>, along: &Along, cause: &Cause) -> Vec<(f64, Location)> {
+    ///
+    /// `stretch` is said in place of the interval: another variable, and from where to where.
+    fn of_cause(
+        &self,
+        unknown: &Unknown<'_>,
+        along: &Along,
+        cause: &Cause,
+        stretch: Option<(&Along, [f64; 2])>,
+    ) -> Vec<(f64, Location)> {
         let within = Within { along, bins: &cause.bins, interval: cause.interval };
         let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
         let runs: Vec<bool> = cause.runs.iter().enumerate().map(|(r, acts)| *acts && touched(r)).collect();
@@ -198,7 +276,12 @@ impl Places<'_> {
         let gaining = cause.gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
         gaining
             .map(|(channel, &gain)| {
-                let place = self.of_rows(channel, &within, &runs, gain);
+                let mut place = self.of_rows(channel, &within, &runs, gain);
+                if let Some((along, [from, to])) = stretch {
+                    place.variable = Some(along.quantity.name.clone());
+                    place.variable_unit = along.quantity.unit.clone();
+                    (place.from, place.to) = (Some(from), Some(to));
+                }
                 (gain, Location { as_if: as_if.clone(), ..place })
             })
             .collect()

@@ -24,6 +24,8 @@ const NEEDED: f64 = 5.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
 /// be imitating the leftover.
 const SMALLER: f64 = 3.0;
+/// What an explanation may leave of the baseline's misfit of unseen data.
+const LEAST: f64 = 0.5;
 /// Noise alone moves a sum of squares by so many standard deviations at most.
 const CHANCE: f64 = 3.0;
 /// A rival takes away at least this part of the misfit.
@@ -113,6 +115,11 @@ impl<'a> Judge<'a> {
         Some(if self.base > 0.0 { 1.0 - misfit / self.base } else { 1.0 })
     }
 
+    /// A set's plain least-squares fit.
+    pub(crate) fn plain(&self, set: &[usize]) -> Option<&Fit> {
+        Some(&self.plain[self.at(set)?].as_ref()?.fit)
+    }
+
     fn misfit(&self, set: &[usize]) -> Option<f64> {
         self.unseen(self.at(set)?)
     }
@@ -198,10 +205,11 @@ impl<'a> Judge<'a> {
         CHANCE * (2.0 * rows as f64).sqrt()
     }
 
-    /// Whether a set leaves nothing but noise, or predicts unseen data no worse than it does without any one member.
+    /// Whether a set leaves nothing but noise of unseen data; or takes away most of the baseline's misfit there, and predicts them no worse than it
+    /// does without any one member.
     pub(crate) fn holds(&self, set: &[usize]) -> bool {
         let Some(left) = self.misfit(set).filter(|left| *left > self.by_chance()) else { return true };
-        set.iter().all(|m| self.leaves_at_least(&without(set, *m), left))
+        left <= LEAST * self.base && set.iter().all(|m| self.leaves_at_least(&without(set, *m), left))
     }
 
     /// Whether each member of a set takes away most of what is left without it.
