@@ -5,7 +5,6 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use missing_physics::engine::Options;
 use missing_physics::observer::Silent;
 use missing_physics_cli::commands::{DiagnoseArguments, diagnose};
 
@@ -22,15 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let ask = |title: &str, folder: &Path| -> Result<(), Box<dyn std::error::Error>> {
         let arguments = DiagnoseArguments {
             folder: folder.into(),
-            json: None,
-            html: None,
-            svg: None,
-            model: None,
-            options: Options::default(),
-            threads: 0,
-            memory: None,
-            say: None,
-            verbose: false,
+            ..DiagnoseArguments::default()
         };
         let begun = Instant::now();
         let text = diagnose(&arguments, &Silent)?.text;

@@ -48,6 +48,9 @@ enum Command {
         /// Write the repaired model as well, for `predict`.
         #[arg(long, value_name = "FILE")]
         write_model: Option<PathBuf>,
+        /// Write the rows of the experiment that is proposed next as CSV as well: when to measure, what to command.
+        #[arg(long, value_name = "FILE")]
+        write_next: Option<PathBuf>,
         /// Seed of every random draw.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -178,6 +181,7 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
             html,
             svg,
             write_model,
+            write_next,
             seed,
             threads,
             alpha,
@@ -196,6 +200,7 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
                 html,
                 svg,
                 model: write_model,
+                next: write_next,
                 options,
                 threads,
                 memory: memory.map(|gigabytes| (1e9 * gigabytes) as u64),

@@ -278,6 +278,9 @@ pub struct NextExperiment {
     pub action: Vec<(String, f64)>,
     /// The action in words.
     pub words: String,
+    /// What is set in each row of its runs, by the names of the recording's variables: when to measure, what to command.
+    #[serde(skip)]
+    pub inputs: Vec<Vec<(String, Vec<f64>)>>,
     /// Identifiers of the mechanisms that it tells apart.
     pub separates: Vec<String>,
     /// Expected log Bayes factor for the true rival against the nearest other.

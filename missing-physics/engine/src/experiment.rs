@@ -1,6 +1,6 @@
 //! The next experiment: the action within the rig's range after which the least doubt between the rivals is expected.
 
-use crate::data::Recording;
+use crate::data::{Recording, Run};
 use crate::diagnosis::NextExperiment;
 use crate::fit::bordered::BorderedNormal;
 use crate::fit::columns::whitened_columns;
@@ -50,8 +50,11 @@ pub(crate) fn best(
         ),
         None => experiment.words.clone(),
     };
+    let variables = &problem.recording.variables;
+    let named = |run: &Run| variables.iter().map(|v| v.name.clone()).zip(run.inputs.iter().cloned()).collect();
     Some(NextExperiment {
         action: experiment.action.clone(),
+        inputs: experiment.runs.iter().map(named).collect(),
         words,
         separates,
         expected_log_bayes_factor: value,

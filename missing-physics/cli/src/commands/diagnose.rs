@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use missing_physics::diagnosis::Diagnosis;
+use missing_physics::diagnosis::{Diagnosis, NextExperiment};
 use missing_physics::engine::Options;
 use missing_physics::observer::{Observer, Progress};
 
@@ -27,6 +27,8 @@ pub struct DiagnoseArguments {
     pub svg: Option<PathBuf>,
     /// Where the repaired model goes.
     pub model: Option<PathBuf>,
+    /// Where the rows of the next experiment go.
+    pub next: Option<PathBuf>,
     /// Seed and false-alarm rate.
     pub options: Options,
     /// Number of threads; 0 for all cores.
@@ -56,10 +58,10 @@ pub(super) struct Done {
 
 /// As [`diagnose`].
 pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Result<Done, CommandError> {
-    let asked = [&arguments.json, &arguments.html, &arguments.svg, &arguments.model];
+    let asked = [&arguments.json, &arguments.html, &arguments.svg, &arguments.model, &arguments.next];
     let outputs: Vec<&std::path::Path> = asked.iter().filter_map(|path| path.as_deref()).collect();
     let mut places = places(&outputs, &domains::recording::files_of(&arguments.folder))?.into_iter();
-    let [json, html, svg, model] = asked.map(|path| path.as_ref().and_then(|_| places.next()));
+    let [json, html, svg, model, next] = asked.map(|path| path.as_ref().and_then(|_| places.next()));
     let threads = arguments.threads;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -114,5 +116,49 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
     if let Some(place) = &model {
         said.write(place, Repair::new(domain, &diagnosis).to_json());
     }
+    if let Some(place) = &next {
+        match &diagnosis.next_experiment {
+            Some(experiment) => said.write(place, rows(experiment)),
+            None => tell("no experiment is proposed: its file was not written".into()),
+        }
+    }
     Ok(Done { said, diagnosis, context })
+}
+
+/// The rows of an experiment as CSV: run, when to measure, what to command.
+fn rows(experiment: &NextExperiment) -> String {
+    let names = experiment.inputs.iter().flatten().map(|(name, _)| name.as_str());
+    let mut columns: Vec<&str> = Vec::new();
+    names.for_each(|name| if !columns.contains(&name) { columns.push(name) });
+    let mut csv = format!("run,{}\n", columns.join(","));
+    for (run, inputs) in experiment.inputs.iter().enumerate() {
+        for row in 0..inputs.iter().map(|(_, values)| values.len()).max().unwrap_or(0) {
+            let cell = |name: &&str| {
+                let values = inputs.iter().find(|(n, _)| n == name).map(|(_, values)| values);
+                values.and_then(|v| v.get(row)).map_or_else(String::new, f64::to_string)
+            };
+            let cells: Vec<String> = columns.iter().map(cell).collect();
+            csv.push_str(&format!("{},{}\n", run + 1, cells.join(",")));
+        }
+    }
+    csv
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_experiment_is_written_row_by_row() {
+        let run = |u: [f64; 2]| vec![("t_s".to_owned(), vec![0.0, 0.5]), ("command_v".to_owned(), u.to_vec())];
+        let experiment = NextExperiment {
+            action: Vec::new(),
+            words: String::new(),
+            inputs: vec![run([0.0, 1.5]), run([-2.0, 1e-7])],
+            separates: Vec::new(),
+            expected_log_bayes_factor: 6.0,
+        };
+        let expected = "run,t_s,command_v\n1,0,0\n1,0.5,1.5\n2,0,-2\n2,0.5,0.0000001\n";
+        assert_eq!(rows(&experiment), expected);
+    }
 }

@@ -28,7 +28,7 @@ pub fn diagnose_many(
     common: &DiagnoseArguments,
     observer: &dyn Observer,
 ) -> Result<Said, CommandError> {
-    for out in [&common.json, &common.html, &common.svg, &common.model].into_iter().flatten() {
+    for out in [&common.json, &common.html, &common.svg, &common.model, &common.next].into_iter().flatten() {
         if out == Path::new("-") || out.exists() && !out.is_dir() {
             return Err(CommandError::NotAFolder { path: out.clone() });
         }
@@ -46,6 +46,7 @@ pub fn diagnose_many(
             html: file(&common.html, "html"),
             svg: file(&common.svg, "svg"),
             model: file(&common.model, "model.json"),
+            next: file(&common.next, "next.csv"),
             ..common.clone()
         };
         // Writing to a string cannot fail.
