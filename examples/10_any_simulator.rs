@@ -19,10 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let swing = root.join("recordings/swing");
     let ask = |title: &str, folder: &Path| -> Result<(), Box<dyn std::error::Error>> {
-        let arguments = DiagnoseArguments {
-            folder: folder.into(),
-            ..DiagnoseArguments::default()
-        };
+        let arguments = DiagnoseArguments { folder: folder.into(), ..DiagnoseArguments::default() };
         let begun = Instant::now();
         let text = diagnose(&arguments, &Silent)?.text;
         println!("== {title}: {:.0} s\n{text}", begun.elapsed().as_secs_f64());

@@ -51,7 +51,8 @@ pub(crate) fn best(
         None => experiment.words.clone(),
     };
     let variables = &problem.recording.variables;
-    let named = |run: &Run| variables.iter().map(|v| v.name.clone()).zip(run.inputs.iter().cloned()).collect();
+    let named =
+        |run: &Run| variables.iter().map(|v| v.name.clone()).zip(run.inputs.iter().cloned()).collect();
     Some(NextExperiment {
         action: experiment.action.clone(),
         inputs: experiment.runs.iter().map(named).collect(),

@@ -129,7 +129,11 @@ pub(super) fn one(arguments: &DiagnoseArguments, observer: &dyn Observer) -> Res
 fn rows(experiment: &NextExperiment) -> String {
     let names = experiment.inputs.iter().flatten().map(|(name, _)| name.as_str());
     let mut columns: Vec<&str> = Vec::new();
-    names.for_each(|name| if !columns.contains(&name) { columns.push(name) });
+    names.for_each(|name| {
+        if !columns.contains(&name) {
+            columns.push(name)
+        }
+    });
     let mut csv = format!("run,{}\n", columns.join(","));
     for (run, inputs) in experiment.inputs.iter().enumerate() {
         for row in 0..inputs.iter().map(|(_, values)| values.len()).max().unwrap_or(0) {
@@ -150,7 +154,8 @@ mod tests {
 
     #[test]
     fn an_experiment_is_written_row_by_row() {
-        let run = |u: [f64; 2]| vec![("t_s".to_owned(), vec![0.0, 0.5]), ("command_v".to_owned(), u.to_vec())];
+        let run =
+            |u: [f64; 2]| vec![("t_s".to_owned(), vec![0.0, 0.5]), ("command_v".to_owned(), u.to_vec())];
         let experiment = NextExperiment {
             action: Vec::new(),
             words: String::new(),
