@@ -158,5 +158,10 @@ def test_an_interruption_stops_the_simulator():
             threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
         return leak(parameters, inputs)
 
-    with pytest.raises(KeyboardInterrupt):
-        mp.diagnose(model(slow, channels=["charge_v"]), decays(offset=0.1))
+    # What a shell starts in the background ignores interruptions.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            mp.diagnose(model(slow, channels=["charge_v"]), decays(offset=0.1))
+    finally:
+        signal.signal(signal.SIGINT, before)
