@@ -111,9 +111,9 @@ impl Course<'_> {
         let chosen = cause.as_ref().map(|cause| &cause.chosen.candidate);
         let chosen = chosen.or(explained.map(|best| ranking.at(best.at)));
         let all = ranking.all();
-        // One mechanism that takes away nearly all of the misfit has something beside it, which may well be local.
+        // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
         let members = chosen
-            .filter(|set| cause.is_none() || set.set.len() > 1)
+            .filter(|_| cause.is_none())
             .map(|set| beside_a_local_cause(problem, baseline, all, set, &judge, &white))
             .transpose()?
             .flatten();
