@@ -2,7 +2,8 @@
 
 use super::arm::{ArmLimits, PaddleArm};
 use super::ball::{FakeBall, Flown};
-use super::room::{Burst, Room, RoomError};
+use super::error::RoomError;
+use super::room::{Burst, Room};
 use hw_traits::arm::{Arm, Pose};
 use hw_traits::clock::Stamped;
 use hw_traits::microphones::Microphones;
@@ -88,7 +89,8 @@ impl hw_traits::Error for FakeError {
     }
 }
 
-/// A court with a ball: [`Microphones`] and [`Arm`] on one clock.
+/// A court with a ball: [`Microphones`] and [`Arm`] on one clock. A copy goes on as the original would.
+#[derive(Clone)]
 pub struct Court {
     room: Room,
     settings: CourtSettings,

@@ -7,9 +7,13 @@
 mod arm;
 mod ball;
 mod court;
+mod error;
+mod panel;
 mod room;
 
 pub use arm::{ArmLimits, PaddleArm};
 pub use ball::{FakeBall, Flown, Touchdown};
 pub use court::{Court, CourtSettings, FakeError, Toss, Verdict};
-pub use room::{Burst, Room, RoomError};
+pub use error::RoomError;
+pub use panel::Panel;
+pub use room::{Burst, Room};

@@ -1,12 +1,13 @@
 //! A rectangular room with microphones: image sources (Allen and Berkley 1979, doi:10.1121/1.382599).
 
+use super::error::RoomError;
+use super::panel::Panel;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::PI;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// Responses are summed on samples this much finer than the microphones'.
 const FINER: usize = 4;
@@ -15,19 +16,8 @@ const NEAREST_M: f64 = 0.01;
 /// Length of a burst, s.
 const BURST_S: f64 = 12e-3;
 
-/// Why there is no such room.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[error("{what} is {got}, expected {expected}")]
-pub struct RoomError {
-    /// Which value.
-    pub what: &'static str,
-    /// What is taken.
-    pub expected: &'static str,
-    /// The value stated.
-    pub got: f64,
-}
-
 /// A room with a table in it; all places in the table's frame.
+#[derive(Clone)]
 pub struct Room {
     size_m: [f64; 3],
     table_m: [f64; 3],
@@ -36,6 +26,7 @@ pub struct Room {
     speed_m_s: f64,
     rate_hz: f64,
     microphones_m: Vec<[f64; 3]>,
+    panels: Vec<Panel>,
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
 }
@@ -94,9 +85,20 @@ impl Room {
             speed_m_s,
             rate_hz,
             microphones_m: microphones_m.to_vec(),
+            panels: Vec::new(),
             forward: planner.plan_fft_forward(n),
             inverse: planner.plan_fft_inverse(n),
         })
+    }
+
+    /// The same room with furniture: each panel sends every sound back once, and shades nothing.
+    ///
+    /// # Errors
+    /// [`RoomError`] for a panel out of range.
+    pub fn furnished(mut self, panels: &[Panel]) -> Result<Self, RoomError> {
+        panels.iter().try_for_each(Panel::check)?;
+        self.panels.extend_from_slice(panels);
+        Ok(self)
     }
 
     /// The microphones, m.
@@ -147,6 +149,12 @@ impl Room {
 
     /// Calls `add` with the delay (s) and the gain of every way from a place to a microphone, down to -60 dB.
     fn images(&self, place_m: [f64; 3], microphone_m: [f64; 3], mut add: impl FnMut(f64, f64)) {
+        for panel in &self.panels {
+            if let Some(r) = panel.way_m(place_m, microphone_m) {
+                let r = r.max(NEAREST_M);
+                add(r / self.speed_m_s, panel.reflection / r);
+            }
+        }
         let farthest = self.speed_m_s * self.rt60_s;
         let axis = |k: usize| {
             let (l, s) = (self.size_m[k], self.table_m[k] + place_m[k]);
