@@ -3,14 +3,23 @@
 //! The ball comes towards a plane x = const in which a paddle moves; each impact on the table is heard with its place. A [`Tracker`] turns
 //! impacts into goals, [`play`] puts microphones, tracker and arm together on any rig.
 
+mod aim;
 mod deterministic;
 mod drive;
+mod error;
+mod filter;
 mod next;
+mod particle;
+mod settings;
 mod stochastic;
+mod thin;
 
 pub use deterministic::Deterministic;
 pub use drive::{PlayError, Played, Player, play};
+pub use error::TrackError;
+pub use filter::ParticleFilter;
 pub use next::{NextBounce, NextSettings, Step};
+pub use settings::{FilterSettings, HearingError};
 pub use stochastic::{Stochastic, StochasticSettings};
 
 use rand::Rng;

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use crate::common::{Dice, bundled, hiss, quantile, shared};
-use bounce_audio::fake::{Burst, Court, Room, RoomError};
+use bounce_audio::fake::{Burst, Court, Panel, Room, RoomError};
 use bounce_audio::hear::{HearError, HearSettings, hear};
 use bounce_audio::listen::{Delays, Listener, Placed, Sounded};
 use bounce_audio::onset::OnsetError;
@@ -264,4 +264,26 @@ fn nonsense_is_an_error() {
     assert_eq!(broken, Err(HearError::Onset(OnsetError::NotFinite { channel: 1, sample: 0 })));
     assert!(matches!(Court::living_room(-1.0), Err(RoomError { .. })));
     assert!(Court::living_room(1e-3).is_err(), "no wall absorbs that much");
+}
+
+/// A panel adds the same sound once more: later by the way to its mirror image, fainter by that way and by what it swallows.
+#[test]
+fn furniture_sends_a_sound_back_once() {
+    let heard = |panels: &[Panel], from_s: f64, loudness: f64| {
+        let room = Court::living_room(0.0).unwrap().furnished(panels).unwrap();
+        let mut channels = vec![vec![0.0; 4_000]; 3];
+        let burst = Burst::new(loudness, &mut ChaCha8Rng::seed_from_u64(1));
+        room.strike([0.1, 0.2, 0.0], from_s, &burst, &mut channels);
+        channels.swap_remove(0)
+    };
+    let panel = Panel::upright([-0.3, -1.0], [-0.3, 1.0], [-0.5, 0.5], 0.6);
+    let (plain, both) = (heard(&[], 0.01, 0.03), heard(&[panel], 0.01, 0.03));
+    // The microphone in the corner (0, 0, 0.0762), and the image at (-0.7, 0.2, 0).
+    let way = |x: f64| (x * x + 0.04 + 0.0762f64.powi(2)).sqrt();
+    let (direct, back) = (way(0.1), way(0.7));
+    let echo = heard(&[], 0.01 + (back - direct) / 343.0, 0.03 * 0.6 * direct / back);
+    let off = (0..4_000).map(|i| (both[i] - plain[i] - echo[i]).abs()).fold(0.0, f64::max);
+    let most = echo.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    assert!(most > 1e-3 && off < 0.1 * most, "{off} of {most}");
+    assert!(Court::living_room(0.0).unwrap().furnished(&[Panel { reflection: 2.0, ..panel }]).is_err());
 }

@@ -3,6 +3,7 @@
 mod common;
 mod cup;
 mod drop;
+mod filter;
 mod flight;
 mod hear;
 mod integrator;
