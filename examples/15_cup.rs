@@ -7,23 +7,19 @@
 //! ```
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 
-use bayes_sim::mdn::{Mdn, MdnSettings, MixtureDensity};
-use bayes_sim::points::Points;
+use bayes_sim::mdn::MixtureDensity;
 use bayes_sim::posterior::Posterior;
-use bayes_sim::simulations::Simulations;
 use bounce_audio::cup::{Cup, Scene};
 use bounce_audio::drop::{Ball, Bounce, Release, each};
 use bounce_audio::fake::FakeBall;
-use bounce_audio::features::{Features, Scale};
-use bounce_audio::posterior::{DROP_HEIGHT_M, DropSimulator, Hearing, prior, projected_product};
+use bounce_audio::features::Features;
+use bounce_audio::posterior::{DROP_HEIGHT_M, DropSimulator};
+use examples::drops::{joint, learn, simulator};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::error::Error;
 
-type Failure = Box<dyn Error>;
-
-/// How well impacts are heard (example 13).
-const HEARING: Hearing = Hearing { time_sigma_s: 20e-6, position_sigma_m: 0.7e-3 };
+type Failure = Box<dyn Error + Send + Sync>;
 
 struct Real {
     name: &'static str,
@@ -69,8 +65,8 @@ fn main() -> Result<(), Failure> {
             published: "35",
         },
     ];
-    let simulator = DropSimulator { hearing: HEARING, scale: Scale::Logarithms, ..DropSimulator::new() };
-    let density = learn(&simulator, &size)?;
+    let simulator = simulator();
+    let density = learn(&simulator, size.train)?;
     println!(
         "{:12} {:>20} {:>20} {:>16} {:>24} {:>22} {:>12}",
         "ball", "e", "log10 kappa", "drop at x, m", "foretold, of 100", "fell in, of 1000", "Matl 2021"
@@ -119,27 +115,6 @@ fn releases(size: &Size) -> Vec<Release> {
     (0..size.along * size.across).map(place).collect()
 }
 
-fn learn(simulator: &DropSimulator, size: &Size) -> Result<Box<dyn MixtureDensity>, Failure> {
-    let prior = prior()?;
-    let drawn = each(size.train, 1, |_, rng| {
-        let theta = prior.sample(rng);
-        simulator.features(&theta, rng).map(|f| (theta, f.numbers(simulator.observed, simulator.scale)))
-    });
-    let mut simulations: Option<(Points, Points)> = None;
-    for one in drawn {
-        let (theta, numbers) = one?;
-        let (t, x) = simulations.get_or_insert_with(|| (Points::new(2), Points::new(numbers.len())));
-        t.push(&theta)?;
-        x.push(&numbers)?;
-    }
-    let (theta, x) = simulations.ok_or("nothing was simulated")?;
-    let mut settings = MdnSettings::default();
-    if examples::small() {
-        (settings.members, settings.training.max_epochs) = (1, 60);
-    }
-    Ok(Box::new(Mdn::train(&prior, &Simulations::new(theta, x)?, &settings, 1)?))
-}
-
 /// The joint posterior of 100 drops of the real ball on a level table.
 fn infer(
     density: &dyn MixtureDensity,
@@ -156,11 +131,8 @@ fn infer(
         simulator.hearing.blur(&mut impacts, rng);
         Features::of(&impacts)
     });
-    let mut posteriors = Vec::with_capacity(drops.len());
-    for drop in drops {
-        posteriors.push(density.posterior(&drop?.numbers(simulator.observed, simulator.scale))?);
-    }
-    Ok(projected_product(&posteriors)?)
+    let drops: Result<Vec<Features>, _> = drops.into_iter().collect();
+    joint(density, simulator, &drops?)
 }
 
 /// Successes of 100 for balls drawn from the posterior: mean and standard deviation, as in [Matl 2021].

@@ -2,6 +2,7 @@
 
 pub mod bars;
 pub mod dough;
+pub mod drops;
 pub mod grains;
 pub mod liquid;
 pub mod plot;
