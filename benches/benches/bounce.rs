@@ -20,7 +20,8 @@ use bounce_audio::localise::Localiser;
 use bounce_audio::onset::{OnsetSettings, OnsetStream};
 use bounce_audio::posterior::{BOUNDS, DropSimulator, prior};
 use bounce_audio::track::{
-    NextBounce, NextSettings, Seen, Stochastic, StochasticSettings, Tracker, Workspace,
+    FilterSettings, NextBounce, NextSettings, ParticleFilter, Seen, Stochastic, StochasticSettings, Tracker,
+    Workspace,
 };
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand::SeedableRng;
@@ -151,10 +152,10 @@ fn inference(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
         rest_z_m: 0.1,
         gravity_m_s2: 9.80665,
     };
+    let [a, b] = [(0.0, [0.05, 0.2]), (0.36, [0.17, 0.22])].map(|(t_s, place_m)| Seen { t_s, place_m });
     for ahead in [2, 4] {
         let settings = StochasticSettings { ahead, ..StochasticSettings::default() };
         let mut tracker = Stochastic::new(next.clone(), space, settings);
-        let [a, b] = [(0.0, [0.05, 0.2]), (0.36, [0.17, 0.22])].map(|(t_s, place_m)| Seen { t_s, place_m });
         c.bench_function(&format!("bounce/decision/10^{ahead}"), |bench| {
             bench.iter(|| {
                 tracker.begin();
@@ -163,6 +164,16 @@ fn inference(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
             });
         });
     }
+    let mut filter = ParticleFilter::new(&[[0.85, 3.0]; 300], space, FilterSettings::default())?;
+    let goal = |filter: &mut ParticleFilter, rng: &mut ChaCha8Rng| {
+        filter.begin();
+        filter.heard(&a, [0.275, 0.1], rng);
+        filter.heard(black_box(&b), [0.275, 0.1], rng)
+    };
+    println!("bounce/decisions/filter: {:?}", goal(&mut filter, &mut rng));
+    c.bench_function("bounce/decisions/filter_of_600_twice", |bench| {
+        bench.iter(|| goal(&mut filter, &mut rng));
+    });
     Ok(())
 }
 
