@@ -11,7 +11,7 @@ use dough_mbrl::goal::Goal;
 use dough_mbrl::mpc::{Mpc, MpcSettings};
 use dough_mbrl::planner::cem::Cem;
 use dough_mbrl::planner::powell::PowellPlanner;
-use dough_mbrl::planner::{Objective, Planner, Task};
+use dough_mbrl::planner::{Chance, Objective, Planner, Task, VarianceGrowth};
 use dough_mbrl::policy::Policy;
 use dough_mbrl::predictor::{Predictor, Refit};
 use dough_mbrl::ridge::Ridge;
@@ -88,6 +88,18 @@ fn dough(c: &mut Criterion) {
         costs[0],
         costs[1]
     );
+    let Ok(growth) = VarianceGrowth::of(&ridge, &rolls) else { return };
+    c.bench_function("dough/variance_growth/600", |b| {
+        b.iter(|| VarianceGrowth::of(black_box(&ridge), black_box(&rolls)));
+    });
+    let Ok(chance) = Chance::new(growth, 0.01) else { return };
+    let constrained = Task { objective: Objective::constrained(chance), ..task };
+    c.bench_function("dough/powell_chance/10", |b| {
+        b.iter(|| {
+            plan.clear();
+            powell.plan(black_box(&constrained), &mut plan, &mut rng)
+        });
+    });
     let Ok(mut mpc) = Mpc::new(ridge.clone(), PowellPlanner::default(), MpcSettings::default()) else {
         return;
     };

@@ -126,7 +126,8 @@ fn a_dough_beyond_the_picture_is_no_shorter_dough() {
 fn a_wetter_dough_lengthens_more_and_a_dry_one_less() {
     let after = |kind, effects| {
         let lengths = (0..4).map(|seed| {
-            let mut rig = FakeRig::new(kind, effects, seed);
+            // The same flow along the axis, so that only hardness differs.
+            let mut rig = FakeRig::new(DoughKind { axial_flow: 1.0, ..kind }, effects, seed);
             let setup = Setup::of(rig.camera_in_world());
             for _ in 0..6 {
                 let shape = setup.look(&mut rig).unwrap();
@@ -200,6 +201,46 @@ fn a_rig_that_stops_ends_the_rollout() {
     assert_eq!((done.end, done.rolls.len()), (End::Stopped, 0));
 }
 
+const STOPPED: RigError = RigError::Device { doing: "moving the arm", kind: ErrorKind::Stopped };
+
+/// Fingers as far apart as the dough is wide, pressed to the table: the dough widens by more than a sixth and meets them. The rig says so, and
+/// the dough is whole; fingers that stand farther apart press as deep.
+#[test]
+fn a_deep_press_between_narrow_fingers_stops_the_rig_and_breaks_no_dough() {
+    for (place, expected) in [([0.0, 0.9696], Err(STOPPED)), ([0.3, 0.9696], Ok(()))] {
+        let mut rig = FakeRig::new(DoughKind { water_g: 5.478, ..DoughKind::A }, NONE, 297);
+        let setup = Setup::of(rig.camera_in_world());
+        let shape = setup.look(&mut rig).unwrap();
+        let before = rig.truth();
+        let action = setup.limits.at(&shape.state()).place(place);
+        let motion = Motion::constrained(&shape, action);
+        assert_eq!(setup.handling.roll(&mut rig, shape.ground_m, &motion, Side::Minus), expected);
+        approx::assert_relative_eq!(rig.volume_m3(), 4e-5, max_relative = 1e-9);
+        let after = rig.truth();
+        assert!(after[0] >= before[0] && after.iter().all(|v| v.is_finite() && *v > 0.0), "{after:?}");
+    }
+}
+
+/// The axial flow changes how far a dough lengthens, and not what a press bears.
+#[test]
+fn axial_flow_lengthens_and_leaves_stiffness() {
+    let band = BandForce::fit(&presses()).unwrap();
+    let [(slow, felt_slow), (fast, felt_fast)] = [0.275, 1.0].map(|axial_flow| {
+        let mut rig = FakeRig::new(DoughKind { axial_flow, ..DoughKind::A }, NONE, 20);
+        let setup = Setup::of(rig.camera_in_world());
+        let felt = Palpation::default().run(&mut rig, &setup, &band).unwrap().stiffness_n_m;
+        let before = rig.truth()[0];
+        for _ in 0..4 {
+            let shape = setup.look(&mut rig).unwrap();
+            let motion = Motion::constrained(&shape, [0.1, 0.7 * shape.height_m]);
+            setup.handling.roll(&mut rig, shape.ground_m, &motion, Side::Plus).unwrap();
+        }
+        (rig.truth()[0] - before, felt)
+    });
+    assert!(fast > 2.0 * slow && slow > 1e-3, "{fast} m and {slow} m");
+    approx::assert_relative_eq!(felt_slow, felt_fast, max_relative = 0.03);
+}
+
 #[test]
 fn longer_goals_take_more_rolls_and_the_same_seed_the_same_rolls() {
     let run = |length_m: f64| {
@@ -231,12 +272,18 @@ proptest! {
             let shape = setup.look(&mut rig);
             let Ok(shape) = shape else { break };
             let action = setup.limits.at(&shape.state()).place([u, v]);
-            setup.handling.roll(&mut rig, shape.ground_m, &Motion::constrained(&shape, action), Side::Minus).unwrap();
+            let rolled =
+                setup.handling.roll(&mut rig, shape.ground_m, &Motion::constrained(&shape, action), Side::Minus);
+            // Between narrow fingers a deep press widens the dough until it meets them, and the rig stops.
+            prop_assert!(matches!(rolled, Ok(()) | Err(STOPPED)), "{rolled:?}");
             prop_assert!((rig.volume_m3() / 4e-5 - 1.0).abs() < 1e-9);
             let [length, width, height] = rig.truth();
             prop_assert!(length >= longest, "rolling never shortens it: {length} after {longest}");
             prop_assert!(width > 0.0 && height > 0.0 && length.is_finite());
             longest = length;
+            if rolled.is_err() {
+                break;
+            }
         }
     }
 }

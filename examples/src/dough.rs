@@ -13,6 +13,8 @@ use rayon::prelude::*;
 
 /// A dough is put aside once it is this long: further on it leaves the picture.
 const LONGEST_M: f64 = 0.26;
+/// Rolls at most of a rollout.
+const MOST_ROLLS: usize = 400;
 
 /// Random rolls on fresh doughs, one list a dough; each is rolled at most so many times.
 ///
@@ -74,7 +76,7 @@ pub fn rollouts(
         .into_par_iter()
         .map(|seed| {
             let mut rig = FakeRig::new(kind, effects, seed);
-            let setup = Setup::of(rig.camera_in_world());
+            let setup = Setup { most_rolls: MOST_ROLLS, ..Setup::of(rig.camera_in_world()) };
             let goal = Goal::cylinder(length_m, kind.volume_m3)?;
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             setup.run(&mut rig, &mut *make(seed)?, &goal, kind.volume_m3, &mut rng)
@@ -90,12 +92,32 @@ pub fn mean_and_half(values: &[f64]) -> (f64, f64) {
     (mean, 1.96 * (variance / n).sqrt())
 }
 
-/// Rolls of each rollout that was neither rolled past its goal nor stopped (one that never reached it counts all its rolls), and how
-/// many missed it.
-pub fn counts(rollouts: &[Rollout]) -> (Vec<f64>, usize) {
-    let unstopped = rollouts.iter().filter(|r| matches!(r.end, End::Reached | End::OutOfRolls));
-    (
-        unstopped.map(|r| r.rolls.len() as f64).collect(),
-        rollouts.iter().filter(|r| r.end != End::Reached).count(),
-    )
+/// Some rollouts, counted: none is left out.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Rolls of each rollout until the goal was reached, the dough was lost, or no more were made.
+    pub rolls: Vec<f64>,
+    /// Doughs that were lost: rolled past the goal.
+    pub lost: usize,
+    /// Doughs that missed it otherwise: out of rolls, or stopped by the rig.
+    pub other: usize,
+}
+
+impl Tally {
+    /// Of some rollouts.
+    pub fn of(rollouts: &[Rollout]) -> Self {
+        let count = |ends: &[End]| rollouts.iter().filter(|r| ends.contains(&r.end)).count();
+        Self {
+            rolls: rollouts.iter().map(|r| r.rolls.len() as f64).collect(),
+            lost: count(&[End::TooLong]),
+            other: count(&[End::OutOfRolls, End::Stopped]),
+        }
+    }
+
+    /// Adds others.
+    pub fn add(&mut self, other: &Self) {
+        self.rolls.extend(&other.rolls);
+        self.lost += other.lost;
+        self.other += other.other;
+    }
 }

@@ -24,6 +24,8 @@ pub(super) struct Material {
     pub(super) hardness_pa: f64,
     /// Force for each metre of length and of squeeze, Pa.
     pub(super) elastic_pa: f64,
+    /// Part of the friction hill's axial share.
+    pub(super) axial_flow: f64,
 }
 
 /// Largest share of the radius by which a slice is oval.
@@ -68,7 +70,7 @@ impl Slice {
             return;
         }
         let contact = 2.0 * self.flat_half_width_m(squeeze_m);
-        let along = contact / (contact + breadth_m);
+        let along = material.axial_flow * contact / (contact + breadth_m);
         let height = self.height_m();
         let squeezed = (plastic / height).min(0.3);
         let before = self.radius_m();

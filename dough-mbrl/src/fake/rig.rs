@@ -50,6 +50,7 @@ struct Way<T> {
 pub struct FakeRig {
     body: Body,
     water_g: f64,
+    axial_flow: f64,
     band: Elastic,
     effects: Effects,
     eye: Eye,
@@ -93,6 +94,7 @@ impl FakeRig {
         Self {
             body,
             water_g: kind.water_g,
+            axial_flow: if kind.axial_flow > 0.0 { kind.axial_flow.min(1.0) } else { 1.0 },
             band: Elastic { natural_m: 0.025, modulus_n: 0.85, breadth_m: 0.04 },
             effects,
             eye: Eye::overhead(),
@@ -128,7 +130,7 @@ impl FakeRig {
     pub fn renew(&mut self, kind: DoughKind) {
         let seed = self.rng.random();
         let fresh = Self::new(kind, self.effects, seed);
-        (self.body, self.water_g) = (fresh.body, kind.water_g);
+        (self.body, self.water_g, self.axial_flow) = (fresh.body, kind.water_g, fresh.axial_flow);
         (self.touching, self.before, self.coming_back) = (false, Vec::new(), Vec::new());
     }
 
@@ -162,7 +164,7 @@ impl FakeRig {
 
     fn material(&self) -> Material {
         let hardness_pa = hardness_pa(self.water_g);
-        Material { hardness_pa, elastic_pa: STIFFNESS_RATIO * hardness_pa }
+        Material { hardness_pa, elastic_pa: STIFFNESS_RATIO * hardness_pa, axial_flow: self.axial_flow }
     }
 
     fn advance(&mut self, duration_s: f64) {

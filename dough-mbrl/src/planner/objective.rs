@@ -1,5 +1,6 @@
 //! What a plan is worth: the discounted objective of eq. 7.1 over predicted states.
 
+use super::chance::Chance;
 use crate::goal::Goal;
 use crate::predictor::{PlanError, Predictor};
 use crate::roll::{Action, Limits, State};
@@ -14,26 +15,50 @@ pub struct Objective {
     /// Cost of each sigma of a predicted state, in its own metres: 0 plans as if the dynamics were certain; 1 is cautious.
     pub caution: f64,
     /// Part of the goal's tolerance within which a predicted state counts as there: a plan that only just enters it misses half of
-    /// the time, and what is too long stays too long. In (0, 1].
+    /// the time, and what is too long stays too long. In [0, 1]; at 0 a plan goes on beyond the goal.
     pub aim: f64,
     /// Cost of each metre by which the dough may get too long, since no roll shortens it; 0 counts too long like too short.
     pub too_long: f64,
     /// By how much more than predicted a roll may lengthen, as a part of what is predicted: what `too_long` counts with.
     pub doubt: f64,
+    /// A bound on the chance of getting too long, of each roll of the plan.
+    pub chance: Option<Chance>,
 }
 
 impl Default for Objective {
     /// Ten rolls, 0.9, certain; a third of the tolerance; too long is dear, and a roll may do two and a half times what is
     /// predicted: deep rolls of a long dough do, on the fake.
     fn default() -> Self {
-        Self { horizon: 10, discount: 0.9, caution: 0.0, aim: 1.0 / 3.0, too_long: 5.0, doubt: 1.5 }
+        Self {
+            horizon: 10,
+            discount: 0.9,
+            caution: 0.0,
+            aim: 1.0 / 3.0,
+            too_long: 5.0,
+            doubt: 1.5,
+            chance: None,
+        }
     }
 }
 
 /// Most rolls that are looked ahead.
 pub const MOST_HORIZON: usize = 50;
 
+/// Cost of each metre by which a roll breaks the chance constraint: far above what any plan gains.
+const BROKEN: f64 = 100.0;
+
 impl Objective {
+    /// Eq. 7.1 of [Matl 2021] and nothing else, ten rolls ahead at a discount of 0.9 (which she does not give): the discounted distances from
+    /// the goal over the whole horizon, dynamics taken for certain.
+    pub fn equation_7_1() -> Self {
+        Self { horizon: 10, discount: 0.9, caution: 0.0, aim: 0.0, too_long: 0.0, doubt: 0.0, chance: None }
+    }
+
+    /// Eq. 7.1, ended within a third of the goal's tolerance, under a chance constraint on the length.
+    pub fn constrained(chance: Chance) -> Self {
+        Self { aim: 1.0 / 3.0, chance: Some(chance), ..Self::equation_7_1() }
+    }
+
     pub(crate) fn check(&self) -> Result<(), PlanError> {
         let h = self.horizon as f64;
         PlanError::setting("horizon", h, (1..=MOST_HORIZON).contains(&self.horizon), "1 to 50 rolls")?;
@@ -41,7 +66,7 @@ impl Objective {
         PlanError::setting("discount", self.discount, good, "above 0, at most 1")?;
         let good = self.caution >= 0.0 && self.caution.is_finite();
         PlanError::setting("caution", self.caution, good, "at least 0, finite")?;
-        PlanError::setting("aim", self.aim, self.aim > 0.0 && self.aim <= 1.0, "above 0, at most 1")?;
+        PlanError::setting("aim", self.aim, (0.0..=1.0).contains(&self.aim), "0 to 1")?;
         for (name, value) in [("too_long", self.too_long), ("doubt", self.doubt)] {
             PlanError::setting(name, value, value >= 0.0 && value.is_finite(), "at least 0, finite")?;
         }
@@ -110,12 +135,17 @@ impl Task<'_> {
             };
             // Dynamics that predict no dough predict nothing good; and no roll shortens it.
             let mut next = next.map(|v| if v.is_nan() { 10.0 } else { v.clamp(1e-3, 10.0) });
-            next[0] = next[0].max(state[0]);
+            let one_way = self.objective.too_long > 0.0 || self.objective.chance.is_some();
+            if one_way {
+                next[0] = next[0].max(state[0]);
+            }
             let longest = next[0] + self.objective.doubt * (next[0] - state[0]);
             let too_long = (longest - self.goal.state[0] - 0.5 * self.goal.within_m).max(0.0);
+            let longest_m = self.goal.state[0] + self.goal.within_m;
+            let broken = self.objective.chance.map_or(0.0, |c| c.excess_m(state[0], next[0], longest_m));
             state = next;
             let off = self.goal.distance_m(&state) + self.objective.caution * unsure;
-            cost += discount * (off + self.objective.too_long * too_long);
+            cost += discount * (off + self.objective.too_long * too_long + BROKEN * broken);
             discount *= self.objective.discount;
         }
         cost
