@@ -88,16 +88,19 @@ fn a_plan_keeps_the_constraint_near_the_goal_and_is_that_of_eq_7_1_far_from_it()
     let chance = Chance::new(growth, 0.01).unwrap();
     let plans = |from| {
         [Objective { aim: 1.0 / 3.0, ..Objective::equation_7_1() }, Objective::constrained(chance)]
-            .map(|objective| planned(from, objective))
+            .map(|objective| planned(from, Objective { horizon: 2, ..objective }))
     };
     // Far from the goal nothing can pass it: inactive.
     let [plain, constrained] = plans([0.06, 0.03, 0.03]);
     assert!((plain[1] - constrained[1]).abs() < 1e-6 && plain[1] > 0.0299, "{plain:?} {constrained:?}");
-    // At 142 mm of 150 the whole depth of 19 mm is predicted to end 1.5 mm beyond the goal, 8.5 mm short of what counts, less than one sigma.
+    // At 142 mm of 150 eq. 7.1 asks for all 8 mm at once, of which one in a hundred would be 18.8 mm too many, 8.8 more than count.
     let from = [0.142, 0.019, 0.019];
     let [plain, constrained] = plans(from);
     let excess = |action: &Action| chance.excess_m(from[0], Half.next(&from, action)[0], 0.16);
-    assert!(excess(&plain) > 0.01 && excess(&constrained) < 2e-4, "{plain:?} {constrained:?}");
+    assert!(
+        (excess(&plain) - 8.8e-3).abs() < 3e-4 && excess(&constrained) < 2e-4,
+        "{plain:?} {constrained:?}"
+    );
     assert!(constrained[1] > 8e-3, "no gentler than it has to be: {constrained:?}");
 }
 
