@@ -1,6 +1,6 @@
 //! Rolling dough to a length: the experiments of [Matl 2021], chapter 7, on a dough that is physics, our numbers beside its.
 //!
-//! `cargo run --release -p examples --example 07_dough` (`--small`: two goals, two rollouts each; `--seed N`: other rollouts;
+//! `cargo run --release -p examples --example 07_dough` (`--small`: two goals, a rollout or two each; `--seed N`: other rollouts;
 //! `--picture FILE.svg` draws)
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
@@ -57,7 +57,7 @@ fn main() -> Result<(), Failure> {
     let seed = 1000 * told("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
     let size = if examples::small() {
         let goals = vec![2.0, 4.0];
-        Size { explored: 120, each: [40, 40], seed, goals, six: 2, twenty: 2, ten: 2, fifteen: 2 }
+        Size { explored: 120, each: [60, 40], seed, goals, six: 2, twenty: 2, ten: 1, fifteen: 1 }
     } else {
         let goals = vec![2.0, 4.0, 6.0, 8.0, 10.0];
         Size { explored: 600, each: [150, 100], seed, goals, six: 6, twenty: 20, ten: 10, fifteen: 15 }

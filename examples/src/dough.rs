@@ -7,14 +7,15 @@ use dough_mbrl::handling::RigError;
 use dough_mbrl::policy::{Explore, Policy};
 use dough_mbrl::roll::Roll;
 use dough_mbrl::rollout::{End, Rolled, Rollout, RolloutError, Setup};
-use rand::SeedableRng;
+use hw_traits::ErrorKind;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// A dough is put aside once it is this long: further on it leaves the picture.
 const LONGEST_M: f64 = 0.26;
-/// Rolls at most of a rollout.
-const MOST_ROLLS: usize = 400;
+/// Rolls at most of a rollout, and on a small run.
+const MOST_ROLLS: [usize; 2] = [400, 100];
 
 /// Random rolls on fresh doughs, one list a dough; each is rolled at most so many times.
 ///
@@ -47,6 +48,10 @@ pub fn explore(
             }
             // The last roll took it out of the picture: the next dough.
             Err(RolloutError::Rig(RigError::Dough(DoughError::CutOff { .. }))) => long = true,
+            // Its fingers met the dough: another rig, and the next dough.
+            Err(RolloutError::Rig(RigError::Device { kind: ErrorKind::Stopped, .. })) => {
+                (rig, long) = (FakeRig::new(kind, effects, rng.random()), true);
+            }
             Err(error) => return Err(error),
         }
     }
@@ -76,7 +81,10 @@ pub fn rollouts(
         .into_par_iter()
         .map(|seed| {
             let mut rig = FakeRig::new(kind, effects, seed);
-            let setup = Setup { most_rolls: MOST_ROLLS, ..Setup::of(rig.camera_in_world()) };
+            let setup = Setup {
+                most_rolls: MOST_ROLLS[usize::from(crate::small())],
+                ..Setup::of(rig.camera_in_world())
+            };
             let goal = Goal::cylinder(length_m, kind.volume_m3)?;
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             setup.run(&mut rig, &mut *make(seed)?, &goal, kind.volume_m3, &mut rng)
