@@ -6,12 +6,9 @@ use missing_physics::data::Run;
 use missing_physics::model::{Mechanism, ParameterRef, Quantity, SpecBuilder, UNBOUNDED};
 use serde::Serialize;
 
-use crate::mechanics::{self, Declares, InputEffect, JointEffect, JointHas, JointSizes, JointUnits};
+use crate::mechanics::{self, Clock, Declares, InputEffect, JointEffect, JointHas, JointSizes, JointUnits};
 use crate::recording::{Header, ReadError, Section, quoted};
 
-/// Delays and lags of so many rows at the most, and of this part of a run.
-const LONGEST_ROWS: f64 = 100.0;
-const LONGEST_PART: f64 = 0.2;
 /// A lag below this part of the time between rows is a delay.
 const SHORTEST_LAG: f64 = 0.25;
 /// The range of a joint of which nothing was measured.
@@ -73,10 +70,8 @@ pub(super) fn declare(
 ) -> Result<Machine, ReadError> {
     let mut machine = Machine::default();
     let declared: Vec<String> = b.so_far().mechanisms.iter().map(|m| m.id.clone()).collect();
-    let mut steps: Vec<f64> =
-        runs.iter().flat_map(|run| run.inputs[0].windows(2).map(|w| w[1] - w[0])).collect();
-    steps.sort_by(f64::total_cmp);
-    machine.step_s = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let clock = Clock::of(runs);
+    machine.step_s = clock.step_s;
     let sections = header.root().sections("joint")?;
     for section in &sections {
         let expected = "a name, unlike the other joints'";
@@ -98,8 +93,6 @@ pub(super) fn declare(
         machine.joints.push(sizes);
         machine.names.push(name.to_owned());
     }
-    let spans = runs.iter().map(|run| run.inputs[0].last().unwrap_or(&0.0) - run.inputs[0][0]);
-    let longest_s = (LONGEST_PART * spans.fold(0.0, f64::max)).min(LONGEST_ROWS * machine.step_s);
     let driving = driving(header, inputs, runs)?;
     for input in &driving {
         let at = machine.inputs.len();
@@ -111,7 +104,7 @@ pub(super) fn declare(
             role: |effect| Role::Input(at, effect),
             but: declared.iter().map(String::as_str).collect(),
         };
-        mechanics::inputs(&mut carrier, &quantity.unit, input.range, machine.step_s, longest_s);
+        mechanics::inputs(&mut carrier, &quantity.unit, input.range, clock.step_s, clock.longest_s());
         machine.inputs.push(Input { ..*input });
     }
     Ok(machine)

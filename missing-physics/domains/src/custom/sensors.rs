@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 use missing_physics::data::Run;
 use missing_physics::model::{ParameterRef, Quantity, SpecBuilder, UNBOUNDED};
 
+use crate::mechanics::{self, Clock};
+
 /// What a sensor or the clock does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -40,9 +42,6 @@ pub(super) struct Sensors {
 }
 
 const CONTROL: &str = "Astrom and Murray, Feedback Systems, 2nd ed. 2021";
-/// Delays and lags of so many rows at the most, and of this part of a run.
-const LONGEST_ROWS: f64 = 100.0;
-const LONGEST_PART: f64 = 0.2;
 
 /// A specification in the making, with the errors of its sensors.
 struct Errors<'a> {
@@ -117,12 +116,12 @@ impl Errors<'_> {
     }
 
     /// Errors in time.
-    fn timed(&mut self, c: usize, channel: &Quantity, [low, high]: [f64; 2], longest_s: f64) {
-        let step_s = self.sensors.step_s;
-        let late = [0.0, longest_s.min(LONGEST_ROWS * step_s)];
+    fn timed(&mut self, c: usize, channel: &Quantity, [low, high]: [f64; 2], clock: &Clock) {
+        let step_s = clock.step_s;
+        let late = [0.0, clock.longest_s()];
         if let Some(id) = self.wanted("sensor-drift", channel) {
             let unit = if channel.unit.is_empty() { "1/s".into() } else { format!("{}/s", channel.unit) };
-            let scale = 0.05 * (high - low) * LONGEST_PART / longest_s;
+            let scale = 0.05 * (high - low) / clock.duration_s;
             let rate = self.parameter((Kind::Drift, c), "rate_per_s", &unit, 0.0, UNBOUNDED, scale);
             let text =
                 ["the sensor's drift", "Readings walk off steadily from each run's start.", "y + rate t"];
@@ -150,12 +149,7 @@ pub(super) fn add(b: &mut SpecBuilder, channels: &[Quantity], inputs: &[Quantity
     let declared = b.so_far().mechanisms.iter().map(|m| m.id.clone()).collect();
     let time = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
     let timed = inputs.first().is_some_and(|first| first.name == "t_s") && runs.iter().all(time);
-    let mut steps: Vec<f64> =
-        runs.iter().flat_map(|run| run.inputs[0].windows(2).map(|w| w[1] - w[0])).collect();
-    steps.sort_by(f64::total_cmp);
-    let step_s = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-    let spans = runs.iter().map(|run| run.inputs[0].last().unwrap_or(&0.0) - run.inputs[0][0]);
-    let longest_s = LONGEST_PART * spans.fold(0.0, f64::max);
+    let clock = Clock::of(runs);
     let range = |c: usize| {
         let readings = runs.iter().flat_map(|run| run.outputs[c].iter().copied()).filter(|v| v.is_finite());
         let range =
@@ -164,7 +158,7 @@ pub(super) fn add(b: &mut SpecBuilder, channels: &[Quantity], inputs: &[Quantity
         if range[0].is_finite() { range } else { [-1.0, 1.0] }
     };
     let ranges: Vec<[f64; 2]> = (0..channels.len()).map(range).collect();
-    let sensors = Sensors { ranges: ranges.clone(), step_s, ..Sensors::default() };
+    let sensors = Sensors { ranges: ranges.clone(), step_s: clock.step_s, ..Sensors::default() };
     let mut errors = Errors { b, sensors, declared, several: channels.len() > 1 };
     for (c, (channel, range)) in channels.iter().zip(ranges).enumerate() {
         // A channel that never changes shows none of them.
@@ -173,7 +167,7 @@ pub(super) fn add(b: &mut SpecBuilder, channels: &[Quantity], inputs: &[Quantity
         }
         errors.still(c, channel, range);
         if timed {
-            errors.timed(c, channel, range, longest_s);
+            errors.timed(c, channel, range, &clock);
         }
     }
     if timed && !errors.sensors.parts.is_empty() && !errors.declared.contains("clock-rate") {
@@ -222,20 +216,10 @@ impl Sensors {
     /// Where to begin fitting a mechanism whose first parameter has this index.
     pub(super) fn starts(&self, first: usize) -> Vec<Vec<(usize, f64)>> {
         let Some(part) = self.parts.iter().find(|p| p.index == first) else { return Vec::new() };
-        let [low, high] = self.ranges[part.channel];
-        let span = high - low;
         match part.kind {
-            Kind::Delay | Kind::Lag => {
-                [0.5, 2.0, 8.0, 30.0].map(|rows| vec![(first, rows * self.step_s)]).to_vec()
-            }
-            Kind::Upper => [0.03, 0.12, 0.3]
-                .iter()
-                .flat_map(|cut| {
-                    // The lower bound is the next parameter.
-                    let (above, below) = ((first, high - cut * span), (first + 1, low + cut * span));
-                    [vec![above], vec![below], vec![above, below]]
-                })
-                .collect(),
+            Kind::Delay | Kind::Lag => mechanics::late(first, self.step_s),
+            // The lower bound is the next parameter.
+            Kind::Upper => mechanics::sensor_bounds(first, first + 1, self.ranges[part.channel]),
             _ => Vec::new(),
         }
     }

@@ -1,15 +1,17 @@
 //! What acts on joints and inputs of any machine, whoever integrates its motion: which parameters each mechanism has, what it is in words,
 //! and where fits of it begin.
 
+mod clock;
 mod input;
 mod joint;
 mod starts;
 
 use missing_physics::model::{Mechanism, ParameterRef};
 
+pub(crate) use clock::Clock;
 pub(crate) use input::inputs;
 pub(crate) use joint::joints;
-pub(crate) use starts::{input_starts, joint_starts, late, two_bounds};
+pub(crate) use starts::{input_starts, joint_starts, late, sensor_bounds};
 
 /// What a parameter is of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -45,12 +45,12 @@ pub(crate) fn joint_starts(effect: JointEffect, own: &[usize], s: &JointSizes, l
 }
 
 /// Starts of an input's mechanism whose parameters are `own`, the first of which is `effect`.
-pub(crate) fn input_starts(effect: InputEffect, own: &[usize], [low, high]: [f64; 2], step_s: f64) -> Starts {
+pub(crate) fn input_starts(effect: InputEffect, own: &[usize], range: [f64; 2], step_s: f64) -> Starts {
     match (effect, own) {
         (InputEffect::Delay | InputEffect::Lag, [first, ..]) => late(*first, step_s),
-        (InputEffect::Upper, [upper, lower, ..]) => two_bounds(*upper, *lower, low, high),
+        (InputEffect::Upper, [upper, lower, ..]) => input_bounds(*upper, *lower, range),
         (InputEffect::DeadZone, [first, ..]) => {
-            let most = low.abs().max(high.abs());
+            let most = range[0].abs().max(range[1].abs());
             [0.01, 0.05, 0.15, 0.4].map(|f| vec![(*first, f * most)]).to_vec()
         }
         _ => Vec::new(),
@@ -62,14 +62,22 @@ pub(crate) fn late(parameter: usize, step_s: f64) -> Starts {
     [0.5, 2.0, 8.0, 30.0].map(|rows| vec![(parameter, rows * step_s)]).to_vec()
 }
 
-/// One bound, the other, or both within a range.
-pub(crate) fn two_bounds(upper: usize, lower: usize, low: f64, high: f64) -> Starts {
+/// Bounds of what an input may be: below its greatest value, above its least, or both.
+fn input_bounds(upper: usize, lower: usize, range: [f64; 2]) -> Starts {
+    two_bounds([upper, lower], range, &[0.03, 0.12, 0.3])
+}
+
+/// Bounds of what a sensor reads: as an input's, and those at which it has been seen.
+pub(crate) fn sensor_bounds(upper: usize, lower: usize, range: [f64; 2]) -> Starts {
+    two_bounds([upper, lower], range, &[0.0, 0.03, 0.12, 0.3])
+}
+
+/// One bound, the other, or both, by these parts of a range within it.
+fn two_bounds([upper, lower]: [usize; 2], [low, high]: [f64; 2], parts: &[f64]) -> Starts {
     let span = high - low;
-    [0.03, 0.12, 0.3]
-        .iter()
-        .flat_map(|cut| {
-            let (above, below) = ((upper, high - cut * span), (lower, low + cut * span));
-            [vec![above], vec![below], vec![above, below]]
-        })
-        .collect()
+    let at = |part: &f64| {
+        let (above, below) = ((upper, high - part * span), (lower, low + part * span));
+        [vec![above], vec![below], vec![above, below]]
+    };
+    parts.iter().flat_map(at).collect()
 }

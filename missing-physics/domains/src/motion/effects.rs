@@ -155,7 +155,7 @@ impl<'a> Effects<'a> {
         let (equations, scales) = (self.equations, self.scales);
         let name = equations.inputs[input].name.as_str();
         let of = (equations.inputs.len() > 1).then_some(name);
-        let longest_s = (100.0 * scales.step_s).min(0.2 * scales.duration_s);
+        let longest_s = scales.clock().longest_s();
         let (unit, range) = (super::units::text(name), scales.inputs[input].range);
         let mut carrier = Carrier { effects: self, of, role: |e| Role::Input(input, e) };
         mechanics::inputs(&mut carrier, &unit, range, scales.step_s, longest_s);
@@ -168,7 +168,7 @@ impl<'a> Effects<'a> {
         let role = |r| Role::Output(output, r);
         let [low, high] = s.range;
         let span = high - low;
-        let longest = (100.0 * self.scales.step_s).min(0.2 * self.scales.duration_s);
+        let longest = self.scales.clock().longest_s();
         let rate_unit = if unit.is_empty() { "1/s".to_owned() } else { format!("{unit}/s") };
         let gain = self.add(role(OfOutput::Gain), "gain", "", 0.0, [-0.9, 10.0], 0.1);
         let offset = self.add(role(OfOutput::Offset), "offset", &unit, 0.0, UNBOUNDED, 0.05 * span);
@@ -240,7 +240,8 @@ impl<'a> Effects<'a> {
                 CONTROL,
             ],
             &["end-stop"],
-        );
+        )
+        .may_be_open = vec![upper.index, lower.index];
     }
 
     /// An upper and a lower bound of what comes between two values: open a tenth beyond them.

@@ -1,7 +1,7 @@
 //! How large a machine's motions, inputs and readings are: what effects and their bounds are measured by.
 
 use super::equations::Equations;
-use crate::mechanics::{JointSizes, JointUnits};
+use crate::mechanics::{Clock, JointSizes, JointUnits};
 
 /// Sizes of a recording.
 #[derive(Debug, Clone, Default)]
@@ -46,6 +46,10 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 impl Scales {
+    pub(super) fn clock(&self) -> Clock {
+        Clock { step_s: self.step_s, duration_s: self.duration_s }
+    }
+
     /// Sizes of nothing in particular: all of them one.
     pub(super) fn of_example(equations: &Equations) -> Self {
         let one = || Range { range: [-1.0, 1.0] };

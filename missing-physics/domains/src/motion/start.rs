@@ -78,14 +78,11 @@ pub(super) fn mechanism(
         Role::Input(input, effect) => {
             mechanics::input_starts(effect, own, scales.inputs[input].range, scales.step_s)
         }
-        Role::Output(output, what) => {
-            let [low, high] = scales.outputs[output].range;
-            match what {
-                OfOutput::Delay | OfOutput::Lag => mechanics::late(first, scales.step_s),
-                OfOutput::Upper => mechanics::two_bounds(first, own[1], low, high),
-                _ => Vec::new(),
-            }
-        }
+        Role::Output(output, what) => match what {
+            OfOutput::Delay | OfOutput::Lag => mechanics::late(first, scales.step_s),
+            OfOutput::Upper => mechanics::sensor_bounds(first, own[1], scales.outputs[output].range),
+            _ => Vec::new(),
+        },
         Role::Overflow(level) => {
             let state = scales.levels[level];
             [0.99, 0.95, 0.9, 0.8, 0.6].map(|f| vec![(first, state[0] + f * (state[1] - state[0]))]).to_vec()

@@ -5,7 +5,7 @@ use crate::answer::Answer;
 use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict};
 use crate::engine::begin::{Begun, rough_sigmas};
 use crate::engine::input::{DiagnoseError, Options};
-use crate::engine::local::beside_a_local_cause;
+use crate::engine::local::BesideLocal;
 use crate::estimate::limits::limits;
 use crate::experiment;
 use crate::fit::prediction::{predictions, residuals};
@@ -111,21 +111,23 @@ impl Course<'_> {
         let chosen = cause.as_ref().map(|cause| &cause.chosen.candidate);
         let chosen = chosen.or(explained.map(|best| ranking.at(best.at)));
         let all = ranking.all();
+        let beside = |judge| BesideLocal { problem, baseline, all, judge, white: &white };
         // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
-        let members = chosen
-            .filter(|_| cause.is_none())
-            .map(|set| beside_a_local_cause(problem, baseline, all, set, &judge, &white))
-            .transpose()?
-            .flatten();
+        let members =
+            chosen.filter(|_| cause.is_none()).map(|set| beside(&judge).members(set)).transpose()?.flatten();
         let remark = chosen.filter(|_| members.is_some()).map(|set| {
             let names = answer.names(&set.set);
             format!("{names} would act everywhere; less of it and one unknown in a part of the data say clearly more")
         });
         let (judge, cause, explained) = match members {
-            None => (judge, cause, explained),
+            None if cause.is_some() || explained.is_some() => (judge, cause, explained),
+            None => {
+                let cause = beside(&judge).main_cause()?;
+                (judge, cause, explained)
+            }
             Some(members) => {
                 let judge = Judge::new(problem, rule, all, &white, |c| c.set.len() <= members);
-                let cause = judge.main_cause();
+                let cause = beside(&judge).main_cause()?.or_else(|| judge.main_cause());
                 (judge, cause, None)
             }
         };

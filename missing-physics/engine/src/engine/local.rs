@@ -6,45 +6,120 @@ use crate::locate::locations::local_cause;
 use crate::model::PredictError;
 use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
-use crate::selection::main_cause::Judge;
+use crate::selection::main_cause::{Judge, MainCause};
 
 /// Twice the log Bayes factor from which on a local cause is preferred (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572, "very
 /// strong").
 const CLEAR: f64 = 10.0;
 
-/// How many members of a set are left, where one unknown more that acts within an interval, or in some runs, takes away clearly more beside
-/// those than the others do; `None` where none does.
+/// What a main cause leaves must be so many times larger than what is left of it with a cause in a part of the data: what that does not
+/// take away is no local cause.
+const SMALLER: f64 = 3.0;
+/// Sets that leave least of the data they are fitted to, beside which a local cause is sought.
+const CLOSE: usize = 12;
+
+/// Sets of mechanisms with the best single cause that acts within an interval, or in some runs, beside them.
 ///
 /// All are judged by what they leave in units of white noise, less Schwarz's price of each size that is fitted and the logarithm of the number
 /// of hypotheses of its kind. What is left beyond noise is noise of its size as well: it counts by its logarithm.
-pub(super) fn beside_a_local_cause(
-    problem: &Problem<'_>,
-    baseline: &Candidate,
-    all: &[Candidate],
-    set: &Candidate,
-    judge: &Judge<'_>,
-    white: &[f64],
-) -> Result<Option<usize>, PredictError> {
-    let rows = (0..problem.channels()).map(|c| problem.count(c)).sum::<usize>() as f64;
-    let counted = |squares: f64| {
-        if squares > rows { rows * (1.0 + (squares / rows).ln()) } else { squares }
-    };
-    let price = |candidate: &Candidate| {
-        let sizes = candidate.selection.shared.len().saturating_sub(baseline.selection.shared.len());
-        let mechanisms = problem.spec().mechanisms.len() as u64;
-        sizes as f64 * rows.ln() + 2.0 * ln_binomial(mechanisms, candidate.set.len() as u64)
-    };
-    let Some(plain) = judge.plain(&set.set) else { return Ok(None) };
-    let most = counted(plain.chi2) + price(set) - CLEAR;
-    let mut best: Option<(f64, usize)> = None;
-    let part = |c: &&Candidate| c.set.len() < set.set.len() && c.set.iter().all(|m| set.set.contains(m));
-    for part in all.iter().filter(part) {
-        let Some(plain) = judge.plain(&part.set) else { continue };
-        let Some(local) = local_cause(problem, &part.selection, plain, white)? else { continue };
-        let left = counted((plain.chi2 - local.gain).max(1.0)) + price(part) + local.price;
-        if left < best.map_or(most, |(best, _)| best) {
-            best = Some((left, part.set.len()));
-        }
+pub(super) struct BesideLocal<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) baseline: &'a Candidate,
+    pub(super) all: &'a [Candidate],
+    pub(super) judge: &'a Judge<'a>,
+    pub(super) white: &'a [f64],
+}
+
+/// A set, and what it leaves with a local cause beside it.
+struct Weighed {
+    at: usize,
+    /// The price included.
+    left: f64,
+    /// What the set leaves beyond noise alone is so many times larger.
+    smaller: f64,
+}
+
+impl BesideLocal<'_> {
+    fn rows(&self) -> f64 {
+        (0..self.problem.channels()).map(|c| self.problem.count(c)).sum::<usize>() as f64
     }
-    Ok(best.map(|(_, members)| members))
+
+    fn counted(&self, squares: f64) -> f64 {
+        let rows = self.rows();
+        if squares > rows { rows * (1.0 + (squares / rows).ln()) } else { squares }
+    }
+
+    fn price(&self, candidate: &Candidate) -> f64 {
+        let sizes = candidate.selection.shared.len().saturating_sub(self.baseline.selection.shared.len());
+        let mechanisms = self.problem.spec().mechanisms.len() as u64;
+        sizes as f64 * self.rows().ln() + 2.0 * ln_binomial(mechanisms, candidate.set.len() as u64)
+    }
+
+    /// A set with its best local cause; `None` where there is none.
+    fn weighed(&self, at: usize) -> Result<Option<Weighed>, PredictError> {
+        let set = &self.all[at];
+        let Some(plain) = self.judge.plain(&set.set) else { return Ok(None) };
+        let local = local_cause(self.problem, &set.selection, plain, self.white)?;
+        Ok(local.map(|local| {
+            let after = (plain.chi2 - local.gain).max(1.0);
+            let beyond = |squares: f64| (squares - self.rows()).max(0.0);
+            let smaller = beyond(plain.chi2) / beyond(after);
+            Weighed { at, left: self.counted(after) + self.price(set) + local.price, smaller }
+        }))
+    }
+
+    fn parts(&self, set: &[usize]) -> impl Iterator<Item = usize> {
+        (0..self.all.len()).filter(move |&i| {
+            let part = &self.all[i].set;
+            part.len() < set.len() && part.iter().all(|m| set.contains(m))
+        })
+    }
+
+    /// How many members of a set are left, where one unknown more that acts within an interval, or in some runs, takes away clearly more beside
+    /// those than the others do; `None` where none does.
+    pub(super) fn members(&self, set: &Candidate) -> Result<Option<usize>, PredictError> {
+        let Some(plain) = self.judge.plain(&set.set) else { return Ok(None) };
+        let most = self.counted(plain.chi2) + self.price(set) - CLEAR;
+        let parts: Vec<Weighed> =
+            self.parts(&set.set).filter_map(|at| self.weighed(at).transpose()).collect::<Result<_, _>>()?;
+        let best = parts.iter().filter(|w| w.left < most).min_by(|a, b| a.left.total_cmp(&b.left));
+        Ok(best.map(|w| self.all[w.at].set.len()))
+    }
+
+    /// The main cause where what it leaves is a cause in a part of the data: each member of the set is clearly needed beside that.
+    ///
+    /// Such a cause drags the estimates of all runs in which it acts, so that the share that is asked for is of the data that are fitted.
+    pub(super) fn main_cause(&self) -> Result<Option<MainCause>, PredictError> {
+        let close: Vec<usize> = self.judge.nearly_all(CLOSE);
+        let weigh = |at: usize| self.weighed(at).transpose();
+        let weighed: Vec<Weighed> = close.into_iter().filter_map(weigh).collect::<Result<_, _>>()?;
+        let Some(mut chosen) = weighed.iter().min_by(|a, b| a.left.total_cmp(&b.left)) else {
+            return Ok(None);
+        };
+        // Of sets that are nearly as likely, the smallest that is a part of the likeliest.
+        let likeliest = &self.all[chosen.at].set;
+        for w in &weighed {
+            let set = &self.all[w.at].set;
+            let smaller =
+                set.len() < self.all[chosen.at].set.len() && set.iter().all(|m| likeliest.contains(m));
+            if smaller && w.left < chosen.left + CLEAR {
+                chosen = w;
+            }
+        }
+        if chosen.smaller < SMALLER {
+            return Ok(None);
+        }
+        for part in self.parts(&self.all[chosen.at].set) {
+            if self.weighed(part)?.is_some_and(|w| w.left < chosen.left + CLEAR) {
+                return Ok(None);
+            }
+        }
+        let members = self.all[chosen.at].set.len();
+        let rivals: Vec<usize> = (weighed.iter())
+            .filter(|w| w.at != chosen.at && self.all[w.at].set.len() <= members)
+            .filter(|w| w.left < chosen.left + CLEAR)
+            .map(|w| w.at)
+            .collect();
+        Ok(self.judge.named(chosen.at, &rivals))
+    }
 }

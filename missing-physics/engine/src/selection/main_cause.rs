@@ -183,6 +183,39 @@ impl<'a> Judge<'a> {
         Some(MainCause { rivals: self.rivals(&chosen), chosen })
     }
 
+    /// The sets that leave least of the data they are fitted to, of those that take away nearly all of the misfit there; at most so many.
+    pub(crate) fn nearly_all(&self, most: usize) -> Vec<usize> {
+        let limit = (1.0 - NEARLY_ALL) * self.baseline_seen();
+        let mut order: Vec<(f64, usize)> = (0..self.all.len())
+            .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
+            .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.seen, i)))
+            .filter(|(seen, _)| *seen <= limit)
+            .collect();
+        // A larger set has to leave so much less that it is needed: the smaller ones first.
+        order.sort_by(|a, b| {
+            let size = |i: usize| self.all[i].set.len();
+            size(a.1).cmp(&size(b.1)).then(a.0.total_cmp(&b.0))
+        });
+        order.into_iter().map(|(_, i)| i).take(most).collect()
+    }
+
+    /// What the baseline leaves of the data it is fitted to.
+    fn baseline_seen(&self) -> f64 {
+        self.at(&[]).and_then(|i| self.plain[i].as_ref()).map_or(0.0, |plain| plain.seen)
+    }
+
+    /// A set as the main cause with its rivals, each with the share that it takes away of the data it is fitted to; `None` where it is no
+    /// explanation beside a leftover.
+    pub(crate) fn named(&self, at: usize, rivals: &[usize]) -> Option<MainCause> {
+        let base = self.baseline_seen();
+        let of_seen = |at: usize| {
+            let seen = self.plain[at].as_ref()?.seen;
+            Some(Judged { share: 1.0 - seen / base, ..self.judged(at)? })
+        };
+        let rivals = rivals.iter().filter_map(|&i| of_seen(i)).take(MOST_RIVALS).collect();
+        Some(MainCause { chosen: of_seen(at)?, rivals })
+    }
+
     /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them.
     pub(crate) fn closest(&self) -> Option<Judged> {
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
