@@ -88,8 +88,12 @@ impl BesideLocal<'_> {
 
     /// The main cause where what it leaves is a cause in a part of the data: each member of the set is clearly needed beside that.
     ///
-    /// Such a cause drags the estimates of all runs in which it acts, so that the share that is asked for is of the data that are fitted.
+    /// Such a cause drags the estimates of all runs in which it acts, so that the share that is asked for is of the data that are fitted. Of
+    /// a single run nothing is said: no other shows what holds without the local cause.
     pub(super) fn main_cause(&self) -> Result<Option<MainCause>, PredictError> {
+        if self.problem.rows.len() < 2 {
+            return Ok(None);
+        }
         let close: Vec<usize> = self.judge.nearly_all(CLOSE);
         let weigh = |at: usize| self.weighed(at).transpose();
         let weighed: Vec<Weighed> = close.into_iter().filter_map(weigh).collect::<Result<_, _>>()?;
