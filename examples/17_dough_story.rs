@@ -39,6 +39,8 @@ const INCH_M: f64 = 0.0254;
 /// twelve rolls of five doughs show what has changed.
 const USUAL: DoughKind = DoughKind { axial_flow: 1.0, ..DoughKind::A };
 const DRY: DoughKind = DoughKind { water_g: 2.0, ..USUAL };
+/// Rolls at most of a rollout.
+const MOST_ROLLS: usize = 150;
 /// A dough is put aside once it is this long.
 const LONGEST_M: f64 = 0.2;
 
@@ -297,7 +299,7 @@ impl Done {
         let (mut values, mut missed) = (Vec::new(), 0);
         for inches in &size.goals {
             let seeds = 100 * day + 7..100 * day + 7 + size.rollouts;
-            let done = rollouts(kind, NONE, inches * INCH_M, seeds, &controller)?;
+            let done = rollouts(kind, NONE, inches * INCH_M, seeds, MOST_ROLLS, &controller)?;
             missed += done.iter().filter(|r| r.end != End::Reached).count();
             values.push(done.iter().map(|r| r.rolls.len() as f64).collect());
         }

@@ -38,6 +38,8 @@ struct Size {
     each: [usize; 2],
     /// Of the first rollout.
     seed: u64,
+    /// Rolls at most of a rollout.
+    most: usize,
     goals: Vec<f64>,
     six: u64,
     /// Rollouts of direct optimisation to each goal.
@@ -57,10 +59,20 @@ fn main() -> Result<(), Failure> {
     let seed = 1000 * told("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
     let size = if examples::small() {
         let goals = vec![2.0, 4.0];
-        Size { explored: 120, each: [60, 40], seed, goals, six: 2, twenty: 2, ten: 1, fifteen: 1 }
+        Size { explored: 120, each: [60, 40], seed, most: 100, goals, six: 2, twenty: 2, ten: 1, fifteen: 1 }
     } else {
         let goals = vec![2.0, 4.0, 6.0, 8.0, 10.0];
-        Size { explored: 600, each: [150, 100], seed, goals, six: 6, twenty: 20, ten: 10, fifteen: 15 }
+        Size {
+            explored: 600,
+            each: [150, 100],
+            seed,
+            most: 400,
+            goals,
+            six: 6,
+            twenty: 20,
+            ten: 10,
+            fifteen: 15,
+        }
     };
     let of = |kind, each, seed| explore(kind, NONE, size.explored, each, seed);
     let a = of(DoughKind::A, size.each[0], 1)?;

@@ -57,10 +57,10 @@ fn row(
     name: &str,
     kind: DoughKind,
     inches: f64,
-    seeds: std::ops::Range<u64>,
+    (seeds, most): (std::ops::Range<u64>, usize),
     make: Make<'_>,
 ) -> Result<(f64, Lines), Failure> {
-    let done = rollouts(kind, NONE, inches * INCH_M, seeds, make)?;
+    let done = rollouts(kind, NONE, inches * INCH_M, seeds, most, make)?;
     let tally = Tally::of(&done);
     let (mean, half) = mean_and_half(&tally.rolls);
     print!("  {name:44} {:>14}", format!("{mean:.1} +- {half:.1}"));
@@ -75,7 +75,7 @@ fn gain(before: f64, after: f64) -> f64 {
 /// Wrong models, fixed or refined every five rolls.
 fn refined(name: &str, plans: Plans, size: &Size, [a, c]: [&Learned; 2]) -> Result<Vec<Lines>, Failure> {
     println!("a, {name}: wrong model, fixed or refined every 5 rolls; {} rollouts", size.fifteen);
-    let seeds = || size.seed + 200..size.seed + 200 + size.fifteen;
+    let seeds = || (size.seed + 200..size.seed + 200 + size.fifteen, size.most);
     let (mut gains, mut lines) = (Vec::new(), Vec::new());
     for (kind, inches, wrong, what) in [
         (DoughKind::A, 6.0, c, "dough A to 6 in, model C"),
@@ -125,7 +125,7 @@ fn matched(
         let model = Matched::new(&known, *stiffness)?;
         // Of the two known doughs the one whose outcomes scatter more says how unsure a mixture is.
         let objective = plans.with(nearer);
-        let seeds = || size.seed + 300..size.seed + 300 + size.ten;
+        let seeds = || (size.seed + 300..size.seed + 300 + size.ten, size.most);
         let what = format!("dough {name} to {inches} in");
         let (before, _) = row(&format!("{what}, wrong model"), kind, inches, seeds(), wrong)?;
         let (after, drawn) =

@@ -57,7 +57,7 @@ pub(crate) fn figure_7_4(size: &Size, a: &Learned) -> Result<Vec<Bars>, Failure>
         print!("{name:26}");
         for goal in &size.goals {
             let seeds = size.seed + 100..size.seed + 100 + count;
-            let tally = Tally::of(&rollouts(DoughKind::A, NONE, goal * INCH_M, seeds, make)?);
+            let tally = Tally::of(&rollouts(DoughKind::A, NONE, goal * INCH_M, seeds, size.most, make)?);
             let (mean, half) = mean_and_half(&tally.rolls);
             print!("{:>16}", format!("{mean:.1} +- {half:.1}"));
             bars.values.push((mean, half));

@@ -14,8 +14,6 @@ use rayon::prelude::*;
 
 /// A dough is put aside once it is this long: further on it leaves the picture.
 const LONGEST_M: f64 = 0.26;
-/// Rolls at most of a rollout, and on a small run.
-const MOST_ROLLS: [usize; 2] = [400, 100];
 
 /// Random rolls on fresh doughs, one list a dough; each is rolled at most so many times.
 ///
@@ -66,7 +64,7 @@ pub fn rolls(doughs: &[Vec<Rolled>]) -> Vec<Roll> {
 /// A policy made anew for each rollout.
 pub type Make<'a> = &'a (dyn Fn(u64) -> Result<Box<dyn Policy>, RolloutError> + Sync);
 
-/// Rollouts to a length, each on a rig of its own, in order.
+/// Rollouts to a length, each of so many rolls at most on a rig of its own, in order.
 ///
 /// # Errors
 /// The first [`RolloutError`].
@@ -75,16 +73,14 @@ pub fn rollouts(
     effects: Effects,
     length_m: f64,
     seeds: std::ops::Range<u64>,
+    most_rolls: usize,
     make: Make<'_>,
 ) -> Result<Vec<Rollout>, RolloutError> {
     seeds
         .into_par_iter()
         .map(|seed| {
             let mut rig = FakeRig::new(kind, effects, seed);
-            let setup = Setup {
-                most_rolls: MOST_ROLLS[usize::from(crate::small())],
-                ..Setup::of(rig.camera_in_world())
-            };
+            let setup = Setup { most_rolls, ..Setup::of(rig.camera_in_world()) };
             let goal = Goal::cylinder(length_m, kind.volume_m3)?;
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             setup.run(&mut rig, &mut *make(seed)?, &goal, kind.volume_m3, &mut rng)
