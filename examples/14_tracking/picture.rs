@@ -24,12 +24,12 @@ pub(crate) fn picture(bars: &[Bar]) -> Result<String, Failure> {
             write!(svg, "<rect x='{x}' y='{y:.1}' width='36' height='{h:.1}' fill='{colour}'/>")?;
         }
         let h = 240.0 * bar.energy / most;
-        let name = ["still", "1", "2", "2 n", "filter", "told"][bar.tracker];
+        let name = ["still", "1", "2", "2 n", "filter", "oracle"][bar.tracker];
         write!(
             svg,
             "<text x='{x}' y='336'>{name}</text><rect x='{right}' y='{:.1}' width='20' height='{h:.1}' fill='#1f77b4'/><text x='{right}' y='336'>{}</text>",
             320.0 - h,
-            ["0", "1", "2", "n", "f", "t"][bar.tracker]
+            ["0", "1", "2", "n", "f", "o"][bar.tracker]
         )?;
         if bar.tracker == 0 {
             write!(

@@ -24,7 +24,7 @@ pub(crate) const TRACKERS: [&str; 6] = [
     "2, with chance",
     "2, no farther than needed",
     "a particle filter",
-    "the filter, told outliers",
+    "the filter, an oracle",
 ];
 
 /// One throw with one tracker.
