@@ -48,7 +48,7 @@ fn a_variance_and_its_growth_are_recovered() {
         let [small, large] = [0.0, 0.01].map(|change| found.sigma_m(change));
         assert!((large / base_m.hypot(0.01 * growth) - 1.0).abs() < 0.06 && small <= large);
     }
-    // With a twentieth of the rolls of [Matl 2021] it is as near as these can tell: three sigma of a standard deviation.
+    // From as few rolls as [Matl 2021] has of a dough, within 15 %.
     let truth = VarianceGrowth { base_m: 1e-3, growth: 0.4 };
     for seed in 0..20 {
         let found = VarianceGrowth::fit(&made(600, truth, seed)).unwrap();

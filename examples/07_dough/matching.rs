@@ -123,7 +123,7 @@ fn matched(
     ];
     for ((name, kind, inches, wrong, nearer), stiffness) in doughs.into_iter().zip(stiffness) {
         let model = Matched::new(&known, *stiffness)?;
-        // Of the two known doughs the one whose outcomes scatter more says how unsure a mixture is.
+        // A mixture is taken for as unsure as the known dough whose rolls scatter more.
         let objective = plans.with(nearer);
         let seeds = || (size.seed + 300..size.seed + 300 + size.ten, size.most);
         let what = format!("dough {name} to {inches} in");

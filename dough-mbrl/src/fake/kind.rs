@@ -7,13 +7,13 @@ pub struct DoughKind {
     pub water_g: f64,
     /// Its volume, m^3.
     pub volume_m3: f64,
-    /// How easily it flows along its axis: part of the friction hill's axial share of a squeeze, in (0, 1]. The rest widens it, and what
-    /// presses bear, and so its stiffness, is the same.
+    /// How easily it flows along its axis: part of the friction hill's axial share of a squeeze, in (0, 1]; above 1, or not above 0,
+    /// counts as 1. The rest widens it, and what presses bear, and so its stiffness, is the same.
     pub axial_flow: f64,
 }
 
-/// Axial flow of doughs A and C: found once, by random rolls on seeds 500 to 507, so that they take dough A to 10 inches in about 150 rolls
-/// and dough C, which lengthens far less under the same band, to 4 inches in about 100: the lengths of [Matl 2021]'s random rollouts. The
+/// Axial flow of doughs A and C: found once, on seeds that no example uses, so that random rolls take dough A to 10 inches in about 150 rolls and
+/// dough C, which gives way far less under the same band, to 4 inches in about 100: as many as a random rollout has in [Matl 2021]. The
 /// wetter a dough, the more it sticks to band and table, which hold it back.
 const AXIAL_FLOW: [f64; 2] = [0.275, 0.9];
 
