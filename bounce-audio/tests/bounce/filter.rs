@@ -1,39 +1,13 @@
 //! The particle filter: against least squares where all is linear, misheard impacts that later ones give away, and what it recovers from.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-use bounce_audio::track::{
-    FilterSettings, HearingError, ParticleFilter, Seen, TrackError, Tracker, Workspace,
-};
+use bounce_audio::track::{FilterSettings, HearingError, ParticleFilter, Seen, TrackError, Tracker};
 use nalgebra::{DMatrix, DVector};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
-const G: f64 = 9.80665;
-const SPACE: Workspace =
-    Workspace { plane_x_m: 0.55, y_m: [0.0, 0.55], z_m: [0.02, 0.5], rest_z_m: 0.1, gravity_m_s2: G };
-
-fn dice(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
-}
+use crate::track::{SPACE, dice, straight};
 
 fn filter(e: f64, log10_kappa: f64) -> ParticleFilter {
     ParticleFilter::new(&[[e, log10_kappa]], SPACE, FilterSettings::default()).unwrap()
-}
-
-/// Impacts of a ball that goes straight on, and where it goes through the plane (y, z).
-fn straight(e: f64, dy: f64) -> (Vec<Seen>, [f64; 2]) {
-    let (mut x, mut y, mut t) = (0.05, 0.2, 1.0);
-    let (mut dx, mut dy, mut dt) = (0.2, dy, 0.36);
-    let mut seen = vec![Seen { t_s: t, place_m: [x, y] }];
-    loop {
-        if x + dx > 0.55 {
-            let s = (0.55 - x) / dx * dt;
-            return (seen, [y + dy * s / dt, 0.5 * G * s * (dt - s)]);
-        }
-        (x, y, t) = (x + dx, y + dy, t + dt);
-        seen.push(Seen { t_s: t, place_m: [x, y] });
-        (dx, dy, dt) = (e * e * dx, e * e * dy, e * dt);
-    }
 }
 
 fn run(tracker: &mut ParticleFilter, impacts: &[Seen], seed: u64) -> [f64; 2] {
@@ -152,7 +126,7 @@ fn what_was_misheard_is_as_probable_as_all_combinations_say() {
 
 #[test]
 fn a_ball_without_chance_is_met() {
-    let (seen, at) = straight(0.85, 0.06);
+    let (seen, [_, at @ ..]) = straight(0.85, 0.06);
     let mut tracker = filter(0.85, 4.0);
     let paddle = run(&mut tracker, &seen, 2);
     let off = (paddle[0] - at[0]).hypot(paddle[1] - at[1]);
@@ -166,7 +140,7 @@ fn a_ball_without_chance_is_met() {
 /// Whichever impact is misheard, the first two included, later ones give it away, and the paddle is where the ball comes.
 #[test]
 fn a_misheard_impact_is_given_up_when_later_ones_contradict_it() {
-    let (seen, at) = straight(0.9, 0.05);
+    let (seen, [_, at @ ..]) = straight(0.9, 0.05);
     assert!(seen.len() >= 4);
     for wrong in 0..2 {
         for off in [[0.0, 0.12], [0.1, -0.08], [-0.1, 0.1]] {
@@ -189,7 +163,7 @@ fn a_misheard_impact_is_given_up_when_later_ones_contradict_it() {
 /// What is no impact does not move the ball, and an impact that was not heard leaves no gap.
 #[test]
 fn sounds_too_many_and_too_few() {
-    let (seen, at) = straight(0.85, 0.03);
+    let (seen, [_, at @ ..]) = straight(0.85, 0.03);
     let near = |p: [f64; 2]| (p[0] - at[0]).hypot(p[1] - at[1]);
     let mut tracker = filter(0.85, 3.8);
     let mut more = seen.clone();
@@ -235,7 +209,7 @@ fn the_same_seed_gives_the_same_bits() {
 
 #[test]
 fn it_recovers_from_what_cannot_be() {
-    let (seen, at) = straight(0.85, 0.03);
+    let (seen, [_, at @ ..]) = straight(0.85, 0.03);
     let mut tracker = filter(0.85, 3.8);
     let mut rng = dice(9);
     assert_eq!(tracker.state(), None);

@@ -20,10 +20,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const G: f64 = 9.80665;
-const SPACE: Workspace =
+pub(crate) const SPACE: Workspace =
     Workspace { plane_x_m: 0.55, y_m: [0.0, 0.55], z_m: [0.02, 0.5], rest_z_m: 0.1, gravity_m_s2: G };
 
-fn dice(seed: u64) -> ChaCha8Rng {
+pub(crate) fn dice(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
@@ -34,7 +34,7 @@ fn learned(e: f64, log10_kappa: f64) -> NextBounce {
 }
 
 /// Impacts of a ball that goes straight on: x at 0.05, then flights of e^2; with the crossing of the plane (s, y, z).
-fn straight(e: f64, dy: f64) -> (Vec<Seen>, [f64; 3]) {
+pub(crate) fn straight(e: f64, dy: f64) -> (Vec<Seen>, [f64; 3]) {
     let (mut x, mut y, mut t) = (0.05, 0.2, 1.0);
     let (mut dx, mut dy, mut dt) = (0.2, dy, 0.36);
     let mut seen = vec![Seen { t_s: t, place_m: [x, y] }];

@@ -6,16 +6,13 @@ use crate::locate::locations::local_cause;
 use crate::model::PredictError;
 use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
-use crate::selection::main_cause::{Judge, MainCause};
+use crate::selection::main_cause::{Judge, MainCause, SMALLER};
 
 /// Twice the log Bayes factor from which on a local cause is preferred (Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572, "very
 /// strong").
 const CLEAR: f64 = 10.0;
 
-/// What a main cause leaves must be so many times larger than what is left of it with a cause in a part of the data: what that does not
-/// take away is no local cause.
-const SMALLER: f64 = 3.0;
-/// Sets that leave least of the data they are fitted to, beside which a local cause is sought.
+/// Sets beside which a local cause is sought: the smallest first, and of one size those that leave least.
 const CLOSE: usize = 12;
 
 /// Sets of mechanisms with the best single cause that acts within an interval, or in some runs, beside them.
@@ -110,18 +107,23 @@ impl BesideLocal<'_> {
                 chosen = w;
             }
         }
+        // What a local cause does not take away most of has another reason.
         if chosen.smaller < SMALLER {
             return Ok(None);
         }
+        let as_likely = |w: &Weighed| w.left < chosen.left + CLEAR;
         for part in self.parts(&self.all[chosen.at].set) {
-            if self.weighed(part)?.is_some_and(|w| w.left < chosen.left + CLEAR) {
+            let needless = match weighed.iter().find(|w| w.at == part) {
+                Some(known) => as_likely(known),
+                None => self.weighed(part)?.as_ref().is_some_and(as_likely),
+            };
+            if needless {
                 return Ok(None);
             }
         }
         let members = self.all[chosen.at].set.len();
         let rivals: Vec<usize> = (weighed.iter())
-            .filter(|w| w.at != chosen.at && self.all[w.at].set.len() <= members)
-            .filter(|w| w.left < chosen.left + CLEAR)
+            .filter(|w| w.at != chosen.at && self.all[w.at].set.len() <= members && as_likely(w))
             .map(|w| w.at)
             .collect();
         Ok(self.judge.named(chosen.at, &rivals))

@@ -22,8 +22,8 @@ const NEARLY_ALL: f64 = 0.9;
 /// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
 const NEEDED: f64 = 5.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
-/// be imitating the leftover.
-const SMALLER: f64 = 3.0;
+/// be imitating the leftover. So must what a set leaves be with a cause in a part of the data.
+pub(crate) const SMALLER: f64 = 3.0;
 /// What an explanation may leave of the baseline's misfit of unseen data.
 const LEAST: f64 = 0.5;
 /// Noise alone moves a sum of squares by so many standard deviations at most.
@@ -183,7 +183,8 @@ impl<'a> Judge<'a> {
         Some(MainCause { rivals: self.rivals(&chosen), chosen })
     }
 
-    /// The sets that leave least of the data they are fitted to, of those that take away nearly all of the misfit there; at most so many.
+    /// The sets that take away nearly all of the misfit of the data they are fitted to, at most so many: small ones before larger ones, and of one
+    /// size those that leave least.
     pub(crate) fn nearly_all(&self, most: usize) -> Vec<usize> {
         let limit = (1.0 - NEARLY_ALL) * self.baseline_seen();
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
@@ -191,7 +192,6 @@ impl<'a> Judge<'a> {
             .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.seen, i)))
             .filter(|(seen, _)| *seen <= limit)
             .collect();
-        // A larger set has to leave so much less that it is needed: the smaller ones first.
         order.sort_by(|a, b| {
             let size = |i: usize| self.all[i].set.len();
             size(a.1).cmp(&size(b.1)).then(a.0.total_cmp(&b.0))
