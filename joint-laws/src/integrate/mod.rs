@@ -115,12 +115,24 @@ const MOST_EVENTS: usize = 40;
 /// A state beyond this has blown up.
 const LARGEST: f64 = 1e12;
 
+/// Errors by which steps are made shorter.
+#[derive(Debug, Clone)]
+struct Control {
+    /// Steps are not cut below this, s.
+    finest_s: f64,
+    /// The largest error of each state in a step.
+    errors: Vec<f64>,
+    /// The step to be tried next, s.
+    next_s: f64,
+}
+
 /// Follows a machine's motion; holds the room that this takes.
 #[derive(Debug, Clone)]
 pub struct Integrator<T> {
     scheme: Scheme,
     /// Largest step, s.
     step_s: f64,
+    control: Option<Control>,
     modes: Vec<Mode>,
     full: Vec<bool>,
     beyond: Vec<bool>,
@@ -143,6 +155,7 @@ impl<T: Number> Integrator<T> {
         Self {
             scheme,
             step_s,
+            control: None,
             modes: Vec::new(),
             full: Vec::new(),
             beyond: Vec::new(),
@@ -154,6 +167,18 @@ impl<T: Number> Integrator<T> {
             point: room(),
             spare: room(),
         }
+    }
+
+    /// Cuts steps, to `finest_s` at the least, where the embedded scheme differs by more than a state's error; of a method that has none
+    /// all steps are as fine. States without an error are not asked.
+    #[must_use]
+    pub fn controlled(mut self, finest_s: f64, errors: Vec<f64>) -> Self {
+        if self.scheme.error.is_empty() {
+            self.step_s = finest_s;
+        } else {
+            self.control = Some(Control { finest_s, errors, next_s: finest_s });
+        }
+        self
     }
 
     /// Finds out which joints rest, which levels are full and which edges are passed: at the beginning, and wherever an input jumps.
@@ -417,31 +442,45 @@ impl<T: Number> Integrator<T> {
             let until = if k as f64 >= steps { to } else { from + (to - from) * (k as f64 / steps) };
             let mut events = 0;
             while *t < until {
-                let h = until - *t;
+                let mut next = self.next(*t, until);
+                let mut h = next - *t;
                 self.step(machine, *t, x, h);
-                check(&self.trial, until)?;
+                while let Some(shorter) = self.too_long(h) {
+                    (next, h) = (*t + shorter, shorter);
+                    self.step(machine, *t, x, h);
+                }
+                check(&self.trial, next)?;
                 let first = if events < MOST_EVENTS { self.first(machine, *t, x, h) } else { None };
-                let end = first.map_or(until, |(_, part)| *t + part * h);
-                while let Some(r) = reads.next_if(|r| r.t_s <= end) {
+                if let Some((_, part)) = first {
+                    // The step ends at the event, which laws that change near it may have moved.
+                    h *= part;
+                    next = *t + h;
+                    self.step(machine, *t, x, h);
+                    if self.too_long(h).is_some() {
+                        continue;
+                    }
+                }
+                while let Some(r) = reads.next_if(|r| r.t_s <= next) {
                     let by = shift(r);
-                    if r.t_s == until && by == T::from(0.0) {
+                    if r.t_s == next && by == T::from(0.0) {
                         read(machine, r, &self.trial);
                         continue;
                     }
+                    let part = if h > 0.0 { (r.t_s - *t) / h } else { 0.0 };
                     let mut point = std::mem::take(&mut self.point);
-                    self.within_moved(x, h, (r.t_s - *t) / h, by, &mut point);
+                    self.within_moved(x, h, part, by, &mut point);
                     read(machine, r, &point);
                     self.point = point;
                 }
-                if let Some((event, part)) = first {
+                if let Some((event, _)) = first {
                     events += 1;
-                    self.step(machine, *t, x, part * h);
                     x.copy_from_slice(&self.trial);
-                    *t = end + self.happen(machine, event, end, x, h);
+                    *t = next + self.happen(machine, event, next, x, h);
                     self.fresh = false;
                 } else {
                     x.copy_from_slice(&self.trial);
-                    *t = until;
+                    *t = next;
+                    events = 0;
                     self.fresh = self.scheme.last_is_end;
                     if self.fresh {
                         let last = self.rates.len() - 1;
@@ -459,6 +498,44 @@ impl<T: Number> Integrator<T> {
             self.point = point;
         }
         Ok(())
+    }
+
+    /// Where the next step ends, on the way to `until`.
+    fn next(&self, t: f64, until: f64) -> f64 {
+        match &self.control {
+            // Two equal steps rather than a long one and the rest.
+            Some(control) if t + control.next_s < until => {
+                t + control.next_s.min((0.5 * (until - t)).max(control.finest_s))
+            }
+            _ => until,
+        }
+    }
+
+    /// The shorter step to be taken in place of the trial step, where that errs by too much; else the length of the next one is set.
+    fn too_long(&mut self, h: f64) -> Option<f64> {
+        // Parts of the step that the estimate allows, and how much one step may differ from the one before.
+        const SAFE: f64 = 0.9;
+        const SHRINK: f64 = 0.2;
+        const GROW: f64 = 5.0;
+        let control = self.control.as_mut()?;
+        let of_state = |(state, most): (usize, &f64)| {
+            let weighed = self.scheme.error.iter().zip(&self.rates).map(|(w, rates)| w * rates[state].re());
+            (h * weighed.sum::<f64>() / most).abs()
+        };
+        // What is no number is too large.
+        let larger = |a: f64, b: f64| if b <= a { a } else { b };
+        let error = control.errors.iter().enumerate().map(of_state).fold(0.0, larger);
+        let factor = SAFE * error.powf(-0.2);
+        let wanted =
+            (h * if factor.is_nan() { SHRINK } else { factor.clamp(SHRINK, GROW) }).max(control.finest_s);
+        if error <= 1.0 || h <= control.finest_s {
+            // A step that ended early for another reason says little of the next.
+            control.next_s =
+                if h < control.next_s && factor >= 1.0 { control.next_s.max(wanted) } else { wanted };
+            return None;
+        }
+        control.next_s = wanted;
+        Some(wanted)
     }
 
     /// The first event within the trial step, and in which part of it.

@@ -19,6 +19,8 @@ pub(super) struct Scheme {
     pub(super) stages: &'static [&'static [f64]],
     /// Each stage's weight in the state at a part of the step: coefficients of its powers from the first.
     pub(super) weights: &'static [[f64; 4]],
+    /// Each stage's weight in the difference to the embedded scheme of the next lower order; none, where a method has none.
+    pub(super) error: &'static [f64],
     /// Whether the last stage stands at the end of the step.
     pub(super) last_is_end: bool,
 }
@@ -35,6 +37,7 @@ impl Method {
                     [0.0, 1.0, -2.0 / 3.0, 0.0],
                     [0.0, -0.5, 2.0 / 3.0, 0.0],
                 ],
+                error: &[],
                 last_is_end: false,
             },
             Self::DormandPrince => Scheme {
@@ -48,6 +51,7 @@ impl Method {
                     &[END[0], END[1], END[2], END[3], END[4], END[5]],
                 ],
                 weights: &WEIGHTS,
+                error: &ERROR,
                 last_is_end: true,
             },
         }
@@ -56,6 +60,9 @@ impl Method {
 
 /// Dormand and Prince's weights at the end of a step.
 const END: [f64; 7] = [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0, 0.0];
+/// These less the weights of the embedded scheme of the fourth order.
+const ERROR: [f64; 7] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
 /// What their interpolant has beyond Hermite's.
 const BEYOND: [f64; 7] = [
     -12715105075.0 / 11282082432.0,
@@ -98,6 +105,24 @@ mod tests {
             (x - (part * h).sin().exp()).abs()
         };
         [error(1.0), (1..20).map(|k| error(f64::from(k) / 20.0)).fold(0.0, f64::max)]
+    }
+
+    /// The difference to the embedded scheme falls as that scheme's error does, and is larger than the scheme's own error.
+    #[test]
+    fn the_estimate_is_of_the_fourth_order() {
+        let estimate = |h: f64| {
+            let scheme = Method::DormandPrince.scheme();
+            let rate = |t: f64, x: f64| x * t.cos();
+            let mut rates = vec![rate(0.0, 1.0)];
+            for (k, row) in scheme.stages.iter().enumerate() {
+                let x = 1.0 + h * row.iter().zip(&rates).map(|(a, r)| a * r).sum::<f64>();
+                rates.push(rate(h * scheme.nodes[k + 1], x));
+            }
+            (h * scheme.error.iter().zip(&rates).map(|(w, r)| w * r).sum::<f64>()).abs()
+        };
+        let (coarse, fine) = (estimate(0.2), estimate(0.1));
+        assert!((coarse / fine).log2() > 4.6, "{coarse}, {fine}");
+        assert!(coarse > errors(Method::DormandPrince, 0.2)[0]);
     }
 
     /// Halving the step divides a step's error by two to the power of the order and one more.

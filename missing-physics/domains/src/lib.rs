@@ -9,6 +9,10 @@ pub mod dough_roll;
 #[cfg(any(feature = "indentation", feature = "trajectory"))]
 mod dual;
 #[cfg(any(feature = "bounce", feature = "grain-pour", feature = "liquid-tilt"))]
+#[cfg_attr(
+    not(all(feature = "bounce", feature = "grain-pour", feature = "liquid-tilt")),
+    allow(dead_code, reason = "no domain draws all of it")
+)]
 mod figures;
 #[cfg(feature = "grain-pour")]
 pub mod grain_pour;

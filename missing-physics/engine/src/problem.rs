@@ -42,7 +42,7 @@ pub(crate) struct ParameterTable {
 }
 
 /// Models with more mechanisms than this know many.
-const MANY: usize = 20;
+const MANY: usize = 16;
 /// The same where a program is asked, each of whose answers takes milliseconds.
 const MANY_FOR_A_PROGRAM: usize = 8;
 

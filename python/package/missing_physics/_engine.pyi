@@ -46,7 +46,12 @@ class Source:
 
 @final
 class Simulator:
-    def __new__(cls, predict: Callable[[dict[str, Any], dict[str, NDArray[np.float64]]], Any], batched: bool) -> Simulator: ...
+    def __new__(
+        cls,
+        predict: Callable[[dict[str, Any], dict[str, NDArray[np.float64]]], Any]
+        | Callable[[dict[str, Any], dict[str, NDArray[np.float64]], dict[str, Any]], Any],
+        batched: bool,
+    ) -> Simulator: ...
 
 @final
 class Prior:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _engine
 from ._forces import Force, Joint, forces
@@ -163,7 +164,11 @@ class Model:
         if not self.joints:
             return _engine.Simulator(self.predict, self.batched)
         predict = self.predict
-        return _engine.Simulator(lambda parameters, inputs, acts: predict(parameters, inputs, forces(acts)), self.batched)
+
+        def with_forces(parameters: dict[str, Any], inputs: dict[str, NDArray[np.float64]], acts: dict[str, Any]) -> Any:
+            return predict(parameters, inputs, forces(acts))
+
+        return _engine.Simulator(with_forces, self.batched)
 
 
 def _only(runs: Runs, wanted: Sequence[str]) -> Runs:

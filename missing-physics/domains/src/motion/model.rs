@@ -10,7 +10,7 @@ use missing_physics::model::{
 
 use super::effects::{Effects, Role};
 use super::equations::{Equations, Start};
-use super::machine::Driven;
+use super::machine::{Driven, Force};
 use super::scales::Scales;
 use super::setting::{Setting, Shared};
 use super::windows;
@@ -18,6 +18,10 @@ use crate::mechanics::JointEffect;
 
 /// Steps of the integration in the shortest time in which a law changes.
 const STEPS_IN_SHORTEST: f64 = 2.0;
+/// The largest error of a state in a step that is cut for a law's sake, in parts of its typical size.
+const ERROR: f64 = 1e-6;
+/// The same of the deflection of a spring that yields, in parts of where it yields.
+const DEFLECTION_ERROR: f64 = 1e-4;
 /// Steps are cut at the most to this part of the time between rows for a law's sake.
 const FINEST_FOR_LAWS: f64 = 0.125;
 
@@ -251,11 +255,29 @@ impl MotionModel {
         shared.setting(values)
     }
 
-    /// The largest step under these laws, s: halved until it resolves them.
+    /// The finest step under these laws, s: the model's, halved until it resolves them.
     fn step_s<T>(&self, setting: &Setting<T>) -> f64 {
         let wanted = (setting.shortest_s / STEPS_IN_SHORTEST).max(FINEST_FOR_LAWS * self.scales.step_s);
         let halvings = (self.pace.step_s / wanted).log2().ceil();
         self.pace.step_s * 0.5_f64.powi(halvings.max(0.0) as i32)
+    }
+
+    /// What follows the motion under these laws: steps of the model's pace, and where laws change faster than these, as short as the error
+    /// of each asks for.
+    fn integrator<T: Number>(&self, setting: &Setting<T>, states: usize) -> Integrator<T> {
+        let Pace { method, step_s } = self.pace;
+        let finest_s = self.step_s(setting);
+        if finest_s >= step_s {
+            return Integrator::new(method, states, step_s);
+        }
+        let mut errors: Vec<f64> = self.scales.states.iter().map(|size| ERROR * size).collect();
+        errors.resize(states, f64::INFINITY);
+        for force in setting.laws.iter().flat_map(|laws| &laws.forces) {
+            if let Force::Yielding(_, yields, state, _) = force {
+                errors[*state] = DEFLECTION_ERROR * yields.re().abs();
+            }
+        }
+        Integrator::new(Method::DormandPrince, states, step_s).controlled(finest_s, errors)
     }
 
     /// Leads a machine through a run; `at_row` is called wherever a row is read: of all outputs without a delay (shift 0), or of one
@@ -269,14 +291,13 @@ impl MotionModel {
     ) -> Result<(), String> {
         let times = &run.inputs[0];
         let Some(&begin) = times.first() else { return Ok(()) };
-        let step_s = self.step_s(&setting);
         let states = self.equations.states.len() + setting.further_states;
+        let mut integrator = self.integrator(&setting, states);
         let mut x = self.start(run, nuisance, states);
         let delayed = setting.drives.iter().any(|d| d.1);
         let (reads, shifts) = readings(times, &setting.delays);
         let mut machine = self.machine(run, setting, &x);
         let breaks = self.breaks(&mut machine, begin, delayed);
-        let mut integrator = Integrator::new(self.pace.method, states, step_s);
         let blown = |e: joint_laws::integrate::Diverged| {
             let name = self.equations.states.get(e.state).map_or("a deflection", |s| s.name.as_str());
             format!("{name} is {:.3e} at t = {:.6} s", e.value, e.t_s)

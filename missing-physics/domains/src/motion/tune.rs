@@ -13,6 +13,7 @@ use super::growth::too_long;
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range};
 use super::windows::{Thinned, cut, rows, thin};
+use crate::mechanics::Clock;
 
 /// The coarsest step of the integration, in rows.
 const COARSEST: f64 = 16.0;
@@ -182,11 +183,10 @@ fn by_the_rows(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -
     }
 }
 
+/// Median time between two rows, s.
 fn median_step(recording: &Recording) -> f64 {
-    let mut steps: Vec<f64> =
-        recording.runs.iter().flat_map(|r| r.inputs[0].windows(2).map(|w| w[1] - w[0])).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+    let step_s = Clock::of(&recording.runs).step_s;
+    if step_s > 0.0 { step_s } else { 1.0 }
 }
 
 /// The coarsest pace that is worth a try: long steps where inputs do not end them.
@@ -355,12 +355,11 @@ fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) -> Result<S
     let column = |pick: &dyn Fn(&Run) -> &Vec<f64>| Range {
         range: range(recording.runs.iter().flat_map(|r| pick(r).iter().copied())),
     };
-    let duration = |r: &Run| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0].first().unwrap_or(&0.0);
     let scales = Scales {
         inputs: (0..model.equations().inputs.len()).map(|k| column(&|r| &r.inputs[1 + k])).collect(),
         outputs: (0..recording.channels.len()).map(|k| column(&|r| &r.outputs[k])).collect(),
         step_s: median_step(recording),
-        duration_s: recording.runs.iter().map(duration).fold(0.0, f64::max),
+        duration_s: Clock::of(&recording.runs).duration_s,
         ..Scales::default()
     };
     Ok(scales.measure(model.equations(), &all, &rates))

@@ -22,6 +22,8 @@ const STALLED: f64 = 1e-4;
 const NO_GAIN: f64 = 1e-6;
 /// Gain of a shortened step, in the same units, that is next to none.
 const HARDLY: f64 = 1e-3;
+/// Gain of a step, promised and had, in the same units, at which a fit is at its end.
+const SETTLED: f64 = 1e-5;
 /// Shortened steps in a row that gain next to nothing, after which a fit is at its end: dry friction and jumps leave kinks.
 const PATIENCE: usize = 3;
 
@@ -98,7 +100,7 @@ pub(crate) fn solve_within(
     let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
     for _ in 0..iterations {
         // Where a fit leaves many times the noise, what a step gains counts in units of that.
-        let left = if many { (linear.chi2 / values.max(1) as f64).max(1.0) } else { 1.0 };
+        let left = (linear.chi2 / values.max(1) as f64).max(1.0);
         let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping);
         let predicted = step.predicted;
         promised = predicted;
@@ -110,21 +112,20 @@ pub(crate) fn solve_within(
         }
         // A shortened step often fails as well: it is not worth its derivatives before it goes down.
         let at = (&step.shared[..], &step.nuisance[..]);
-        let promises = !many
-            || damping == 0.0
+        let promises = damping == 0.0
             || sum_of_squares(problem, selection, noise, at.0, at.1).is_ok_and(|next| next <= linear.chi2);
         let next = promises.then(|| linearise(problem, selection, noise, at.0, at.1));
         match next.transpose().ok().flatten() {
             Some(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
                 let gained = linear.chi2 - next.chi2;
                 (shared, nuisance, linear) = (step.shared, step.nuisance, next);
-                hardly = if many && damping > 0.0 && gained < HARDLY * left { hardly + 1 } else { 0 };
+                hardly = if damping > 0.0 && gained < HARDLY * left { hardly + 1 } else { 0 };
                 if hardly == PATIENCE {
                     converged = predicted < STALLED * (1.0 + linear.chi2);
                     break;
                 }
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
-                if gained < 1e-7 * left && predicted < 1e-5 * left {
+                if gained < SETTLED * left && predicted < SETTLED * left {
                     converged = true;
                     break;
                 }

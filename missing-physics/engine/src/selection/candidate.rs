@@ -1,7 +1,7 @@
 //! A set of mechanisms, fitted from several starts.
 
 use crate::fit::alternate::fit;
-use crate::fit::gauss_newton::solve;
+use crate::fit::gauss_newton::{solve, solve_within};
 use crate::fit::optimum::Fit;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
@@ -10,6 +10,11 @@ use crate::selection::evidence::evidence;
 
 /// Whole numbers that are less likely than the best by more than this logarithm (1 in 20) are ruled out.
 const OPEN: f64 = 3.0;
+
+/// Starts of one set, with the same whole numbers, that are fitted to the end.
+const FINALISTS: usize = 3;
+/// Steps after which those are chosen of more.
+const HEAT: usize = 6;
 
 /// A set of mechanisms, fitted.
 #[derive(Debug, Clone)]
@@ -114,9 +119,10 @@ fn fits(
 ) -> Result<Vec<Fit>, PredictError> {
     let mut best_of: Vec<(Vec<f64>, Fit)> = Vec::new();
     let mut failure = None;
-    for start in starts {
+    let begun = begun(problem, selection, integers, near, starts);
+    for (start, nuisance) in &begun {
         let numbers: Vec<f64> = integers.iter().map(|&slot| start[slot]).collect();
-        match solve(problem, selection, &near.noise, start, &near.nuisance) {
+        match solve(problem, selection, &near.noise, start, nuisance) {
             Ok(fit) => match best_of.iter_mut().find(|(n, _)| *n == numbers) {
                 Some((_, best)) if fit.chi2 < best.chi2 - 1e-9 => *best = fit,
                 Some(_) => {}
@@ -137,6 +143,39 @@ fn fits(
         return Err(failure.unwrap_or_else(none));
     }
     Ok(fits)
+}
+
+/// Where fits go on, shared and nuisance parameters: of many starts with the same whole numbers those that are best after some steps.
+fn begun(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    integers: &[usize],
+    near: &Fit,
+    starts: &[Vec<f64>],
+) -> Vec<(Vec<f64>, Vec<Vec<f64>>)> {
+    let numbers = |start: &[f64]| -> Vec<f64> { integers.iter().map(|&slot| start[slot]).collect() };
+    let mut by_numbers: Vec<(Vec<f64>, Vec<&Vec<f64>>)> = Vec::new();
+    for start in starts {
+        match by_numbers.iter_mut().find(|(n, _)| *n == numbers(start)) {
+            Some((_, alike)) => alike.push(start),
+            None => by_numbers.push((numbers(start), vec![start])),
+        }
+    }
+    let mut begun = Vec::new();
+    for (_, alike) in by_numbers {
+        let few = alike.len() <= FINALISTS;
+        if !few {
+            let some = |start: &&Vec<f64>| {
+                solve_within(HEAT, problem, selection, &near.noise, (start, &near.nuisance)).ok()
+            };
+            let mut fits: Vec<Fit> = alike.iter().filter_map(some).collect();
+            fits.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+            begun.extend(fits.into_iter().take(FINALISTS).map(|fit| (fit.shared, fit.nuisance)));
+        } else {
+            begun.extend(alike.into_iter().map(|start| (start.clone(), near.nuisance.clone())));
+        }
+    }
+    begun
 }
 
 impl Candidate {
