@@ -3,10 +3,11 @@
 
 use joint_laws::signal::{Between, Drive, Signal};
 use missing_physics::data::Run;
-use missing_physics::model::{Mechanism, ParameterRef, Quantity, SpecBuilder, UNBOUNDED};
+use missing_physics::model::{Quantity, SpecBuilder, UNBOUNDED};
 use serde::Serialize;
 
-use crate::mechanics::{self, Clock, Declares, InputEffect, JointEffect, JointHas, JointSizes, JointUnits};
+use super::carrier::{Carrier, Part};
+use crate::mechanics::{self, Clock, InputEffect, JointEffect, JointHas, JointSizes, JointUnits};
 use crate::recording::{Header, ReadError, Section, quoted};
 
 /// A lag below this part of the time between rows is a delay.
@@ -32,15 +33,6 @@ enum Role {
     Input(usize, InputEffect),
 }
 
-/// A parameter of a mechanism: where its value stands, and where it is off.
-#[derive(Debug, Clone, Copy)]
-struct Part {
-    role: Role,
-    slot: usize,
-    index: usize,
-    off: f64,
-}
-
 /// An input that drives the simulator.
 #[derive(Debug)]
 struct Input {
@@ -56,7 +48,7 @@ pub(super) struct Machine {
     names: Vec<String>,
     joints: Vec<JointSizes>,
     inputs: Vec<Input>,
-    parts: Vec<Part>,
+    parts: Vec<Part<Role>>,
     step_s: f64,
 }
 
@@ -88,6 +80,7 @@ pub(super) fn declare(
             of: (sections.len() > 1).then_some(name),
             role: |effect| Role::Joint(at, effect),
             but: declared.iter().map(String::as_str).chain(without).collect(),
+            unasked: false,
         };
         mechanics::joints(&mut carrier, &sizes, has);
         machine.joints.push(sizes);
@@ -103,6 +96,7 @@ pub(super) fn declare(
             of: (driving.len() > 1).then_some(quantity.name.as_str()),
             role: |effect| Role::Input(at, effect),
             but: declared.iter().map(String::as_str).collect(),
+            unasked: false,
         };
         mechanics::inputs(&mut carrier, &quantity.unit, input.range, clock.step_s, clock.longest_s());
         machine.inputs.push(Input { ..*input });
@@ -251,14 +245,14 @@ impl Machine {
         self.parts.iter().filter(|p| matches!(p.role, Role::Input(..))).count()
     }
 
-    fn sorted(&self) -> impl Iterator<Item = &Part> {
-        let of_input = |p: &&Part| matches!(p.role, Role::Input(..));
+    fn sorted(&self) -> impl Iterator<Item = &Part<Role>> {
+        let of_input = |p: &&Part<Role>| matches!(p.role, Role::Input(..));
         self.parts.iter().filter(of_input).chain(self.parts.iter().filter(move |p| !of_input(p)))
     }
 
     /// Why nothing can be predicted at [`values`](Self::values), where that is so: on which side of a joint a stop stands is known by its range.
     pub(super) fn unknown(&self, values: &[f64]) -> Option<String> {
-        let stands = |(part, v): (&Part, &f64)| match part.role {
+        let stands = |(part, v): (&Part<Role>, &f64)| match part.role {
             Role::Joint(joint, JointEffect::StopStiffness) if *v != part.off => Some(joint),
             _ => None,
         };
@@ -421,57 +415,6 @@ fn by_rows(signal: &Signal<f64>, times: &[f64], between: Between) -> Vec<f64> {
     }
     rows.extend(times.last().map(|t| at(*t)));
     rows
-}
-
-/// One joint or input of a specification in the making.
-struct Carrier<'c, R> {
-    b: &'c mut SpecBuilder,
-    parts: &'c mut Vec<Part>,
-    /// Its name, where there are several of its kind.
-    of: Option<&'c str>,
-    role: R,
-    /// What is not tried: what the recording declares itself, or does without.
-    but: Vec<&'c str>,
-}
-
-impl<R> Carrier<'_, R> {
-    fn id(&self, kind: &str) -> String {
-        self.of.map_or_else(|| kind.to_owned(), |of| format!("{kind}@{of}"))
-    }
-}
-
-impl<E, R: Fn(E) -> Role> Declares<E> for Carrier<'_, R> {
-    fn wants(&self, kind: &str) -> bool {
-        let id = self.id(kind);
-        !self.but.iter().any(|but| *but == kind || *but == id)
-    }
-
-    fn parameter(
-        &mut self,
-        effect: E,
-        name: &str,
-        unit: &str,
-        off: f64,
-        bounds: [f64; 2],
-        scale: f64,
-    ) -> ParameterRef {
-        let scale = if scale.is_normal() { scale } else { 1.0 };
-        let at = self.b.shared(name, unit, off, bounds, scale);
-        let role = (self.role)(effect);
-        self.parts.push(Part { role, slot: at.slot, index: at.index, off });
-        at
-    }
-
-    fn mechanism(
-        &mut self,
-        kind: &str,
-        parameters: &[ParameterRef],
-        text: [&str; 4],
-        confused: &[&str],
-    ) -> &mut Mechanism {
-        let name = self.of.map_or_else(|| text[0].to_owned(), |of| format!("{} of {of}", text[0]));
-        self.b.mechanism(&self.id(kind), parameters, [&name, text[1], text[2], text[3]], confused)
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The domain `custom`: anybody's simulator, as a program that is asked or as columns that it has written.
 
 mod answer;
+mod carrier;
 mod declare;
 mod machine;
 mod model;

@@ -306,7 +306,7 @@ impl Model for CustomModel {
 impl MultimodalModel for CustomModel {
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
         let own = &self.spec.mechanisms[mechanism].parameters;
-        let mut starts = own.first().map_or_else(Vec::new, |first| self.sensors.starts(*first));
+        let mut starts = self.sensors.starts(own);
         if let Simulation::Program(program) = &self.simulation {
             starts.extend(program.machine.starts(own));
         }

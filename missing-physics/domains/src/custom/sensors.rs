@@ -1,152 +1,33 @@
 //! What a sensor and a clock may do to what a simulator predicts, whatever it simulates: mechanisms that nobody has to ask for.
 
-use std::collections::BTreeSet;
-
 use missing_physics::data::Run;
-use missing_physics::model::{ParameterRef, Quantity, SpecBuilder, UNBOUNDED};
+use missing_physics::model::{Quantity, SpecBuilder};
 
-use crate::mechanics::{self, Clock};
+use super::carrier::{Carrier, Part};
+use crate::mechanics::{self, CONTROL, Clock, Declares, OutputEffect};
 
-/// What a sensor or the clock does.
+/// What a parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Gain,
-    Offset,
-    Drift,
-    Delay,
-    Lag,
-    Upper,
-    Lower,
-    /// Of all channels.
+enum Role {
+    /// Of the sensor of a channel.
+    Output(usize, OutputEffect),
+    /// By how much the clock of all channels is fast.
     Clock,
-}
-
-/// A parameter of a sensor's error: what it does, in which channel.
-#[derive(Debug, Clone, Copy)]
-struct Part {
-    slot: usize,
-    index: usize,
-    kind: Kind,
-    channel: usize,
-    /// Where it is off.
-    off: f64,
 }
 
 /// The errors of all sensors.
 #[derive(Debug, Default)]
 pub(super) struct Sensors {
-    parts: Vec<Part>,
+    parts: Vec<Part<Role>>,
     /// Smallest and largest reading of each channel.
     ranges: Vec<[f64; 2]>,
     step_s: f64,
 }
 
-const CONTROL: &str = "Astrom and Murray, Feedback Systems, 2nd ed. 2021";
-
-/// A specification in the making, with the errors of its sensors.
-struct Errors<'a> {
-    b: &'a mut SpecBuilder,
-    sensors: Sensors,
-    /// What the recording declares itself is not tried.
-    declared: BTreeSet<String>,
-    several: bool,
-}
-
-impl Errors<'_> {
-    fn parameter(
-        &mut self,
-        (kind, channel): (Kind, usize),
-        name: &str,
-        unit: &str,
-        off: f64,
-        bounds: [f64; 2],
-        scale: f64,
-    ) -> ParameterRef {
-        let at = self.b.shared(name, unit, off, bounds, scale);
-        self.sensors.parts.push(Part { slot: at.slot, index: at.index, kind, channel, off });
-        at
-    }
-
-    /// The identifier of an error of a channel, unless the recording has one of its own of that name.
-    fn wanted(&self, kind: &str, channel: &Quantity) -> Option<String> {
-        let of_channel = if self.several { format!("{kind}@{}", channel.name) } else { kind.to_owned() };
-        (!self.declared.contains(kind) && !self.declared.contains(&of_channel)).then_some(of_channel)
-    }
-
-    fn mechanism(&mut self, id: &str, own: &[ParameterRef], text: [&str; 3], confused: &[&str]) {
-        let [name, what, equation] = text;
-        let name = match id.split_once('@') {
-            Some((_, of)) => format!("{name} of {of}"),
-            None => name.to_owned(),
-        };
-        self.b.mechanism(id, own, [&name, what, equation, CONTROL], confused).unasked = true;
-    }
-
-    /// Errors that need no time.
-    fn still(&mut self, c: usize, channel: &Quantity, [low, high]: [f64; 2]) {
-        let span = high - low;
-        if let Some(id) = self.wanted("sensor-gain", channel) {
-            let gain = self.parameter((Kind::Gain, c), "gain", "", 0.0, [-0.9, 10.0], 0.1);
-            let text = ["the sensor's gain", "Readings are the quantity times a factor.", "(1 + gain) y"];
-            self.mechanism(&id, &[gain], text, &["clock-rate"]);
-        }
-        if let Some(id) = self.wanted("sensor-offset", channel) {
-            let offset =
-                self.parameter((Kind::Offset, c), "offset", &channel.unit, 0.0, UNBOUNDED, 0.05 * span);
-            let text = ["the sensor's offset", "Readings are the quantity and a constant.", "y + offset"];
-            self.mechanism(&id, &[offset], text, &["sensor-drift"]);
-        }
-        if let Some(id) = self.wanted("sensor-saturation", channel) {
-            let (tenth, unit) = (0.1 * span, channel.unit.clone());
-            let [open_above, open_below] = [high + tenth, low - tenth];
-            let upper = (Kind::Upper, c);
-            let upper = self.parameter(upper, "upper", &unit, open_above, [low, high + 2.0 * tenth], tenth);
-            let lower = (Kind::Lower, c);
-            let lower = self.parameter(lower, "lower", &unit, open_below, [low - 2.0 * tenth, high], tenth);
-            let text = [
-                "the sensor's saturation",
-                "Beyond a bound the sensor reads the bound.",
-                "min(max(y, lower), upper)",
-            ];
-            self.mechanism(&id, &[upper, lower], text, &[]);
-            if let Some(mechanism) = self.b.mechanism_mut(&id) {
-                mechanism.may_be_open = vec![upper.index, lower.index];
-            }
-        }
-    }
-
-    /// Errors in time.
-    fn timed(&mut self, c: usize, channel: &Quantity, [low, high]: [f64; 2], clock: &Clock) {
-        let step_s = clock.step_s;
-        let late = [0.0, clock.longest_s()];
-        if let Some(id) = self.wanted("sensor-drift", channel) {
-            let unit = if channel.unit.is_empty() { "1/s".into() } else { format!("{}/s", channel.unit) };
-            let scale = 0.05 * (high - low) / clock.duration_s;
-            let rate = self.parameter((Kind::Drift, c), "rate_per_s", &unit, 0.0, UNBOUNDED, scale);
-            let text =
-                ["the sensor's drift", "Readings walk off steadily from each run's start.", "y + rate t"];
-            self.mechanism(&id, &[rate], text, &["sensor-offset"]);
-        }
-        if let Some(id) = self.wanted("sensor-delay", channel) {
-            let delay = self.parameter((Kind::Delay, c), "delay_s", "s", 0.0, late, step_s);
-            let text = ["the sensor's delay", "Readings are old when they come.", "y(t - delay)"];
-            self.mechanism(&id, &[delay], text, &["sensor-lag"]);
-        }
-        if let Some(id) = self.wanted("sensor-lag", channel) {
-            let lag = self.parameter((Kind::Lag, c), "tau_s", "s", 0.0, late, step_s);
-            let text = [
-                "the sensor's lag",
-                "Readings follow the quantity with a first-order lag.",
-                "tau dy'/dt = y - y'",
-            ];
-            self.mechanism(&id, &[lag], text, &["sensor-delay"]);
-        }
-    }
-}
-
 /// Adds the errors of the sensors and of the clock to a specification: those in time where the first input is `t_s` and rises.
 pub(super) fn add(b: &mut SpecBuilder, channels: &[Quantity], inputs: &[Quantity], runs: &[Run]) -> Sensors {
-    let declared = b.so_far().mechanisms.iter().map(|m| m.id.clone()).collect();
+    let declared: Vec<String> = b.so_far().mechanisms.iter().map(|m| m.id.clone()).collect();
+    let but: Vec<&str> = declared.iter().map(String::as_str).collect();
     let time = |run: &Run| run.inputs[0].windows(2).all(|w| w[0] < w[1]);
     let timed = inputs.first().is_some_and(|first| first.name == "t_s") && runs.iter().all(time);
     let clock = Clock::of(runs);
@@ -158,41 +39,43 @@ pub(super) fn add(b: &mut SpecBuilder, channels: &[Quantity], inputs: &[Quantity
         if range[0].is_finite() { range } else { [-1.0, 1.0] }
     };
     let ranges: Vec<[f64; 2]> = (0..channels.len()).map(range).collect();
-    let sensors = Sensors { ranges: ranges.clone(), step_s: clock.step_s, ..Sensors::default() };
-    let mut errors = Errors { b, sensors, declared, several: channels.len() > 1 };
-    for (c, (channel, range)) in channels.iter().zip(ranges).enumerate() {
+    let mut parts = Vec::new();
+    for (c, (channel, &range)) in channels.iter().zip(&ranges).enumerate() {
         // A channel that never changes shows none of them.
         if !(range[1] - range[0]).is_normal() {
             continue;
         }
-        errors.still(c, channel, range);
-        if timed {
-            errors.timed(c, channel, range, &clock);
-        }
+        let of = (channels.len() > 1).then_some(channel.name.as_str());
+        let role = |effect| Role::Output(c, effect);
+        let but = but.clone();
+        let mut carrier = Carrier { b: &mut *b, parts: &mut parts, of, role, but, unasked: true };
+        mechanics::outputs(&mut carrier, &channel.unit, range, timed.then_some(&clock));
     }
-    if timed && !errors.sensors.parts.is_empty() && !errors.declared.contains("clock-rate") {
-        let rate = errors.parameter((Kind::Clock, 0), "rate", "", 0.0, [-0.5, 0.5], 0.01);
-        let text = ["the clock", "The recording's clock runs fast or slow.", "t = (1 + rate) t_true"];
-        errors.mechanism("clock-rate", &[rate], text, &["sensor-gain", "sensor-delay"]);
+    let role = |()| Role::Clock;
+    let any = !parts.is_empty();
+    let mut carrier = Carrier { b, parts: &mut parts, of: None, role, but, unasked: true };
+    if timed && any && carrier.wants("clock-rate") {
+        let rate = carrier.parameter((), "rate", "", 0.0, [-0.5, 0.5], 0.01);
+        let text =
+            ["the clock", "The recording's clock runs fast or slow.", "t = (1 + rate) t_true", CONTROL];
+        carrier.mechanism("clock-rate", &[rate], text, &["sensor-gain", "sensor-delay"]);
     }
-    errors.sensors
+    Sensors { parts, ranges, step_s: clock.step_s }
 }
 
 impl Sensors {
     /// Turns the predictions of all channels of a run into readings, in place: clock, delay, lag, gain, offset and drift, saturation.
     pub(super) fn read(&self, shared: &[f64], t: &[f64], out: &mut [f64]) {
-        let on = |part: &&Part| shared[part.slot] != part.off;
+        let on = |part: &&Part<Role>| shared[part.slot] != part.off;
         if !self.parts.iter().any(|part| on(&part)) {
             return;
         }
         let begin = t.first().copied().unwrap_or(0.0);
-        let value = |kind: Kind, channel: usize| {
-            let found = self.parts.iter().filter(on).find(|p| p.kind == kind && p.channel == channel);
-            found.map(|p| shared[p.slot])
-        };
-        let rate = value(Kind::Clock, 0).unwrap_or(0.0);
+        let of = |role: Role| self.parts.iter().filter(on).find(|p| p.role == role).map(|p| shared[p.slot]);
+        let rate = of(Role::Clock).unwrap_or(0.0);
         for (c, column) in out.chunks_exact_mut(t.len().max(1)).enumerate() {
-            let delay = value(Kind::Delay, c).unwrap_or(0.0);
+            let value = |effect: OutputEffect| of(Role::Output(c, effect));
+            let delay = value(OutputEffect::Delay).unwrap_or(0.0);
             if rate != 0.0 || delay != 0.0 {
                 let read: Vec<f64> = t
                     .iter()
@@ -200,26 +83,26 @@ impl Sensors {
                     .collect();
                 column.copy_from_slice(&read);
             }
-            if let Some(lag_s) = value(Kind::Lag, c) {
+            if let Some(lag_s) = value(OutputEffect::Lag) {
                 lag(t, column, lag_s);
             }
-            let [gain, offset, drift] =
-                [Kind::Gain, Kind::Offset, Kind::Drift].map(|kind| value(kind, c).unwrap_or(0.0));
-            let upper = value(Kind::Upper, c).unwrap_or(f64::INFINITY);
-            let lower = value(Kind::Lower, c).unwrap_or(f64::NEG_INFINITY);
+            let [gain, offset, drift] = [OutputEffect::Gain, OutputEffect::Offset, OutputEffect::Drift]
+                .map(|effect| value(effect).unwrap_or(0.0));
+            let upper = value(OutputEffect::Upper).unwrap_or(f64::INFINITY);
+            let lower = value(OutputEffect::Lower).unwrap_or(f64::NEG_INFINITY);
             for (y, t_s) in column.iter_mut().zip(t) {
                 *y = (*y * (1.0 + gain) + offset + drift * (t_s - begin)).min(upper).max(lower);
             }
         }
     }
 
-    /// Where to begin fitting a mechanism whose first parameter has this index.
-    pub(super) fn starts(&self, first: usize) -> Vec<Vec<(usize, f64)>> {
-        let Some(part) = self.parts.iter().find(|p| p.index == first) else { return Vec::new() };
-        match part.kind {
-            Kind::Delay | Kind::Lag => mechanics::late(first, self.step_s),
-            // The lower bound is the next parameter.
-            Kind::Upper => mechanics::sensor_bounds(first, first + 1, self.ranges[part.channel]),
+    /// Where to begin fitting a mechanism of these parameters, by their indices.
+    pub(super) fn starts(&self, own: &[usize]) -> Vec<Vec<(usize, f64)>> {
+        let part = own.first().and_then(|first| self.parts.iter().find(|p| p.index == *first));
+        match part.map(|part| part.role) {
+            Some(Role::Output(c, effect)) => {
+                mechanics::output_starts(effect, own, self.ranges[c], self.step_s)
+            }
             _ => Vec::new(),
         }
     }
@@ -325,7 +208,7 @@ mod tests {
             kind: 0,
         };
         let mut b = SpecBuilder::default();
-        let own = b.shared("offset_n", "N", 0.0, UNBOUNDED, 1.0);
+        let own = b.shared("offset_n", "N", 0.0, missing_physics::model::UNBOUNDED, 1.0);
         b.mechanism("sensor-offset", &[own], ["", "", "", ""], &[]);
         let channels = [Quantity::new("force_n", "N"), Quantity::new("still_n", "N")];
         add(&mut b, &channels, &[Quantity::new("load_kg", "kg")], &[run]);

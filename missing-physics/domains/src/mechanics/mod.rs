@@ -1,9 +1,10 @@
-//! What acts on joints and inputs of any machine, whoever integrates its motion: which parameters each mechanism has, what it is in words,
+//! What acts on joints, inputs and outputs of any machine, whoever integrates its motion: which parameters each mechanism has, what it is in words,
 //! and where fits of it begin.
 
 mod clock;
 mod input;
 mod joint;
+mod output;
 mod starts;
 
 use missing_physics::model::{Mechanism, ParameterRef};
@@ -11,7 +12,8 @@ use missing_physics::model::{Mechanism, ParameterRef};
 pub(crate) use clock::Clock;
 pub(crate) use input::inputs;
 pub(crate) use joint::joints;
-pub(crate) use starts::{input_starts, joint_starts, late, sensor_bounds};
+pub(crate) use output::outputs;
+pub(crate) use starts::{input_starts, joint_starts, output_starts};
 
 /// What a parameter is of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +49,18 @@ pub(crate) enum InputEffect {
     Upper,
     Lower,
     DeadZone,
+}
+
+/// What a parameter is of an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OutputEffect {
+    Gain,
+    Offset,
+    Drift,
+    Delay,
+    Lag,
+    Upper,
+    Lower,
 }
 
 /// Sizes of a joint's motion: what effects and their bounds are measured by.
@@ -97,7 +111,7 @@ pub(crate) struct JointHas {
     pub(crate) inertia: bool,
 }
 
-/// Takes mechanisms down: of one joint, or of one input.
+/// Takes mechanisms down: of one joint, one input or one output.
 pub(crate) trait Declares<E> {
     /// Whether a mechanism is to be tried.
     fn wants(&self, kind: &str) -> bool;

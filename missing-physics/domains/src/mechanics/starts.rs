@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{InputEffect, JointEffect, JointSizes};
+use super::{InputEffect, JointEffect, JointSizes, OutputEffect};
 
 /// Starts.
 type Starts = Vec<Vec<(usize, f64)>>;
@@ -48,7 +48,7 @@ pub(crate) fn joint_starts(effect: JointEffect, own: &[usize], s: &JointSizes, l
 pub(crate) fn input_starts(effect: InputEffect, own: &[usize], range: [f64; 2], step_s: f64) -> Starts {
     match (effect, own) {
         (InputEffect::Delay | InputEffect::Lag, [first, ..]) => late(*first, step_s),
-        (InputEffect::Upper, [upper, lower, ..]) => input_bounds(*upper, *lower, range),
+        (InputEffect::Upper, [upper, lower, ..]) => two_bounds([*upper, *lower], range, &[0.03, 0.12, 0.3]),
         (InputEffect::DeadZone, [first, ..]) => {
             let most = range[0].abs().max(range[1].abs());
             [0.01, 0.05, 0.15, 0.4].map(|f| vec![(*first, f * most)]).to_vec()
@@ -57,19 +57,21 @@ pub(crate) fn input_starts(effect: InputEffect, own: &[usize], range: [f64; 2], 
     }
 }
 
+/// Starts of an output's mechanism whose parameters are `own`, the first of which is `effect`.
+pub(crate) fn output_starts(effect: OutputEffect, own: &[usize], range: [f64; 2], step_s: f64) -> Starts {
+    match (effect, own) {
+        (OutputEffect::Delay | OutputEffect::Lag, [first, ..]) => late(*first, step_s),
+        // A bound of readings has been seen where it is one.
+        (OutputEffect::Upper, [upper, lower, ..]) => {
+            two_bounds([*upper, *lower], range, &[0.0, 0.03, 0.12, 0.3])
+        }
+        _ => Vec::new(),
+    }
+}
+
 /// Delays and lags of a few rows.
-pub(crate) fn late(parameter: usize, step_s: f64) -> Starts {
+fn late(parameter: usize, step_s: f64) -> Starts {
     [0.5, 2.0, 8.0, 30.0].map(|rows| vec![(parameter, rows * step_s)]).to_vec()
-}
-
-/// Bounds of what an input may be: below its greatest value, above its least, or both.
-fn input_bounds(upper: usize, lower: usize, range: [f64; 2]) -> Starts {
-    two_bounds([upper, lower], range, &[0.03, 0.12, 0.3])
-}
-
-/// Bounds of what a sensor reads: as an input's, and those at which it has been seen.
-pub(crate) fn sensor_bounds(upper: usize, lower: usize, range: [f64; 2]) -> Starts {
-    two_bounds([upper, lower], range, &[0.0, 0.03, 0.12, 0.3])
 }
 
 /// One bound, the other, or both, by these parts of a range within it.

@@ -2,7 +2,7 @@
 
 use super::equations::Equations;
 use super::scales::Scales;
-use crate::mechanics::{self, CONTROL, Declares, InputEffect, JointEffect, JointHas};
+use crate::mechanics::{self, Declares, InputEffect, JointEffect, JointHas, OutputEffect};
 use missing_physics::model::{Mechanism, ParameterRef, SpecBuilder, UNBOUNDED};
 
 /// What a shared parameter is.
@@ -17,24 +17,13 @@ pub(super) enum Role {
     /// An input's.
     Input(usize, InputEffect),
     /// An output's.
-    Output(usize, OfOutput),
+    Output(usize, OutputEffect),
     /// The height at which a level overflows.
     Overflow(usize),
     /// The rate at which a level leaks.
     Leak(usize),
     /// By how much the clock is fast.
     Clock,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum OfOutput {
-    Gain,
-    Offset,
-    Drift,
-    Delay,
-    Lag,
-    Upper,
-    Lower,
 }
 
 /// A specification in the making, with what each shared parameter is.
@@ -162,93 +151,12 @@ impl<'a> Effects<'a> {
     }
 
     fn output(&mut self, output: usize) {
-        let s = self.scales.outputs[output].clone();
-        let (name, several) = (self.equations.outputs[output].name.clone(), self.equations.outputs.len() > 1);
-        let unit = super::units::text(&name);
-        let role = |r| Role::Output(output, r);
-        let [low, high] = s.range;
-        let span = high - low;
-        let longest = self.scales.clock().longest_s();
-        let rate_unit = if unit.is_empty() { "1/s".to_owned() } else { format!("{unit}/s") };
-        let gain = self.add(role(OfOutput::Gain), "gain", "", 0.0, [-0.9, 10.0], 0.1);
-        let offset = self.add(role(OfOutput::Offset), "offset", &unit, 0.0, UNBOUNDED, 0.05 * span);
-        let drift = self.add(
-            role(OfOutput::Drift),
-            "rate_per_s",
-            &rate_unit,
-            0.0,
-            UNBOUNDED,
-            0.05 * span / self.scales.duration_s,
-        );
-        let delay = self.add(role(OfOutput::Delay), "delay_s", "s", 0.0, [0.0, longest], self.scales.step_s);
-        let lag = self.add(role(OfOutput::Lag), "tau_s", "s", 0.0, [0.0, longest], self.scales.step_s);
-        let [upper, lower] = self.bounds([role(OfOutput::Upper), role(OfOutput::Lower)], &unit, s.range);
-        let of = several.then_some(name.as_str());
-        self.mechanism(
-            "sensor-gain",
-            of,
-            &[gain],
-            ["the sensor's gain", "Readings are the quantity times a factor.", "(1 + gain) y", CONTROL],
-            &["input-gain"],
-        );
-        self.mechanism(
-            "sensor-offset",
-            of,
-            &[offset],
-            ["the sensor's offset", "Readings are the quantity and a constant.", "y + offset", CONTROL],
-            &["input-offset", "constant-force"],
-        );
-        self.mechanism(
-            "sensor-drift",
-            of,
-            &[drift],
-            [
-                "the sensor's drift",
-                "Readings walk off steadily from each run's start.",
-                "y + rate t",
-                CONTROL,
-            ],
-            &["constant-force"],
-        );
-        self.mechanism(
-            "sensor-delay",
-            of,
-            &[delay],
-            ["the sensor's delay", "Readings are old when they come.", "y(t - delay)", CONTROL],
-            &["input-delay", "sensor-lag"],
-        );
-        self.mechanism(
-            "sensor-lag",
-            of,
-            &[lag],
-            [
-                "the sensor's lag",
-                "Readings follow the quantity with a first-order lag.",
-                "tau dy'/dt = y - y'",
-                CONTROL,
-            ],
-            &["sensor-delay", "input-lag"],
-        );
-        self.mechanism(
-            "sensor-saturation",
-            of,
-            &[upper, lower],
-            [
-                "the sensor's saturation",
-                "Beyond a bound the sensor reads the bound.",
-                "min(max(y, lower), upper)",
-                CONTROL,
-            ],
-            &["end-stop"],
-        )
-        .may_be_open = vec![upper.index, lower.index];
-    }
-
-    /// An upper and a lower bound of what comes between two values: open a tenth beyond them.
-    fn bounds(&mut self, [above, below]: [Role; 2], unit: &str, [low, high]: [f64; 2]) -> [ParameterRef; 2] {
-        let tenth = 0.1 * (high - low);
-        let upper = self.add(above, "upper", unit, high + tenth, [low, high + 2.0 * tenth], tenth);
-        [upper, self.add(below, "lower", unit, low - tenth, [low - 2.0 * tenth, high], tenth)]
+        let (equations, scales) = (self.equations, self.scales);
+        let name = equations.outputs[output].name.as_str();
+        let of = (equations.outputs.len() > 1).then_some(name);
+        let (unit, range) = (super::units::text(name), scales.outputs[output].range);
+        let mut carrier = Carrier { effects: self, of, role: |e| Role::Output(output, e) };
+        mechanics::outputs(&mut carrier, &unit, range, Some(&scales.clock()));
     }
 
     fn level(&mut self, level: usize) {
@@ -285,7 +193,7 @@ impl<'a> Effects<'a> {
     }
 }
 
-/// One joint or input of a specification in the making.
+/// One joint, input or output of a specification in the making.
 struct Carrier<'e, 'a, R> {
     effects: &'e mut Effects<'a>,
     /// Its name, where there are several of its kind.

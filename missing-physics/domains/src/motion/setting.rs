@@ -6,10 +6,10 @@ use joint_laws::integrate::{Ceiling, Edge};
 use joint_laws::sensor::Sensor;
 use joint_laws::signal::Drive;
 
-use super::effects::{OfOutput, Role};
+use super::effects::Role;
 use super::equations::Equations;
 use super::machine::{Force, JointLaws};
-use crate::mechanics::{InputEffect, JointEffect, JointSizes};
+use crate::mechanics::{InputEffect, JointEffect, JointSizes, OutputEffect};
 
 /// All that parameters decide.
 pub(super) struct Setting<T> {
@@ -178,16 +178,16 @@ impl<T: Number> Setting<T> {
         }
     }
 
-    fn output(&mut self, output: usize, what: OfOutput, value: T) {
+    fn output(&mut self, output: usize, what: OutputEffect, value: T) {
         let sensor = &mut self.sensors[output];
         match what {
-            OfOutput::Gain => sensor.gain = value,
-            OfOutput::Offset => sensor.offset = value,
-            OfOutput::Drift => sensor.drift_per_s = value,
-            OfOutput::Delay => self.delays[output] = Some(value),
-            OfOutput::Lag => sensor.lag_s = Some(value),
-            OfOutput::Upper => sensor.upper = value,
-            OfOutput::Lower => sensor.lower = value,
+            OutputEffect::Gain => sensor.gain = value,
+            OutputEffect::Offset => sensor.offset = value,
+            OutputEffect::Drift => sensor.drift_per_s = value,
+            OutputEffect::Delay => self.delays[output] = Some(value),
+            OutputEffect::Lag => sensor.lag_s = Some(value),
+            OutputEffect::Upper => sensor.upper = value,
+            OutputEffect::Lower => sensor.lower = value,
         }
     }
 }

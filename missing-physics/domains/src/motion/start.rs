@@ -3,7 +3,7 @@
 use missing_physics::data::Run;
 use missing_physics::model::{Mechanism, Scope, Spec};
 
-use super::effects::{OfOutput, Role};
+use super::effects::Role;
 use super::equations::{Equations, Start};
 use super::scales::Scales;
 use crate::mechanics;
@@ -78,11 +78,9 @@ pub(super) fn mechanism(
         Role::Input(input, effect) => {
             mechanics::input_starts(effect, own, scales.inputs[input].range, scales.step_s)
         }
-        Role::Output(output, what) => match what {
-            OfOutput::Delay | OfOutput::Lag => mechanics::late(first, scales.step_s),
-            OfOutput::Upper => mechanics::sensor_bounds(first, own[1], scales.outputs[output].range),
-            _ => Vec::new(),
-        },
+        Role::Output(output, effect) => {
+            mechanics::output_starts(effect, own, scales.outputs[output].range, scales.step_s)
+        }
         Role::Overflow(level) => {
             let state = scales.levels[level];
             [0.99, 0.95, 0.9, 0.8, 0.6].map(|f| vec![(first, state[0] + f * (state[1] - state[0]))]).to_vec()
