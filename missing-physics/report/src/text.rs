@@ -172,10 +172,14 @@ pub(super) fn law_kind(kind: &str) -> &str {
 
 /// Where the baseline misses, in one sentence.
 pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
+    /// A mean below this part of the largest is rounding: the fit has made it zero.
+    const ROUNDING: f64 = 1e-6;
+    let is_rounding = l.mean_residual.abs() < ROUNDING * l.largest_residual.abs();
+    let mean = if is_rounding { 0.0 } else { l.mean_residual };
     format!(
         "{}: measured less simulated is {} {unit} on average, at most {} {unit} ({:.0} sigma, {:.0} % of the misfit)",
         place_words(d, l),
-        significant(l.mean_residual, 2),
+        significant(mean, 2),
         significant(l.largest_residual, 2),
         l.z,
         100.0 * l.share,
