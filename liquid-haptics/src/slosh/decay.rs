@@ -47,6 +47,9 @@ pub enum DecayError {
     },
 }
 
+/// Where fewer rows than this lie in a step, working out each takes less time than the step does.
+const ROWS_A_STEP: f64 = 3.0;
+
 /// The fifth power of the spring, over the square of the third.
 pub(super) const QUINTIC: f64 = 21.0 / 80.0;
 
@@ -61,11 +64,38 @@ impl Decay {
         self.check()?;
         let damped = self.omega_rad_s * (1.0 - self.damping_ratio * self.damping_ratio).sqrt();
         let start = [a, -self.damping_ratio * self.omega_rad_s * a + damped * b];
-        if self.is_linear() {
-            self.propagate(t_s, start, out);
-            return Ok(());
+        if !self.is_linear() {
+            return self.integrate(t_s, start, out);
         }
-        self.integrate(t_s, start, out)
+        let steps = self.omega_rad_s * STEPS_PER_RADIAN * t_s.last().unwrap_or(&0.0);
+        if (t_s.len() as f64) < ROWS_A_STEP * steps {
+            for (y, t) in out.iter_mut().zip(t_s) {
+                let (cos, sin) = self.unit(*t);
+                *y = a * cos + b * sin;
+            }
+        } else {
+            self.propagate(t_s, start, out);
+        }
+        Ok(())
+    }
+
+    /// Readings of the linear motion at a time, from the starts `[1, 0]` and `[0, 1]`.
+    fn unit(&self, t: f64) -> (f64, f64) {
+        let (omega, ratio) = (self.omega_rad_s, self.damping_ratio);
+        let (sin, cos) = (omega * (1.0 - ratio * ratio).sqrt() * t).sin_cos();
+        let fade = (-ratio * omega * t).exp();
+        (fade * cos, fade * sin)
+    }
+
+    /// The decay without its effects, at the rising times `t_s` (s, from 0 on).
+    ///
+    /// # Errors
+    /// [`DecayError::Value`].
+    pub fn linear<'a>(&self, t_s: &'a [f64]) -> Result<LinearDecay<'a>, DecayError> {
+        self.check()?;
+        let decay = Self { effects: Effects::default(), ..*self };
+        let (cos, sin) = t_s.iter().map(|t| decay.unit(*t)).unzip();
+        Ok(LinearDecay { decay, t_s, unit: [cos, sin] })
     }
 
     /// Whether no effect is on, so that readings are proportional to the start.
@@ -149,6 +179,42 @@ impl Decay {
     }
 }
 
+/// A decay without effects at some times: readings from every start, and their derivatives, are sums of two readings.
+#[derive(Debug, Clone)]
+pub struct LinearDecay<'a> {
+    decay: Decay,
+    t_s: &'a [f64],
+    unit: [Vec<f64>; 2],
+}
+
+impl LinearDecay<'_> {
+    /// Readings from the starts `[1, 0]` and `[0, 1]` of [`Decay::read`].
+    pub fn unit(&self) -> &[Vec<f64>; 2] {
+        &self.unit
+    }
+
+    /// Readings from the start `[a, b]`, one a time.
+    pub fn read(&self, [a, b]: [f64; 2], out: &mut [f64]) {
+        let [cos, sin] = &self.unit;
+        for ((out, cos), sin) in out.iter_mut().zip(cos).zip(sin) {
+            *out = a * cos + b * sin;
+        }
+    }
+
+    /// Derivatives of the readings from the start `[a, b]`, where the angular frequency changes by `omega_rad_s` and the damping ratio
+    /// by `damping_ratio` for each unit of what they are derived by.
+    pub fn derivative(&self, [a, b]: [f64; 2], [omega_rad_s, damping_ratio]: [f64; 2], out: &mut [f64]) {
+        let (omega, ratio) = (self.decay.omega_rad_s, self.decay.damping_ratio);
+        let root = (1.0 - ratio * ratio).sqrt();
+        let fade = -(ratio * omega_rad_s + omega * damping_ratio);
+        let turn = root * omega_rad_s - omega * ratio / root * damping_ratio;
+        let [cos, sin] = &self.unit;
+        for (((out, t), cos), sin) in out.iter_mut().zip(self.t_s).zip(cos).zip(sin) {
+            *out = t * ((fade * a + turn * b) * cos + (fade * b - turn * a) * sin);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
@@ -229,6 +295,39 @@ mod tests {
     }
 
     /// Angular frequency of a motion without damping, by its zero crossings.
+    /// Derivatives of the linear decay in closed form are those of its readings.
+    #[test]
+    fn derivatives_of_the_linear_decay_agree_with_differences() {
+        let t: Vec<f64> = (0..200).map(|i| 0.03 * f64::from(i)).collect();
+        let (decay, start) = (Decay { effects: Effects::default(), ..MODE }, [0.7, -0.4]);
+        let linear = decay.linear(&t).unwrap();
+        let mut out = vec![0.0; t.len()];
+        linear.read(start, &mut out);
+        for (a, b) in out.iter().zip(read(decay, &t, start)) {
+            approx::assert_abs_diff_eq!(*a, b, epsilon = 1e-12);
+        }
+        for [omega, ratio] in [[1.0, 0.0], [0.0, 1.0], [0.3, -0.2]] {
+            linear.derivative(start, [omega, ratio], &mut out);
+            let at = |h: f64| {
+                let omega_rad_s = decay.omega_rad_s + h * omega;
+                read(
+                    Decay { omega_rad_s, damping_ratio: decay.damping_ratio + h * ratio, ..decay },
+                    &t,
+                    start,
+                )
+            };
+            let [high, low] = [1e-5, -1e-5].map(at);
+            for (row, exact) in out.iter().enumerate() {
+                approx::assert_relative_eq!(
+                    *exact,
+                    (high[row] - low[row]) / 2e-5,
+                    max_relative = 1e-5,
+                    epsilon = 1e-5
+                );
+            }
+        }
+    }
+
     fn frequency(decay: Decay, start: [f64; 2]) -> f64 {
         let x = read(decay, &times(40_000, 2.5e-4), start);
         let crossings: Vec<f64> = x

@@ -9,7 +9,7 @@ mod decay;
 mod integrator;
 mod linear;
 
-pub use decay::{Decay, DecayError, Effects};
+pub use decay::{Decay, DecayError, Effects, LinearDecay};
 
 /// Roots of J1', the antisymmetric modes (Abramowitz and Stegun 1964, table 9.5).
 pub const ANTISYMMETRIC_ROOTS: [f64; 3] =

@@ -4,7 +4,7 @@ use liquid_haptics::slosh::{SloshError, UprightCylinder};
 use missing_physics::data::Run;
 use missing_physics::model::{Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec};
 
-use super::reading::Reading;
+use super::reading::{Free, Reading};
 use super::setup::{Channel, Setup, cylinder};
 use super::spec::{ARM_RAD_S, Layout, build, second_band};
 use super::start::{first_wave, peaks, viscosity_guess};
@@ -135,33 +135,19 @@ impl Model for SloshModel {
         out: &mut [f64],
         jacobian: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict(run, shared, nuisance, out)?;
-        let reading = self.reading(run);
-        let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
-        let mut below = vec![0.0; out.len()];
-        let free = shared_free.iter().map(|&s| (true, s)).chain(nuisance_free.iter().map(|&s| (false, s)));
-        for ((is_shared, slot), column) in free.zip(jacobian.chunks_exact_mut(out.len().max(1))) {
-            let failed = |reason| PredictError { run: run.label.clone(), reason };
-            if !is_shared && let Some(done) = reading.proportional(&shared, slot, column) {
-                done.map_err(failed)?;
-                continue;
-            }
-            let info = &self.spec.parameters[if is_shared { self.shared[slot] } else { self.nuisance[slot] }];
-            let value = if is_shared { shared[slot] } else { nuisance[slot] };
-            let step = 1e-5 * info.scale.max(1e-3 * value.abs());
-            let (high, low) = ((value + step).min(info.upper), (value - step).max(info.lower));
-            for (x, target) in [(high, &mut *column), (low, &mut below)] {
-                *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = x;
-                let done = match reading.part_of(slot).filter(|_| is_shared) {
-                    Some(part) => reading.part(part, &shared, &nuisance, target),
-                    None => reading.first(&shared, &nuisance, target),
-                };
-                done.map_err(failed)?;
-            }
-            *(if is_shared { &mut shared[slot] } else { &mut nuisance[slot] }) = value;
-            column.iter_mut().zip(&below).for_each(|(d, b)| *d = (*d - b) / (high - low));
-        }
-        Ok(())
+        let by = |is_shared: bool, slot: usize, value: f64| {
+            let index = if is_shared { self.shared[slot] } else { self.nuisance[slot] };
+            let parameter = &self.spec.parameters[index];
+            let step = DIFFERENCE * parameter.scale.max(1e-3 * value.abs());
+            let step = if value + step <= parameter.upper { step } else { -step };
+            Free { is_shared, slot, step }
+        };
+        let of_shared = shared_free.iter().map(|&slot| by(true, slot, shared[slot]));
+        let of_run = nuisance_free.iter().map(|&slot| by(false, slot, nuisance[slot]));
+        let free: Vec<Free> = of_shared.chain(of_run).collect();
+        self.reading(run)
+            .linearised([shared, nuisance], &free, out, jacobian)
+            .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 
     fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
@@ -232,6 +218,8 @@ impl SloshModel {
     }
 }
 
+/// The step of a difference, in scales of its parameter: readings are exact to 1e-12 of the wave.
+const DIFFERENCE: f64 = 1e-6;
 /// How many points of the envelope's search are tried.
 const ENVELOPES: usize = 8;
 /// How many peaks of a residual's spectrum are tried.

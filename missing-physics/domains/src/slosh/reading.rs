@@ -1,6 +1,6 @@
 //! What a sensor reads of a decaying wave: the first mode, and what is added to it.
 
-use liquid_haptics::slosh::{Decay, Effects, UprightCylinder};
+use liquid_haptics::slosh::{Decay, Effects, LinearDecay, UprightCylinder};
 use missing_physics::data::Run;
 use missing_physics::model::ParameterRef;
 
@@ -19,6 +19,42 @@ pub(super) struct Reading<'a> {
     pub(super) run: &'a Run,
 }
 
+/// An oscillation in the reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mode {
+    First,
+    Second,
+    Arm,
+}
+
+/// What is added to the first mode.
+const ADDED: [Mode; 2] = [Mode::Second, Mode::Arm];
+
+/// A parameter by which the reading is derived, and the step of a difference.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Free {
+    pub(super) is_shared: bool,
+    pub(super) slot: usize,
+    pub(super) step: f64,
+}
+
+impl Free {
+    fn is_shared(&self, parameter: ParameterRef) -> bool {
+        self.is_shared && parameter.slot == self.slot
+    }
+
+    fn is_nuisance(&self, parameter: ParameterRef) -> bool {
+        !self.is_shared && parameter.slot == self.slot
+    }
+
+    /// The parameters, shared and nuisance, with this one moved by its step.
+    fn moved(&self, parameters: [&[f64]; 2]) -> [Vec<f64>; 2] {
+        let mut moved = parameters.map(<[f64]>::to_vec);
+        moved[usize::from(!self.is_shared)][self.slot] += self.step;
+        moved
+    }
+}
+
 impl Reading<'_> {
     /// Angular frequency (rad/s) and damping ratio of the first mode.
     pub(super) fn first_mode(&self, shared: &[f64]) -> [f64; 2] {
@@ -27,152 +63,178 @@ impl Reading<'_> {
         [omega, self.cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999)]
     }
 
-    /// The first mode.
-    fn wave(&self, shared: &[f64]) -> Decay {
-        let p = self.layout;
-        let [omega_rad_s, damping_ratio] = self.first_mode(shared);
-        Decay {
-            omega_rad_s,
-            damping_ratio,
-            effects: Effects {
-                friction: shared[p.friction.slot],
-                quadratic_per_reading: shared[p.quadratic.slot],
-                frequency_change: shared[p.frequency.slot] * self.largest * self.largest,
-                largest_amplitude: self.largest,
-            },
-        }
-    }
-
-    /// The reading of the first mode.
-    pub(super) fn first(&self, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        let p = self.layout;
-        read(&self.wave(shared), self.run, [nuisance[p.cos.slot], nuisance[p.sin.slot]], out)
-    }
-
-    /// The second mode, or the arm.
-    fn oscillation(&self, part: Part, shared: &[f64]) -> Decay {
-        let p = self.layout;
-        let [omega_rad_s, damping_ratio] = if part == Part::Arm {
-            [shared[p.arm_omega.slot], shared[p.arm_damping.slot]]
-        } else {
-            // With another fill the second mode moves by as much as theory says.
-            let moved =
-                self.cylinder.angular_frequency_rad_s(1, 0.0) / self.full.angular_frequency_rad_s(1, 0.0);
-            [moved * shared[p.second_omega.slot], shared[p.second_damping.slot]]
-        };
-        Decay { omega_rad_s, damping_ratio, effects: Effects::default() }
-    }
-
-    /// A part of what is added to the first mode's reading.
-    pub(super) fn part(
-        &self,
-        part: Part,
-        shared: &[f64],
-        nuisance: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), String> {
-        let p = self.layout;
-        let start = match part {
-            Part::Transient => {
-                let (transient, lag) = (nuisance[p.transient.slot], shared[p.lag.slot]);
-                fade(self.run, lag, out)?;
-                out.iter_mut().for_each(|y| *y *= transient);
-                return Ok(());
-            }
-            Part::Second => [nuisance[p.second_cos.slot], nuisance[p.second_sin.slot]],
-            Part::Arm => [nuisance[p.arm_cos.slot], nuisance[p.arm_sin.slot]],
-        };
-        read(&self.oscillation(part, shared), self.run, start, out)
-    }
-
     /// All of the reading.
     pub(super) fn all(&self, shared: &[f64], nuisance: &[f64], out: &mut [f64]) -> Result<(), String> {
-        self.first(shared, nuisance, out)?;
-        let zero = nuisance[self.layout.zero.slot];
+        let p = self.layout;
+        self.read(Mode::First, [shared, nuisance], out)?;
+        let zero = nuisance[p.zero.slot];
         out.iter_mut().for_each(|y| *y += zero);
-        let mut more = Vec::new();
-        for part in [Part::Second, Part::Arm, Part::Transient] {
-            if self.has(part, nuisance) {
-                more.resize(out.len(), 0.0);
-                self.part(part, shared, nuisance, &mut more)?;
-                out.iter_mut().zip(&more).for_each(|(y, x)| *y += x);
+        let mut more = vec![0.0; out.len()];
+        for mode in ADDED {
+            if self.start(mode, nuisance) != [0.0; 2] {
+                self.read(mode, [shared, nuisance], &mut more)?;
+                add(out, 1.0, &more);
+            }
+        }
+        let transient = nuisance[p.transient.slot];
+        if transient != 0.0 {
+            self.fade(shared, &mut more)?;
+            add(out, transient, &more);
+        }
+        Ok(())
+    }
+
+    /// All of the reading, and its derivatives by parameters, one column each: in closed form, but for what the first mode's reading
+    /// depends on where that is not linear in its start.
+    pub(super) fn linearised(
+        &self,
+        parameters: [&[f64]; 2],
+        free: &[Free],
+        out: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), String> {
+        let p = self.layout;
+        let [shared, nuisance] = parameters;
+        let (mut first, mut fade) = (vec![0.0; out.len()], vec![0.0; out.len()]);
+        let known = self.known(parameters, free)?;
+        match known.first() {
+            Some((Mode::First, decay)) => decay.read(self.start(Mode::First, nuisance), &mut first),
+            _ => self.read(Mode::First, parameters, &mut first)?,
+        }
+        out.copy_from_slice(&first);
+        for (mode, decay) in known.iter().filter(|(mode, _)| *mode != Mode::First) {
+            decay.read(self.start(*mode, nuisance), &mut fade);
+            add(out, 1.0, &fade);
+        }
+        self.fade(shared, &mut fade)?;
+        let (zero, transient, lag) = (nuisance[p.zero.slot], nuisance[p.transient.slot], shared[p.lag.slot]);
+        add(out, transient, &fade);
+        out.iter_mut().for_each(|y| *y += zero);
+        for (by, column) in free.iter().zip(jacobian.chunks_exact_mut(out.len().max(1))) {
+            if by.is_nuisance(p.zero) {
+                column.fill(1.0);
+            } else if by.is_nuisance(p.transient) {
+                column.copy_from_slice(&fade);
+            } else if by.is_shared(p.lag) {
+                for ((d, fade), t) in column.iter_mut().zip(&fade).zip(times(self.run)?) {
+                    *d = transient * fade * t / (lag * lag);
+                }
+            } else if !known.iter().any(|known| self.derive(known, parameters, by, column)) {
+                let [shared, nuisance] = by.moved(parameters);
+                self.read(Mode::First, [&shared, &nuisance], column)?;
+                column.iter_mut().zip(&first).for_each(|(d, y)| *d = (*d - y) / by.step);
             }
         }
         Ok(())
     }
 
-    /// Whether a part is there at all.
-    fn has(&self, part: Part, nuisance: &[f64]) -> bool {
-        let p = self.layout;
-        let sizes: &[_] = match part {
-            Part::Second => &[p.second_cos, p.second_sin],
-            Part::Arm => &[p.arm_cos, p.arm_sin],
-            Part::Transient => &[p.transient],
-        };
-        sizes.iter().any(|size| nuisance[size.slot] != 0.0)
-    }
-
-    /// The derivative by a parameter that the reading is proportional to, in closed form; `None` for another one.
-    pub(super) fn proportional(
+    /// Modes that are there, or that something is derived by, as far as their readings are linear in their starts; the first mode first.
+    fn known(
         &self,
-        shared: &[f64],
-        slot: usize,
-        out: &mut [f64],
-    ) -> Option<Result<(), String>> {
+        [shared, nuisance]: [&[f64]; 2],
+        free: &[Free],
+    ) -> Result<Vec<(Mode, LinearDecay<'_>)>, String> {
+        let mut known = Vec::new();
+        for mode in [Mode::First, Mode::Second, Mode::Arm] {
+            let (of_start, of_decay) = self.parameters(mode);
+            let by = |f: &Free| {
+                of_start.iter().any(|p| f.is_nuisance(*p)) || of_decay.iter().any(|p| f.is_shared(*p))
+            };
+            let decay = self.decay(mode, shared);
+            if decay.is_linear() && (self.start(mode, nuisance) != [0.0; 2] || free.iter().any(by)) {
+                known.push((mode, decay.linear(times(self.run)?).map_err(|e| e.to_string())?));
+            }
+        }
+        Ok(known)
+    }
+
+    /// The derivative by a parameter of a mode whose reading is linear in its start; whether it is one.
+    fn derive(
+        &self,
+        (mode, known): &(Mode, LinearDecay<'_>),
+        parameters: [&[f64]; 2],
+        by: &Free,
+        column: &mut [f64],
+    ) -> bool {
+        let (of_start, of_decay) = self.parameters(*mode);
+        if let Some(place) = of_start.iter().position(|p| by.is_nuisance(*p)) {
+            column.copy_from_slice(&known.unit()[place]);
+            return true;
+        }
+        if !of_decay.iter().any(|p| by.is_shared(*p)) {
+            return false;
+        }
+        let [shared, nuisance] = parameters;
+        let at = |shared: &[f64]| {
+            let decay = self.decay(*mode, shared);
+            [decay.omega_rad_s, decay.damping_ratio]
+        };
+        let ([omega, ratio], [high_omega, high_ratio]) = (at(shared), at(&by.moved(parameters)[0]));
+        let slope = [(high_omega - omega) / by.step, (high_ratio - ratio) / by.step];
+        known.derivative(self.start(*mode, nuisance), slope, column);
+        true
+    }
+
+    /// A mode as it decays.
+    fn decay(&self, mode: Mode, shared: &[f64]) -> Decay {
         let p = self.layout;
-        let is = |parameter: ParameterRef| parameter.slot == slot;
-        let is_one_of = |pair: [ParameterRef; 2]| pair.into_iter().any(is);
-        let unit = |pair: [ParameterRef; 2]| pair.map(|parameter| f64::from(is(parameter)));
-        let (first, second, arm) = ([p.cos, p.sin], [p.second_cos, p.second_sin], [p.arm_cos, p.arm_sin]);
-        if is(p.zero) {
-            out.fill(1.0);
-            Some(Ok(()))
-        } else if is(p.transient) {
-            Some(fade(self.run, shared[p.lag.slot], out))
-        } else if is_one_of(second) {
-            Some(read(&self.oscillation(Part::Second, shared), self.run, unit(second), out))
-        } else if is_one_of(arm) {
-            Some(read(&self.oscillation(Part::Arm, shared), self.run, unit(arm), out))
-        } else {
-            let wave = self.wave(shared);
-            (is_one_of(first) && wave.is_linear()).then(|| read(&wave, self.run, unit(first), out))
+        let (omega_rad_s, damping_ratio) = match mode {
+            Mode::First => self.first_mode(shared).into(),
+            // With another fill the second mode moves by as much as theory says.
+            Mode::Second => {
+                let [here, full] = [self.cylinder, self.full].map(|c| c.angular_frequency_rad_s(1, 0.0));
+                (here / full * shared[p.second_omega.slot], shared[p.second_damping.slot])
+            }
+            Mode::Arm => (shared[p.arm_omega.slot], shared[p.arm_damping.slot]),
+        };
+        let effects = match mode {
+            Mode::First => Effects {
+                friction: shared[p.friction.slot],
+                quadratic_per_reading: shared[p.quadratic.slot],
+                frequency_change: shared[p.frequency.slot] * self.largest * self.largest,
+                largest_amplitude: self.largest,
+            },
+            Mode::Second | Mode::Arm => Effects::default(),
+        };
+        Decay { omega_rad_s, damping_ratio, effects }
+    }
+
+    /// The nuisance parameters that a mode starts from, and the shared ones of its frequency and damping.
+    fn parameters(&self, mode: Mode) -> ([ParameterRef; 2], [ParameterRef; 2]) {
+        let p = self.layout;
+        match mode {
+            Mode::First => ([p.cos, p.sin], [p.tension, p.viscosity]),
+            Mode::Second => ([p.second_cos, p.second_sin], [p.second_omega, p.second_damping]),
+            Mode::Arm => ([p.arm_cos, p.arm_sin], [p.arm_omega, p.arm_damping]),
         }
     }
 
-    /// The part that a shared parameter acts on, where that is not the first mode.
-    pub(super) fn part_of(&self, slot: usize) -> Option<Part> {
-        let p = self.layout;
-        let of = |parameters: &[ParameterRef]| parameters.iter().any(|a| a.slot == slot);
-        if of(&[p.second_omega, p.second_damping]) {
-            Some(Part::Second)
-        } else if of(&[p.arm_omega, p.arm_damping]) {
-            Some(Part::Arm)
-        } else {
-            of(&[p.lag]).then_some(Part::Transient)
+    /// From where a mode starts.
+    fn start(&self, mode: Mode, nuisance: &[f64]) -> [f64; 2] {
+        self.parameters(mode).0.map(|parameter| nuisance[parameter.slot])
+    }
+
+    /// The reading of a mode.
+    fn read(&self, mode: Mode, [shared, nuisance]: [&[f64]; 2], out: &mut [f64]) -> Result<(), String> {
+        let decay = self.decay(mode, shared);
+        decay.read(times(self.run)?, self.start(mode, nuisance), out).map_err(|e| e.to_string())
+    }
+
+    /// What is left of one unit of the sensor's transient.
+    fn fade(&self, shared: &[f64], out: &mut [f64]) -> Result<(), String> {
+        let lag = shared[self.layout.lag.slot];
+        for (y, t) in out.iter_mut().zip(times(self.run)?) {
+            *y = (-t / lag).exp();
         }
+        Ok(())
     }
 }
 
-/// What is added to the first mode's reading, beside the sensor's zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Part {
-    Second,
-    Arm,
-    Transient,
+/// Adds as many times another reading.
+fn add(out: &mut [f64], times: f64, more: &[f64]) {
+    out.iter_mut().zip(more).for_each(|(y, x)| *y += times * x);
 }
 
 fn times(run: &Run) -> Result<&[f64], String> {
     run.inputs.first().map(Vec::as_slice).ok_or_else(|| "there is no column of times".to_owned())
-}
-
-fn read(decay: &Decay, run: &Run, start: [f64; 2], out: &mut [f64]) -> Result<(), String> {
-    decay.read(times(run)?, start, out).map_err(|e| e.to_string())
-}
-
-/// What is left of one unit of the sensor's transient.
-fn fade(run: &Run, lag: f64, out: &mut [f64]) -> Result<(), String> {
-    for (y, t) in out.iter_mut().zip(times(run)?) {
-        *y = (-t / lag).exp();
-    }
-    Ok(())
 }

@@ -49,24 +49,16 @@ pub(crate) fn whitened_columns(
     for channel in 0..problem.channels() {
         let whitener = problem.whitener(run, channel, noise.shape[channel]);
         let inverse_sigma = 1.0 / noise.sigma[channel];
-        let mut push = |target: usize, mut picked: Vec<f64>| {
-            whitener.whiten(&mut picked);
-            columns[target].extend(picked.into_iter().map(|v| v * inverse_sigma));
-        };
-        for k in 0..free {
-            // The model lists shared columns first; the normal equations eliminate nuisance ones first.
-            let source = if k < selection.nuisance.len() {
-                selection.shared.len() + k
-            } else {
-                k - selection.nuisance.len()
-            };
-            push(k, problem.pick(run, channel, &jacobian[source * rows..(source + 1) * rows]));
+        // The model lists shared columns first; the normal equations eliminate nuisance ones first.
+        let sources = (selection.shared.len()..free).chain(0..selection.shared.len());
+        let mut picked: Vec<Vec<f64>> =
+            sources.map(|k| problem.pick(run, channel, &jacobian[k * rows..(k + 1) * rows])).collect();
+        let valid = problem.rows[run].valid[channel].iter();
+        picked.push(valid.map(|&i| data.outputs[channel][i] - out[channel * data.len() + i]).collect());
+        whitener.whiten_all(&mut picked);
+        for (column, picked) in columns.iter_mut().zip(&picked) {
+            column.extend(picked.iter().map(|v| v * inverse_sigma));
         }
-        let residual: Vec<f64> = problem.rows[run].valid[channel]
-            .iter()
-            .map(|&i| data.outputs[channel][i] - out[channel * data.len() + i])
-            .collect();
-        push(free, residual);
     }
     Ok(columns)
 }

@@ -24,6 +24,10 @@ const NO_GAIN: f64 = 1e-6;
 const HARDLY: f64 = 1e-3;
 /// Gain of a step, promised and had, in the same units, at which a fit is at its end.
 const SETTLED: f64 = 1e-5;
+/// The least part of a step that is tried.
+const SHORTEST: f64 = 0.1;
+/// A step of which more than this part would have been best is not shortened.
+const WHOLE: f64 = 0.75;
 /// Shortened steps in a row that gain next to nothing, after which a fit is at its end: dry friction and jumps leave kinks.
 const PATIENCE: usize = 3;
 
@@ -55,6 +59,36 @@ fn sum_of_squares(
         Ok(dot(&residual, &residual) + nuisance_departure(problem, selection, run, &nuisance[run]))
     };
     Ok(problem.by_run(of_run)?.into_iter().sum())
+}
+
+/// The normal equations where a step leads, and the sum of squares there (infinite where the model says nothing); without derivatives
+/// where that is not below a bound: what follows a step that failed often fails as well, and is not worth them.
+fn tried(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    step: &Step,
+    below: Option<f64>,
+) -> (Option<NormalEquations>, f64) {
+    let at = (&step.shared[..], &step.nuisance[..]);
+    if let Some(bound) = below {
+        let reached = sum_of_squares(problem, selection, noise, at.0, at.1).unwrap_or(f64::INFINITY);
+        if !(reached <= bound) {
+            return (None, reached);
+        }
+    }
+    let next = linearise(problem, selection, noise, at.0, at.1).ok();
+    let reached = next.as_ref().map_or(f64::INFINITY, |next| next.chi2);
+    (next, reached)
+}
+
+/// The part of a step at which the sum of squares is least along it: of the parabola with the slope that the step was made from, through
+/// what a part of it gained (`-infinity` where it led nowhere).
+fn best_length(length: f64, predicted: f64, gained: f64) -> f64 {
+    // The sum of squares falls by `2 a predicted` to first order at a part `a`.
+    let bent = 2.0 * length * predicted - gained;
+    let best = predicted * length * length / bent;
+    if bent > 0.0 && best < WHOLE { best } else { 1.0 }
 }
 
 /// Fits the free parameters for a given noise, from a given start.
@@ -96,6 +130,8 @@ pub(crate) fn solve_within(
     let mut converged = false;
     let mut held = vec![false; n_shared];
     let many = problem.knows_many();
+    // What part of a step is taken, whether one from here failed, and whether it was shortened since.
+    let (mut length, mut failed, mut shortened) = (1.0, false, false);
     let (mut hardly, mut promised) = (0, f64::INFINITY);
     let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
     for _ in 0..iterations {
@@ -104,27 +140,27 @@ pub(crate) fn solve_within(
         let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping);
         let predicted = step.predicted;
         promised = predicted;
-        held = step.held;
+        held.clone_from(&step.held);
         let least = if many { NOT_WORTH * left } else { 1e-9 * (1.0 + 1e-6 * linear.chi2) };
         if !(predicted > least) {
             converged = true;
             break;
         }
-        // A shortened step often fails as well: it is not worth its derivatives before it goes down.
-        let at = (&step.shared[..], &step.nuisance[..]);
-        let promises = damping == 0.0
-            || sum_of_squares(problem, selection, noise, at.0, at.1).is_ok_and(|next| next <= linear.chi2);
-        let next = promises.then(|| linearise(problem, selection, noise, at.0, at.1));
-        match next.transpose().ok().flatten() {
+        let step = step.part(length, &shared, &nuisance);
+        let (next, reached) = tried(problem, selection, noise, &step, failed.then_some(linear.chi2));
+        let gained = linear.chi2 - reached;
+        let best = best_length(length, predicted, gained);
+        match next {
             Some(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
-                let gained = linear.chi2 - next.chi2;
                 (shared, nuisance, linear) = (step.shared, step.nuisance, next);
+                (length, failed) = (best, damping > 0.0);
                 hardly = if damping > 0.0 && gained < HARDLY * left { hardly + 1 } else { 0 };
                 if hardly == PATIENCE {
                     converged = predicted < STALLED * (1.0 + linear.chi2);
                     break;
                 }
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
+                shortened = false;
                 if gained < SETTLED * left && predicted < SETTLED * left {
                     converged = true;
                     break;
@@ -135,7 +171,12 @@ pub(crate) fn solve_within(
                 converged = predicted < STALLED * (1.0 + linear.chi2);
                 break;
             }
-            _ => damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 },
+            // A step that leads too far is shortened, one that leads astray is damped.
+            _ if !shortened && best > SHORTEST => (length, failed, shortened) = (best, true, true),
+            _ => {
+                damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 };
+                (length, failed, shortened) = (1.0, true, false);
+            }
         }
     }
     converged |= many && promised < 10.0 * STALLED * (1.0 + linear.chi2);

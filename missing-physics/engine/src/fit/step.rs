@@ -58,6 +58,17 @@ impl Step {
         Self::holding(problem, selection, linear, (shared, nuisance), damping, &nuisance_held).0
     }
 
+    /// A part of the step, in (0, 1], from the point that it leads from.
+    pub(crate) fn part(mut self, length: f64, shared: &[f64], nuisance: &[Vec<f64>]) -> Self {
+        let shorten = |to: &mut f64, from: &f64| *to = from + length * (*to - from);
+        if length < 1.0 {
+            self.shared.iter_mut().zip(shared).for_each(|(to, from)| shorten(to, from));
+            let nuisance = nuisance.iter().flatten();
+            self.nuisance.iter_mut().flatten().zip(nuisance).for_each(|(to, from)| shorten(to, from));
+        }
+        self
+    }
+
     /// A step, and which of the nuisance parameters (run, number) it pushes beyond a bound that they stand at.
     fn holding(
         problem: &Problem<'_>,

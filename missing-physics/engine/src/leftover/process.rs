@@ -83,8 +83,9 @@ impl Process {
             let Some(smooth) = smooth else { continue };
             let start: usize = rows[..channel].iter().sum();
             let whitener = problem.whitener(run, channel, self.noise.shape[channel]);
-            for mut part in normalised(problem, curves, run, channel, smooth.variable, smooth.degree) {
-                whitener.whiten(&mut part);
+            let mut parts = normalised(problem, curves, run, channel, smooth.variable, smooth.degree);
+            whitener.whiten_all(&mut parts);
+            for part in parts {
                 let mut column = vec![0.0; rows.iter().sum()];
                 for (to, from) in column[start..].iter_mut().zip(part) {
                     *to = from / self.noise.sigma[channel];
@@ -249,7 +250,7 @@ impl Channel<'_> {
                 all.extend(normalised(problem, self.curves, run, channel, variable, degree));
             }
             all.extend(columns.last().map(|residual| residual[part.clone()].to_vec()));
-            all.iter_mut().for_each(|column| whitener.whiten(column));
+            whitener.whiten_all(&mut all);
             let of_run = gram(&all);
             let n = mine.len();
             let block = of_run.view((0, 0), (n, n)).into_owned();

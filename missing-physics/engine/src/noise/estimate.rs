@@ -134,16 +134,9 @@ impl Left<'_> {
             let whitener = problem.whitener(run, channel, shape);
             let mine = &self.nuisance_columns[run][channel];
             let n_nuisance = mine.len();
-            let whitened: Vec<Vec<f64>> = mine
-                .iter()
-                .copied()
-                .chain([columns.len() - 1])
-                .map(|k| {
-                    let mut column = columns[k][start..end].to_vec();
-                    whitener.whiten(&mut column);
-                    column
-                })
-                .collect();
+            let raw = mine.iter().copied().chain([columns.len() - 1]);
+            let mut whitened: Vec<Vec<f64>> = raw.map(|k| columns[k][start..end].to_vec()).collect();
+            whitener.whiten_all(&mut whitened);
             // The nuisance parameters are fitted anew under each shape: what they were under another one is no evidence.
             let normal = gram(&whitened);
             let block = normal.view((0, 0), (n_nuisance, n_nuisance)).into_owned();

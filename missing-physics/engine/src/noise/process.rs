@@ -56,6 +56,9 @@ impl Shape {
 /// Smallest share of the variance that is white.
 const LEAST_WHITE: f64 = 1e-6;
 
+/// How many columns go through a filter side by side.
+const LANES: usize = 4;
+
 /// Turns noise of one shape at fixed positions into white noise of unit variance, and back.
 #[derive(Debug, Clone)]
 pub struct Whitener {
@@ -148,14 +151,38 @@ impl Whitener {
 
     /// Whitens a column in place.
     pub fn whiten(&self, column: &mut [f64]) {
+        self.whiten_lanes([column]);
+    }
+
+    /// Whitens columns of one length in place, each as [`Self::whiten`] does: several go through the filter side by side, since each of
+    /// its rows waits for the one before.
+    pub fn whiten_all<'c>(&self, columns: impl IntoIterator<Item = &'c mut Vec<f64>>) {
+        let mut columns: Vec<&mut [f64]> = columns.into_iter().map(Vec::as_mut_slice).collect();
+        let mut groups = columns.chunks_exact_mut(LANES);
+        for group in &mut groups {
+            if let [a, b, c, d] = group {
+                self.whiten_lanes([a, b, c, d]);
+            }
+        }
+        groups.into_remainder().iter_mut().for_each(|column| self.whiten(column));
+    }
+
+    fn whiten_lanes<const L: usize>(&self, columns: [&mut [f64]; L]) {
+        if self.kind == Kind::Root {
+            columns.into_iter().for_each(|column| self.whiten_by_root(column));
+            return;
+        }
+        self.run_from(0, columns, |value, mean, inverse_sigma| {
+            let innovation = value - mean;
+            (innovation * inverse_sigma, innovation)
+        });
+    }
+
+    fn whiten_by_root(&self, column: &mut [f64]) {
         for (i, row) in self.root.iter().enumerate().take(column.len()) {
             let known: f64 = row[..i].iter().zip(&column[..i]).map(|(r, x)| r * x).sum();
             column[i] = (column[i] - known) / row[i];
         }
-        self.run(column, |value, mean, inverse_sigma| {
-            let innovation = value - mean;
-            (innovation * inverse_sigma, innovation)
-        });
     }
 
     /// Turns white noise of unit variance into noise of this shape, in place.
@@ -163,7 +190,7 @@ impl Whitener {
         for (i, row) in self.root.iter().enumerate().take(column.len()).rev() {
             column[i] = row[..=i].iter().zip(&column[..=i]).map(|(r, x)| r * x).sum();
         }
-        self.run(column, |value, mean, inverse_sigma| {
+        self.run_from(0, [column], |value, mean, inverse_sigma| {
             let innovation = value / inverse_sigma;
             (mean + innovation, innovation)
         });
@@ -184,42 +211,48 @@ impl Whitener {
         if let Some(first) = image.first_mut() {
             *first = 1.0;
         }
-        self.run_from(i, &mut image, |value, mean, inverse_sigma| {
+        self.run_from(i, [&mut image], |value, mean, inverse_sigma| {
             let innovation = value - mean;
             (innovation * inverse_sigma, innovation)
         });
         image
     }
 
+    /// Runs the filter over rows of some columns that begin at row `first`, all rows before them being zero.
     #[inline]
-    fn run(&self, column: &mut [f64], output: impl Fn(f64, f64, f64) -> (f64, f64)) {
-        self.run_from(0, column, output);
-    }
-
-    /// Runs the filter over rows that begin at row `first`, all rows before them being zero.
-    #[inline]
-    fn run_from(&self, first: usize, column: &mut [f64], output: impl Fn(f64, f64, f64) -> (f64, f64)) {
+    fn run_from<const L: usize>(
+        &self,
+        first: usize,
+        columns: [&mut [f64]; L],
+        output: impl Fn(f64, f64, f64) -> (f64, f64),
+    ) {
         let steps = self.steps.get(first..).unwrap_or_default();
+        let rows = columns.iter().fold(steps.len(), |rows, column| rows.min(column.len()));
+        let mut columns = columns.map(|column| &mut column[..rows]);
         match self.kind {
             Kind::White | Kind::Root => {}
             Kind::Rough => {
-                let mut state = 0.0;
-                for (value, step) in column.iter_mut().zip(steps) {
-                    state *= step.transition[0];
-                    let (out, innovation) = output(*value, state, step.inverse_sigma);
-                    state += step.gain[0] * innovation;
-                    *value = out;
+                let mut state = [0.0; L];
+                for (row, step) in steps[..rows].iter().enumerate() {
+                    for (column, state) in columns.iter_mut().zip(&mut state) {
+                        *state *= step.transition[0];
+                        let (out, innovation) = output(column[row], *state, step.inverse_sigma);
+                        *state += step.gain[0] * innovation;
+                        column[row] = out;
+                    }
                 }
             }
             Kind::Smooth => {
-                let (mut state, mut slope) = (0.0, 0.0);
-                for (value, step) in column.iter_mut().zip(steps) {
+                let mut state = [[0.0; 2]; L];
+                for (row, step) in steps[..rows].iter().enumerate() {
                     let f = step.transition;
-                    (state, slope) = (f[0] * state + f[1] * slope, f[2] * state + f[3] * slope);
-                    let (out, innovation) = output(*value, state, step.inverse_sigma);
-                    state += step.gain[0] * innovation;
-                    slope += step.gain[1] * innovation;
-                    *value = out;
+                    for (column, [state, slope]) in columns.iter_mut().zip(&mut state) {
+                        (*state, *slope) = (f[0] * *state + f[1] * *slope, f[2] * *state + f[3] * *slope);
+                        let (out, innovation) = output(column[row], *state, step.inverse_sigma);
+                        *state += step.gain[0] * innovation;
+                        *slope += step.gain[1] * innovation;
+                        column[row] = out;
+                    }
                 }
             }
         }

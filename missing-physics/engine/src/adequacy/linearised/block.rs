@@ -45,7 +45,7 @@ impl Block {
     /// The columns whitened, the nuisance columns eliminated.
     pub(super) fn whitened(&self, whitener: &Whitener) -> Whitened {
         let mut columns = self.raw.clone();
-        columns.iter_mut().filter(|c| c.iter().any(|v| *v != 0.0)).for_each(|c| whitener.whiten(c));
+        whitener.whiten_all(columns.iter_mut().filter(|c| c.iter().any(|v| *v != 0.0)));
         let mut gram = Gram::new(&columns);
         let mine = &self.mine;
         let block = DMatrix::from_fn(mine.len(), mine.len(), |i, j| gram.of(mine[i], mine[j]));
