@@ -124,19 +124,23 @@ fn blur(values: &mut [f64], [width, height]: [usize; 2], sigma_px: f64) {
         (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma_px).powi(2)).exp()).collect();
     let sum: f64 = weights.iter().sum();
     weights.iter_mut().for_each(|w| *w /= sum);
-    let mut line = Vec::new();
-    let mut along = |values: &mut [f64], first: usize, stride: usize, count: usize| {
-        line.clear();
-        line.extend((0..count).map(|k| values[first + stride * k]));
-        for k in 0..count {
-            let at = |o: i64| line[(k as i64 + o).clamp(0, count as i64 - 1) as usize];
-            values[first + stride * k] = weights.iter().zip(-reach..).map(|(w, o)| w * at(o)).sum();
+    // What a shift brings to all of a line at once.
+    let shifted = |v: usize, k: i64, count: usize| (v as i64 + k).clamp(0, count as i64 - 1) as usize;
+    let mut padded = Vec::new();
+    for row in values.chunks_exact_mut(width) {
+        padded.clear();
+        padded.extend((0..width + 2 * reach as usize).map(|u| row[shifted(u, -reach, width)]));
+        row.fill(0.0);
+        for (k, weight) in weights.iter().enumerate() {
+            row.iter_mut().zip(&padded[k..]).for_each(|(sum, value)| *sum += weight * value);
         }
-    };
-    for v in 0..height {
-        along(values, v * width, 1, width);
     }
-    for u in 0..width {
-        along(values, u, width, height);
+    let rows = values.to_vec();
+    for (v, row) in values.chunks_exact_mut(width).enumerate() {
+        row.fill(0.0);
+        for (k, weight) in (-reach..).zip(&weights) {
+            let from = shifted(v, k, height) * width;
+            row.iter_mut().zip(&rows[from..from + width]).for_each(|(sum, value)| *sum += weight * value);
+        }
     }
 }

@@ -131,7 +131,9 @@ impl HeightMap {
         if missing > MOST_MISSING {
             return Err(SeeError::Missing { missing, most: MOST_MISSING });
         }
-        let middle = median(depths.iter().copied().filter(|d| d.is_finite()).collect());
+        let few = if depths.len() < SMALL { 1 } else { FEW };
+        let middle =
+            median(&mut depths.iter().step_by(few).copied().filter(|d| d.is_finite()).collect::<Vec<_>>());
         if !(middle < UNIT_FACTOR * camera.height_m && middle > camera.height_m / UNIT_FACTOR) {
             let (height_m, unit_m) = (camera.height_m, camera.depth_unit_m);
             return Err(SeeError::Unit { depth_m: middle, height_m, unit_m });
@@ -185,37 +187,84 @@ impl Plane {
     fn depth(&self, [x, y]: [f64; 2]) -> f64 {
         self.level / (1.0 - self.slope[0] * x - self.slope[1] * y)
     }
+
+    /// Moves to where most pixels (depth, ray) lie, and says on how many it ended; the first band is twice as wide where the level is a
+    /// guess.
+    fn settle<'p>(
+        &mut self,
+        camera: &Camera,
+        pixels: impl Iterator<Item = (&'p f64, &'p [f64; 2])> + Clone,
+        guess: bool,
+    ) -> usize {
+        let (mut left, mut deeper) = (Vec::new(), Vec::new());
+        let mut within = 0u32;
+        for round in 0..ROUNDS {
+            left.clear();
+            left.extend(pixels.clone().map(|(d, ray)| d - self.depth(*ray)));
+            // Deeper than the ground is only noise: its spread is the noise's. Half of the ground is; no branch could be foreseen.
+            deeper.resize(left.len(), 0.0);
+            let mut count = 0;
+            for r in &left {
+                deeper[count] = *r;
+                count += usize::from(*r > 0.0 && *r < MOST_NOISE);
+            }
+            self.noise =
+                (1.4826 * median(&mut deeper[..count])).max(0.3 * camera.depth_unit_m).min(MOST_NOISE);
+            let band = 2.5 * self.noise * if guess && round == 0 { 2.0 } else { 1.0 };
+            let mut sums = [[0.0; 9]; 2];
+            within = 0;
+            for (k, (r, (_, [x, y]))) in left.iter().zip(pixels.clone()).enumerate() {
+                if r.abs() < band {
+                    let terms = [1.0, *x, *y, x * x, x * y, y * y, *r, r * x, r * y];
+                    sums[k % 2].iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+                    within += 1;
+                }
+            }
+            let [n, x, y, xx, xy, yy, r, rx, ry] = std::array::from_fn(|k| sums[0][k] + sums[1][k]);
+            let h = camera.height_m;
+            let normal = nalgebra::Matrix3::new(
+                n,
+                h * x,
+                h * y,
+                h * x,
+                h * h * xx,
+                h * h * xy,
+                h * y,
+                h * h * xy,
+                h * h * yy,
+            );
+            let right = nalgebra::Vector3::new(r, h * rx, h * ry);
+            let Some(step) = normal.cholesky().map(|c| c.solve(&right)) else { break };
+            self.level += step[0];
+            self.slope[0] += step[1];
+            self.slope[1] += step[2];
+            if step.amax() < SETTLED * self.noise / f64::from(within).sqrt() {
+                break;
+            }
+        }
+        within as usize
+    }
 }
 
-/// The plane that most pixels lie on: from the commonest depth, least squares over what lies within 2.5 sigma, repeated.
+/// One in so many pixels says where the ground lies nearly, where there are enough.
+const FEW: usize = 17;
+const SMALL: usize = 20_000;
+/// Most rounds in which the ground is looked for.
+const ROUNDS: usize = 12;
+/// A step of less than this part of its standard error ends the search for the ground.
+const SETTLED: f64 = 0.01;
+
+/// The plane that most pixels lie on: from the commonest depth, least squares over what lies within 2.5 sigma, repeated; first for some of
+/// the pixels, then for all.
 fn ground(camera: &Camera, depths: &[f64], rays: &[[f64; 2]]) -> Result<Plane, SeeError> {
-    let mut plane = Plane { level: commonest(camera, depths), slope: [0.0; 2], noise: 0.0 };
-    let finite = depths.iter().filter(|d| d.is_finite()).count();
-    let mut within = 0;
-    for round in 0..12 {
-        let left: Vec<f64> = depths.iter().zip(rays).map(|(d, ray)| d - plane.depth(*ray)).collect();
-        // Deeper than the ground is only noise: its spread is the noise's.
-        let deeper: Vec<f64> = left.iter().copied().filter(|r| *r > 0.0 && *r < MOST_NOISE).collect();
-        plane.noise = (1.4826 * median(deeper)).max(0.3 * camera.depth_unit_m).min(MOST_NOISE);
-        let band = 2.5 * plane.noise * if round == 0 { 2.0 } else { 1.0 };
-        let mut normal = nalgebra::Matrix3::<f64>::zeros();
-        let mut right = nalgebra::Vector3::<f64>::zeros();
-        within = 0;
-        for (r, ray) in left.iter().zip(rays).filter(|(r, _)| r.abs() < band) {
-            let [x, y] = ray.map(|v| v * camera.height_m);
-            let row = nalgebra::Vector3::new(1.0, x, y);
-            normal += row * row.transpose();
-            right += row * *r;
-            within += 1;
-        }
-        let Some(step) = normal.cholesky().map(|c| c.solve(&right)) else { break };
-        plane.level += step[0];
-        plane.slope[0] += step[1];
-        plane.slope[1] += step[2];
-        if step.amax() < 1e-9 {
-            break;
-        }
+    let few = if depths.len() < SMALL { 1 } else { FEW };
+    let level = commonest(camera, depths.iter().step_by(few).copied());
+    let mut plane = Plane { level, slope: [0.0; 2], noise: 0.0 };
+    let mut within = plane.settle(camera, depths.iter().zip(rays).step_by(few), true);
+    if few > 1 {
+        within = plane.settle(camera, depths.iter().zip(rays), false);
     }
+    let finite = depths.iter().filter(|d| d.is_finite()).count();
     let share = 100.0 * within as f64 / finite.max(1) as f64;
     if share < LEAST_GROUND || plane.noise >= ROUGH * MOST_NOISE || plane.slope.iter().any(|s| s.abs() > 1.0)
     {
@@ -225,10 +274,10 @@ fn ground(camera: &Camera, depths: &[f64], rays: &[[f64; 2]]) -> Result<Plane, S
 }
 
 /// The commonest depth, in bins of half a percent of the camera's height.
-fn commonest(camera: &Camera, depths: &[f64]) -> f64 {
+fn commonest(camera: &Camera, depths: impl Iterator<Item = f64> + Clone) -> f64 {
     let bin = 5e-3 * camera.height_m;
     let mut bins = vec![0u32; 1 + (2.0 * camera.height_m / bin) as usize];
-    for d in depths.iter().filter(|d| d.is_finite()) {
+    for d in depths.clone().filter(|d| d.is_finite()) {
         if let Some(count) = bins.get_mut((d / bin) as usize) {
             *count += 1;
         }
@@ -236,5 +285,6 @@ fn commonest(camera: &Camera, depths: &[f64]) -> f64 {
     let most = bins.iter().enumerate().max_by_key(|(_, n)| **n).map_or(0, |(i, _)| i);
     let middle = (most as f64 + 0.5) * bin;
     // A little wider than the bin: a ground without noise may lie on its very edge.
-    median(depths.iter().copied().filter(|d| (d - middle).abs() <= 0.6 * bin).collect())
+    let near = depths.filter(|d| (d - middle).abs() <= 0.6 * bin);
+    median(&mut near.collect::<Vec<_>>())
 }

@@ -89,9 +89,11 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
         if !z.is_finite() {
             continue;
         }
-        let r = x.hypot(y) / length;
+        let r = (x * x + y * y).sqrt() / length;
         radii[i] = r;
-        if let Some(k) = RINGS.windows(2).position(|w| r >= w[0] && r < w[1]) {
+        // Rings begin at zero: how many of their edges lie within the radius is found without a branch.
+        let k = RINGS.iter().map(|edge| usize::from(*edge <= r)).sum::<usize>().wrapping_sub(1);
+        if k < ring.len() {
             ring[k] += z;
             pixels[k] += 1;
         }

@@ -1,5 +1,7 @@
 //! Weighted ridge regression whose strength is chosen by what is left out.
 
+use faer::linalg::solvers::Solve;
+use faer::{ColRef, MatRef, Side};
 use nalgebra::{DMatrix, DVector};
 
 /// Parts that are left out in turn.
@@ -27,24 +29,24 @@ pub(super) struct Fitted {
 impl Design {
     /// Coefficients of values with weights (one each on average), at the strength that foretells best what is left out.
     pub(super) fn fit(&self, values: &DVector<f64>, weights: &DVector<f64>) -> Fitted {
-        let parts: Vec<(Vec<usize>, Normal)> = (0..FOLDS)
+        let parts: Vec<(Vec<usize>, DMatrix<f64>, Normal)> = (0..FOLDS)
             .map(|fold| {
                 let of_fold: Vec<usize> =
                     (0..values.len()).filter(|i| self.groups[*i] % FOLDS == fold).collect();
                 let rows = self.rows.select_rows(&of_fold);
                 let normal =
                     Normal::new(&rows, &values.select_rows(&of_fold), &weights.select_rows(&of_fold));
-                (of_fold, normal)
+                (of_fold, rows, normal)
             })
             .collect();
         let mut normal = Normal::nothing(self.degrees.len());
-        parts.iter().for_each(|(_, part)| normal.add(part));
+        parts.iter().for_each(|(_, _, part)| normal.add(part));
         let left_out = |strength: f64| {
             let mut left = vec![0.0; values.len()];
-            for (of_fold, part) in &parts {
-                let coefficients = normal.less(part).solve(&self.degrees, strength);
-                for &i in of_fold {
-                    left[i] = values[i] - (self.rows.row(i) * &coefficients)[0];
+            for (of_fold, rows, part) in &parts {
+                let foretold = rows * normal.less(part).solve(&self.degrees, strength);
+                for (&i, foretold) in of_fold.iter().zip(&foretold) {
+                    left[i] = values[i] - foretold;
                 }
             }
             left
@@ -97,6 +99,11 @@ impl Normal {
             matrix[(k, k)] +=
                 strength * if *degree == 0 { 1e-3 } else { DEARER.powi(i32::from(*degree) - 1) };
         }
-        matrix.cholesky().map_or_else(|| DVector::zeros(degrees.len()), |c| c.solve(&self.right))
+        let n = degrees.len();
+        let factor = MatRef::from_column_major_slice(matrix.as_slice(), n, n).llt(Side::Lower);
+        factor.map_or_else(
+            |_| DVector::zeros(n),
+            |c| DVector::from_iterator(n, c.solve(ColRef::from_slice(self.right.as_slice())).iter().copied()),
+        )
     }
 }

@@ -163,17 +163,21 @@ fn begun(
     }
     let mut begun = Vec::new();
     for (_, alike) in by_numbers {
-        let few = alike.len() <= FINALISTS;
-        if !few {
-            let some = |start: &&Vec<f64>| {
-                solve_within(HEAT, problem, selection, &near.noise, (start, &near.nuisance)).ok()
-            };
-            let mut fits: Vec<Fit> = alike.iter().filter_map(some).collect();
-            fits.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
-            begun.extend(fits.into_iter().take(FINALISTS).map(|fit| (fit.shared, fit.nuisance)));
-        } else {
-            begun.extend(alike.into_iter().map(|start| (start.clone(), near.nuisance.clone())));
+        let begin = |start: &Vec<f64>| (start.clone(), near.nuisance.clone());
+        if alike.len() <= FINALISTS {
+            begun.extend(alike.into_iter().map(begin));
+            continue;
         }
+        let some = |start: &&Vec<f64>| {
+            solve_within(HEAT, problem, selection, &near.noise, (start, &near.nuisance)).ok()
+        };
+        let mut fits: Vec<Fit> = alike.iter().filter_map(some).collect();
+        if fits.is_empty() {
+            // Why none of them is possible is said where one is fitted.
+            begun.extend(alike.first().map(|start| begin(start)));
+        }
+        fits.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        begun.extend(fits.into_iter().take(FINALISTS).map(|fit| (fit.shared, fit.nuisance)));
     }
     begun
 }
