@@ -6,6 +6,7 @@ use missing_physics::model::{Derived, ParameterRef, Quantity, SpecBuilder};
 
 use super::effects::Effects;
 use super::setup::Setup;
+use super::spread::{HEADS, OUTWARDS};
 
 /// Where each parameter stands; `None` where the data cannot show it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -106,9 +107,9 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (SpecBuilder, Layout) {
 pub(super) fn hand(b: &mut SpecBuilder, nominal: &Effects) -> [ParameterRef; 3] {
     let [x, y] = nominal.heads;
     [
-        b.shared("heads_x_rad", "rad", x, [-1.0, 1.0], 0.005),
-        b.shared("heads_y_rad", "rad", y, [-1.0, 1.0], 0.005),
-        b.shared("outwards_rad_m", "rad/m", nominal.outwards_per_m, [-50.0, 50.0], 0.1),
+        b.shared("heads_x_rad", "rad", x, HEADS, 0.005),
+        b.shared("heads_y_rad", "rad", y, HEADS, 0.005),
+        b.shared("outwards_rad_m", "rad/m", nominal.outwards_per_m, OUTWARDS, 0.1),
     ]
 }
 

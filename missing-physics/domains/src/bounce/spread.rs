@@ -77,6 +77,13 @@ const NUISANCES: [Change; 6] = [
 /// take for a smaller slope.
 const HAND: [Change; 3] = [|e, d| e.heads[0] += d, |e, d| e.heads[1] += d, |e, d| e.outwards_per_m += d];
 
+/// What each of them is beforehand, give or take, in rad and rad/m: few drops that come apart would have a hand throw balls along the
+/// table.
+const HAND_WIDTH: [f64; 3] = [0.3, 0.3, 10.0];
+/// Where a heading (rad), and how it changes outwards (rad/m), may lie.
+pub(super) const HEADS: [f64; 2] = [-1.0, 1.0];
+pub(super) const OUTWARDS: [f64; 2] = [-50.0, 50.0];
+
 /// Whether there are drops enough to say how a hand lets go of balls.
 pub(super) const fn released(drops: usize) -> bool {
     drops >= 5
@@ -98,8 +105,8 @@ fn nuisances(drops: &[Drop]) -> Vec<Change> {
 #[derive(Clone, Copy)]
 struct Likelihood<'a> {
     drops: &'a [(Linear, DVector<f64>, DMatrix<f64>)],
-    /// How many nuisances there are.
-    columns: usize,
+    /// What is known of the nuisances beforehand: the precision of each, and how far the effects are from the likeliest.
+    beforehand: &'a [[f64; 2]],
     calibration: Calibration,
     start: Spread,
 }
@@ -173,10 +180,14 @@ impl Likelihood<'_> {
 
     /// Minus twice the logarithm, up to a constant, and the nuisances' best values.
     fn value(&self, spread: &Spread) -> Option<(f64, DVector<f64>)> {
-        let columns = self.columns;
-        let (mut total, mut squares) = (0.0, 0.0);
-        let mut normal = DMatrix::identity(columns, columns) * 1e-9;
-        let mut pull = DVector::zeros(columns);
+        let columns = self.beforehand.len();
+        let precision =
+            DVector::from_iterator(columns, self.beforehand.iter().map(|[precision, _]| *precision));
+        let departure =
+            DVector::from_iterator(columns, self.beforehand.iter().map(|[_, departure]| *departure));
+        let mut normal = DMatrix::from_diagonal(&precision);
+        let mut pull = precision.component_mul(&departure);
+        let (mut total, mut squares) = (0.0, pull.dot(&departure));
         for (linear, errors, design) in self.drops {
             let factor = linear.factor(spread, 0.0)?;
             let lower = factor.l_dirty();
@@ -241,7 +252,14 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
     let nuisances = nuisances(drops);
     for _ in 0..ROUNDS {
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, &nuisances)).collect();
-        let likelihood = Likelihood { drops: &parts, columns: nuisances.len(), calibration, start: spread };
+        let mut beforehand = vec![[1e-9, 0.0]; nuisances.len()];
+        if released(drops.len()) {
+            let [x, y] = begin.heads;
+            let by_hand =
+                beforehand.iter_mut().rev().zip(HAND_WIDTH.iter().zip([x, y, begin.outwards_per_m]).rev());
+            by_hand.for_each(|(to, (width, from))| *to = [width.powi(-2), from]);
+        }
+        let likelihood = Likelihood { drops: &parts, beforehand: &beforehand, calibration, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);
         let (_, moved) = likelihood.value(&spread)?;
         plausible = Likelihood { start: spread, ..likelihood }.plausible();
@@ -249,7 +267,8 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
         nuisances.iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
         likely.friction = 0.0;
         likely.drag_per_m = likely.drag_per_m.max(0.0);
-        (begin.heads, begin.outwards_per_m) = (likely.heads, likely.outwards_per_m);
+        begin.heads = likely.heads.map(|v| v.clamp(HEADS[0], HEADS[1]));
+        begin.outwards_per_m = likely.outwards_per_m.clamp(OUTWARDS[0], OUTWARDS[1]);
         linear = linear.iter().map(|l| l.likely(&likely, &spread)).collect::<Option<_>>()?;
     }
     let Effects { heads, outwards_per_m, .. } = begin;

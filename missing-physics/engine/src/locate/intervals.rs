@@ -5,8 +5,8 @@ use crate::locate::responses::{Effect, Form, Responses};
 
 /// So many groups of neighbouring runs are told apart.
 const GROUPS: usize = 40;
-/// By how much a change that goes on to the last run is worth more than what is over before.
-const STAYS: f64 = 1.0;
+/// By how much a change that goes on to the last run, or to the end of the variable, is worth more than what is over before.
+pub(crate) const STAYS: f64 = 1.0;
 /// Likelihoods that differ by this part of their sum are the same: as they are where the same readings are moved, but for rounding.
 const EVEN: f64 = 1e-3;
 /// A subset of the runs is sought among so many at most.
@@ -36,6 +36,11 @@ impl Found {
 pub(crate) struct Best {
     pub(crate) simple: Option<Found>,
     pub(crate) some_runs: Option<Found>,
+}
+
+/// Whether an interval begins somewhere within so many bins and ends where they do.
+pub(crate) fn goes_on((from, to): (usize, usize), bins: usize) -> bool {
+    from > 0 && to == bins
 }
 
 /// An effect in several runs.
@@ -68,6 +73,8 @@ impl Scan<'_> {
                     self.responses.iter().map(|r| r.by_run(self.bins, interval, form)).collect();
                 let whole = interval == (0, n) && form == Form::Even;
                 let scanned = if whole { 0.0 } else { 2.0 * (Form::ALL.len() as f64 * intervals).ln() };
+                // A shift from somewhere on has another side that fits as well where each run has a level of its own: what was before.
+                let scanned = if goes_on(interval, n) { scanned - STAYS } else { scanned };
                 self.all_runs(&effects, interval, form, scanned, &mut best.simple);
                 if self.alone && self.runs > 1 && form == Form::Even {
                     self.neighbouring_runs(&effects, interval, scanned, &mut best.simple);

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::locate::bins::{Along, Bins};
+use crate::locate::intervals::{STAYS, goes_on};
 use crate::locate::least_squares::least_squares;
 use crate::problem::Problem;
 
@@ -93,6 +94,7 @@ impl Scan {
         let bins_in_all = self.rows.len() as f64;
         // Any of the intervals could have been it.
         let scanned = 2.0 * (0.5 * bins_in_all * (bins_in_all + 1.0)).ln();
+        let scanned = if goes_on(bins, self.rows.len()) { scanned - STAYS } else { scanned };
         let missed = self.whole - self.outside(bins).0;
         let freed = Interval {
             worth: variance_gain(dropped, missed) - price - scanned,
