@@ -52,11 +52,28 @@ impl Maker for Bounce {
         }
         let ([header, data], unheard) = made;
         key.state_missed(unheard.len(), world.runs);
+        if let Some(place) = key.place.as_mut().filter(|place| place.variable == "x_m") {
+            place.runs = coming_there(&data, place);
+        }
         if hidden == Hidden::Local && world.effects.unheard > 0.0 {
             key.events = unheard.iter().map(|[run, impact]| (run.to_string(), *impact as f64)).collect();
         }
         Concealed::table(header, data, key)
     }
+}
+
+/// The runs that come to a place along x, as recorded: a stripe does nothing to the others.
+fn coming_there(data: &str, place: &Place) -> Vec<String> {
+    let mut runs: Vec<String> = Vec::new();
+    for row in data.lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let there =
+            cells.get(3).and_then(|x| x.parse().ok()).is_some_and(|x: f64| x >= place.from && x <= place.to);
+        if there && !runs.iter().any(|run| run == cells[0]) {
+            runs.push(cells[0].into());
+        }
+    }
+    runs
 }
 
 /// A restitution that is lower on a stripe of the table, from a drop on, or at some speeds; or a few impacts that go unheard.

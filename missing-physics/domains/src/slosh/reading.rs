@@ -95,7 +95,7 @@ impl Reading<'_> {
     ) -> Result<(), String> {
         let p = self.layout;
         let [shared, nuisance] = parameters;
-        let (mut first, mut fade) = (vec![0.0; out.len()], vec![0.0; out.len()]);
+        let [mut first, mut more, mut fade] = [0, 1, 2].map(|_| vec![0.0; out.len()]);
         let known = self.known(parameters, free)?;
         match known.first() {
             Some((Mode::First, decay)) => decay.read(self.start(Mode::First, nuisance), &mut first),
@@ -103,8 +103,8 @@ impl Reading<'_> {
         }
         out.copy_from_slice(&first);
         for (mode, decay) in known.iter().filter(|(mode, _)| *mode != Mode::First) {
-            decay.read(self.start(*mode, nuisance), &mut fade);
-            add(out, 1.0, &fade);
+            decay.read(self.start(*mode, nuisance), &mut more);
+            add(out, 1.0, &more);
         }
         self.fade(shared, &mut fade)?;
         let (zero, transient, lag) = (nuisance[p.zero.slot], nuisance[p.transient.slot], shared[p.lag.slot]);
