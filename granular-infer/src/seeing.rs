@@ -131,9 +131,8 @@ impl HeightMap {
         if missing > MOST_MISSING {
             return Err(SeeError::Missing { missing, most: MOST_MISSING });
         }
-        let few = if depths.len() < SMALL { 1 } else { FEW };
-        let middle =
-            median(&mut depths.iter().step_by(few).copied().filter(|d| d.is_finite()).collect::<Vec<_>>());
+        let some = depths.iter().step_by(one_in(depths.len())).copied().filter(|d| d.is_finite());
+        let middle = median(&mut some.collect::<Vec<_>>());
         if !(middle < UNIT_FACTOR * camera.height_m && middle > camera.height_m / UNIT_FACTOR) {
             let (height_m, unit_m) = (camera.height_m, camera.depth_unit_m);
             return Err(SeeError::Unit { depth_m: middle, height_m, unit_m });
@@ -246,9 +245,11 @@ impl Plane {
     }
 }
 
-/// One in so many pixels says where the ground lies nearly, where there are enough.
-const FEW: usize = 17;
-const SMALL: usize = 20_000;
+/// One in so many pixels of a picture says nearly where the ground lies: of a small picture all do.
+const fn one_in(pixels: usize) -> usize {
+    if pixels < 20_000 { 1 } else { 17 }
+}
+
 /// Most rounds in which the ground is looked for.
 const ROUNDS: usize = 12;
 /// A step of less than this part of its standard error ends the search for the ground.
@@ -257,7 +258,7 @@ const SETTLED: f64 = 0.01;
 /// The plane that most pixels lie on: from the commonest depth, least squares over what lies within 2.5 sigma, repeated; first for some of
 /// the pixels, then for all.
 fn ground(camera: &Camera, depths: &[f64], rays: &[[f64; 2]]) -> Result<Plane, SeeError> {
-    let few = if depths.len() < SMALL { 1 } else { FEW };
+    let few = one_in(depths.len());
     let level = commonest(camera, depths.iter().step_by(few).copied());
     let mut plane = Plane { level, slope: [0.0; 2], noise: 0.0 };
     let mut within = plane.settle(camera, depths.iter().zip(rays).step_by(few), true);

@@ -91,8 +91,8 @@ pub fn statistics(map: &HeightMap, count: usize, diameter_m: f64) -> [f64; COUNT
         }
         let r = (x * x + y * y).sqrt() / length;
         radii[i] = r;
-        // Rings begin at zero: how many of their edges lie within the radius is found without a branch.
-        let k = RINGS.iter().map(|edge| usize::from(*edge <= r)).sum::<usize>().wrapping_sub(1);
+        // Rings begin at zero: the ring is how many of the other edges lie within the radius.
+        let k = RINGS[1..].iter().filter(|edge| **edge <= r).count();
         if k < ring.len() {
             ring[k] += z;
             pixels[k] += 1;

@@ -254,10 +254,11 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, &nuisances)).collect();
         let mut beforehand = vec![[1e-9, 0.0]; nuisances.len()];
         if released(drops.len()) {
+            // The hand's are the last.
             let [x, y] = begin.heads;
-            let by_hand =
-                beforehand.iter_mut().rev().zip(HAND_WIDTH.iter().zip([x, y, begin.outwards_per_m]).rev());
-            by_hand.for_each(|(to, (width, from))| *to = [width.powi(-2), from]);
+            let by_hand = HAND_WIDTH.iter().zip([x, y, begin.outwards_per_m]);
+            beforehand.truncate(nuisances.len() - HAND.len());
+            beforehand.extend(by_hand.map(|(width, from)| [width.powi(-2), from]));
         }
         let likelihood = Likelihood { drops: &parts, beforehand: &beforehand, calibration, start: spread };
         spread = likelihood.spread(&best(&likelihood)?);

@@ -106,7 +106,10 @@ impl Reading<'_> {
             decay.read(self.start(*mode, nuisance), &mut more);
             add(out, 1.0, &more);
         }
-        self.fade(shared, &mut fade)?;
+        let by_fade = |by: &Free| by.is_nuisance(p.transient) || by.is_shared(p.lag);
+        if nuisance[p.transient.slot] != 0.0 || free.iter().any(by_fade) {
+            self.fade(shared, &mut fade)?;
+        }
         let (zero, transient, lag) = (nuisance[p.zero.slot], nuisance[p.transient.slot], shared[p.lag.slot]);
         add(out, transient, &fade);
         out.iter_mut().for_each(|y| *y += zero);
