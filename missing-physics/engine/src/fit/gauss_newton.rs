@@ -1,5 +1,6 @@
 //! Bounded Gauss-Newton for a given noise.
 
+use crate::fit::bordered::BorderedNormal;
 use crate::fit::columns::{normal_of_run, nuisance_departure, whitened_columns};
 use crate::fit::optimum::Fit;
 use crate::fit::step::{NormalEquations, Step};
@@ -181,16 +182,7 @@ pub(crate) fn solve_within(
     }
     converged |= many && promised < 10.0 * STALLED * (1.0 + linear.chi2);
     let bordered = linear.bordered(n_shared);
-    let mut log_likelihood = -0.5 * linear.chi2;
-    for run in bordered.runs() {
-        log_likelihood -= 0.5 * run.log_determinant();
-    }
-    for channel in 0..problem.channels() {
-        log_likelihood -= problem.count(channel) as f64 * noise.sigma[channel].ln();
-        for run in 0..problem.rows.len() {
-            log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
-        }
-    }
+    let log_likelihood = log_likelihood(problem, noise, &bordered, linear.chi2);
     let nuisance_errors = bordered.runs().iter().map(|run| run.errors(n_shared)).collect();
     let at_bound = (0..n_shared).filter(|&i| held[i]).map(|i| selection.shared[i]).collect();
     Ok(Fit {
@@ -204,4 +196,19 @@ pub(crate) fn solve_within(
         converged,
         at_bound,
     })
+}
+
+/// Log likelihood of the noise at a sum of squares, up to a constant, the nuisance parameters integrated out.
+fn log_likelihood(problem: &Problem<'_>, noise: &NoiseState, bordered: &BorderedNormal, chi2: f64) -> f64 {
+    let mut log_likelihood = -0.5 * chi2;
+    for run in bordered.runs() {
+        log_likelihood -= 0.5 * run.log_determinant();
+    }
+    for channel in 0..problem.channels() {
+        log_likelihood -= problem.count(channel) as f64 * noise.sigma[channel].ln();
+        for run in 0..problem.rows.len() {
+            log_likelihood -= 0.5 * problem.whitener(run, channel, noise.shape[channel]).log_determinant;
+        }
+    }
+    log_likelihood
 }
