@@ -191,11 +191,12 @@ impl Drop {
             .velocities(effects.gravity_m_s2, effects.drag_per_m)
     }
 
-    /// By how much each impact is off, in the order of [`Drop::row`]; unheard impacts count as heard where `split` says so.
-    fn fill(&self, effects: &Effects, split: bool, out: &mut [f64]) {
+    /// By how much each impact is off, in the order of [`Drop::row`]; all unheard impacts before the first impact (0) or in a flight (its
+    /// number and 1) count where `split` says so, and the known ones elsewhere.
+    fn fill(&self, effects: &Effects, split: impl Fn(usize) -> bool, out: &mut [f64]) {
         let hidden = |place: usize| {
             let (found, known) = (self.unheard.get(place), self.known.get(place));
-            (if split { found } else { known }).copied().unwrap_or(0)
+            (if split(place) { found } else { known }).copied().unwrap_or(0)
         };
         // Times and places in wrong units change every angle alike, the noise of the directions too: no likelier for that.
         let angles = (1.0 + effects.position_scale)
@@ -235,14 +236,28 @@ impl Drop {
     pub(super) fn errors(&self, effects: &Effects, out: &mut [f64]) {
         let split = effects.unheard;
         if self.unheard == self.known || split == 1.0 {
-            return self.fill(effects, true, out);
+            return self.fill(effects, |_| true, out);
         }
-        self.fill(effects, false, out);
+        self.fill(effects, |_| false, out);
         if split != 0.0 {
             let mut apart = vec![0.0; out.len()];
-            self.fill(effects, true, &mut apart);
+            self.fill(effects, |_| true, &mut apart);
             out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
         }
+    }
+
+    /// By how much the impacts are off the less where the unheard impacts of one place (0: before the first impact; else in the flight of
+    /// that number less 1) count as such, and those of no other; `None` where all that are there are known.
+    pub(super) fn unheard_at(&self, place: usize, effects: &Effects) -> Option<DVector<f64>> {
+        if self.unheard.get(place) == self.known.get(place) {
+            return None;
+        }
+        let of = |split: bool| {
+            let mut out = DVector::zeros(self.errors_len());
+            self.fill(effects, |p| split && p == place, out.as_mut_slice());
+            out
+        };
+        Some(of(false) - of(true))
     }
 
     /// How many impacts went unheard within a flight.

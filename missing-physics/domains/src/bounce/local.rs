@@ -5,6 +5,7 @@ use missing_physics::data::Run;
 use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
 use nalgebra::DVector;
 
+use super::effects::Effects;
 use super::model::{BounceModel, ShownDrop};
 use super::times::TimesModel;
 
@@ -12,13 +13,23 @@ use super::times::TimesModel;
 const RESTITUTION: usize = 0;
 const FLIGHT: usize = 1;
 const MISREAD: usize = 2;
+const DIRECTION: usize = 3;
+const UNHEARD: usize = 4;
+/// The number of that unknown where there are times alone.
+const UNHEARD_IN_TIMES: usize = 2;
+
+/// An unknown of one component.
+fn one(name: &str, component: &str, unit: &str) -> LocalUnknown {
+    LocalUnknown::new(name, vec![Quantity::new(component, unit)])
+}
+
+/// That the impacts which a flight seems to hide are there (1) or not (0).
+fn unheard() -> LocalUnknown {
+    one("impacts that were not heard", "unheard", "").at_single_rows()
+}
 
 /// Those that times alone show.
 fn of_times() -> Vec<LocalUnknown> {
-    let one = |name: &str, component: &str, unit: &str| LocalUnknown {
-        name: name.into(),
-        components: vec![Quantity::new(component, unit)],
-    };
     vec![
         one("another restitution", "log_restitution", ""),
         one("a longer flight", "duration_s", "s"),
@@ -27,26 +38,37 @@ fn of_times() -> Vec<LocalUnknown> {
 }
 
 impl ShownDrop {
-    /// By how much each error changes.
-    fn change(&self, (unknown, component): (usize, usize), amounts: &[f64]) -> DVector<f64> {
+    /// By how much each prediction of an error changes.
+    fn change(
+        &self,
+        (unknown, component): (usize, usize),
+        effects: &Effects,
+        amounts: &[f64],
+    ) -> DVector<f64> {
         let linear = &self.weights.linear;
         let drop = &linear.drop;
         let mut change = DVector::zeros(drop.errors_len());
         for (row, amount) in amounts.iter().enumerate().filter(|(_, amount)| **amount != 0.0) {
             let impact = self.rows.heard.start + row;
             match (unknown, self.rows.known(row)) {
+                (UNHEARD, _) => {
+                    // What is before the first row shows there.
+                    let places = if row == 0 { 0..impact + 2 } else { impact + 1..impact + 2 };
+                    let there = places.filter_map(|place| drop.unheard_at(place, effects));
+                    there.for_each(|less| change.axpy(*amount, &less, 1.0));
+                }
+                // A measured time that is late makes the errors what they are; the others are what is expected.
                 (MISREAD, _) => change.axpy(*amount, &linear.by_time(impact), 1.0),
                 (FLIGHT, _) => {
                     let later = impact + 1..drop.times_s.len();
                     later.for_each(|k| change.axpy(*amount, &linear.by_time(k), 1.0));
                 }
-                (RESTITUTION, Some(known)) => change[drop.row(known, 0)] -= amount,
-                (_, Some(known)) => change[drop.row(known, 1 + component)] -= amount,
-                (_, None) => {}
+                (RESTITUTION, Some(known)) => change[drop.row(known, 0)] += amount,
+                (DIRECTION, Some(known)) => change[drop.row(known, 1 + component)] += amount,
+                _ => {}
             }
         }
-        // A measured time that is late makes the errors what they are; the others are what is expected.
-        if matches!(unknown, FLIGHT | MISREAD) { change } else { -change }
+        change
     }
 }
 
@@ -54,7 +76,8 @@ impl LocalCauses for BounceModel {
     fn unknowns(&self) -> Vec<LocalUnknown> {
         let components = ["heading_x_rad", "heading_y_rad"].map(|name| Quantity::new(name, "rad")).into();
         let mut all = of_times();
-        all.push(LocalUnknown { name: "another direction".into(), components });
+        all.push(LocalUnknown::new("another direction", components));
+        all.extend(self.hides_impacts().then(unheard));
         all
     }
 
@@ -62,16 +85,17 @@ impl LocalCauses for BounceModel {
         &self,
         of: (usize, usize),
         runs: &[Run],
-        _: &[f64],
+        shared: &[f64],
         _: &[Vec<f64>],
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError> {
+        let effects = self.effects(shared);
         let of_run = |(run, amounts): (&Run, &Vec<f64>)| {
             let n = run.len();
             let mut out = vec![0.0; run.outputs.len() * n];
             let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
             let shown = self.shown(&run.label).ok_or_else(|| wrong("no such drop"))?;
-            let white = shown.weights.white_change(shown.change(of, amounts));
+            let white = shown.weights.white_change(shown.change(of, &effects, amounts));
             let white = white.ok_or_else(|| wrong("the covariance of its errors has no root"))?;
             let drop = &shown.weights.linear.drop;
             for row in 0..n {
@@ -88,7 +112,9 @@ impl LocalCauses for BounceModel {
 impl LocalCauses for TimesModel {
     fn unknowns(&self) -> Vec<LocalUnknown> {
         // A misread time is an offset of what was measured.
-        of_times().into_iter().take(MISREAD).collect()
+        let mut all: Vec<LocalUnknown> = of_times().into_iter().take(MISREAD).collect();
+        all.extend(self.hides_impacts().then(unheard));
+        all
     }
 
     fn response(
@@ -109,11 +135,14 @@ impl LocalCauses for TimesModel {
                 });
                 return Ok(late.collect());
             }
+            let failed = |reason| PredictError { run: run.label.clone(), reason };
+            if unknown == UNHEARD_IN_TIMES {
+                return self.later_by_unheard(run, shared, nuisance, amounts).map_err(failed);
+            }
             let moved = |step: f64| {
                 let springier: Vec<f64> = amounts.iter().map(|a| step * a).collect();
                 let mut out = vec![0.0; run.len()];
-                self.fill(run, shared, nuisance, &springier, &mut out)
-                    .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
+                self.fill(run, shared, nuisance, &springier, &mut out).map_err(failed)?;
                 Ok(out)
             };
             let (high, low) = (moved(STEP)?, moved(-STEP)?);

@@ -83,6 +83,11 @@ impl BounceModel {
         &self.setup
     }
 
+    /// Whether some flights seem to hide impacts that went unheard.
+    pub(super) fn hides_impacts(&self) -> bool {
+        self.layout.unheard.is_some()
+    }
+
     pub(super) fn nominal(&self) -> &Effects {
         &self.nominal
     }

@@ -117,13 +117,12 @@ impl TimesModel {
         }
     }
 
-    /// Times of the impacts that are heard, of all that there are.
+    /// Times of the impacts that are heard, of all that there are: so many went unheard before each, `gaps`.
     fn times(
         &self,
-        run: &Run,
         shared: &[f64],
         nuisance: &[f64],
-        (hidden, springier): (usize, &[f64]),
+        (gaps, springier): (&[f64], &[f64]),
         out: &mut [f64],
     ) -> Result<(), String> {
         let p = &self.layout;
@@ -146,7 +145,7 @@ impl TimesModel {
         let mut elapsed = 0.0;
         let mut impact = 0.0;
         for (i, time) in out.iter_mut().enumerate() {
-            let wanted = i as f64 + run.inputs[hidden][i];
+            let wanted = i as f64 + gaps[i];
             while impact < wanted {
                 let (duration, lands) = rebound(leaves, gravity, drag);
                 elapsed += duration;
@@ -161,6 +160,35 @@ impl TimesModel {
         Ok(())
     }
 
+    /// Whether some flights seem to hide impacts that went unheard.
+    pub(super) fn hides_impacts(&self) -> bool {
+        self.layout.unheard.is_some()
+    }
+
+    /// How much later each impact is by those that a flight seems to hide, taken for what they are to the amount at the row before it.
+    pub(super) fn later_by_unheard(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        amounts: &[f64],
+    ) -> Result<Vec<f64>, String> {
+        let [known, found] = [KNOWN, FOUND].map(|k| run.inputs.get(k).ok_or("its impacts are not numbered"));
+        let (known, found) = (known?, found?);
+        let mut none = vec![0.0; run.len()];
+        self.times(shared, nuisance, (known, &[]), &mut none)?;
+        let mut later = vec![0.0; run.len()];
+        let hides = |row: usize| (found[row + 1] - found[row]) - (known[row + 1] - known[row]);
+        for row in (0..run.len().saturating_sub(1)).filter(|&row| amounts[row] != 0.0 && hides(row) > 0.0) {
+            let more = |(k, gaps): (usize, &f64)| if k > row { gaps + hides(row) } else { *gaps };
+            let gaps: Vec<f64> = known.iter().enumerate().map(more).collect();
+            let mut times = vec![0.0; run.len()];
+            self.times(shared, nuisance, (&gaps, &[]), &mut times)?;
+            later.iter_mut().zip(times.iter().zip(&none)).for_each(|(l, (t, n))| *l += amounts[row] * (t - n));
+        }
+        Ok(later)
+    }
+
     /// The times where the logarithm of the restitution of each row's impact is larger by some amounts (none: empty).
     pub(super) fn fill(
         &self,
@@ -173,11 +201,11 @@ impl TimesModel {
         if run.inputs.len() <= FOUND {
             return Err("its impacts are not numbered".into());
         }
-        self.times(run, shared, nuisance, (KNOWN, springier), out)?;
+        self.times(shared, nuisance, (&run.inputs[KNOWN], springier), out)?;
         let split = self.layout.unheard.map_or(0.0, |at| shared[at.slot]);
         if split != 0.0 {
             let mut apart = vec![0.0; out.len()];
-            self.times(run, shared, nuisance, (FOUND, springier), &mut apart)?;
+            self.times(shared, nuisance, (&run.inputs[FOUND], springier), &mut apart)?;
             out.iter_mut().zip(&apart).for_each(|(o, a)| *o += split * (a - *o));
         }
         Ok(())

@@ -317,7 +317,7 @@ impl MultimodalModel for DoughModel {
 impl LocalCauses for DoughModel {
     fn unknowns(&self) -> Vec<LocalUnknown> {
         let part = Quantity::new("relative_response", "");
-        vec![LocalUnknown { name: "another response".into(), components: vec![part] }]
+        vec![LocalUnknown::new("another response", vec![part])]
     }
 
     /// What was learned ties rolls of all doughs together.

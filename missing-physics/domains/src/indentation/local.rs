@@ -10,9 +10,8 @@ const STIFFNESS: usize = 1;
 impl LocalCauses for IndentationModel {
     /// A modulus by which the force of a row is larger as a whole, and a stiffness whose force stays on at larger depths.
     fn unknowns(&self) -> Vec<LocalUnknown> {
-        let one = |name: &str, component: &str, unit: &str| LocalUnknown {
-            name: name.into(),
-            components: vec![Quantity::new(component, unit)],
+        let one = |name: &str, component: &str, unit: &str| {
+            LocalUnknown::new(name, vec![Quantity::new(component, unit)])
         };
         vec![one("another modulus", "relative_modulus", ""), one("another stiffness", "stiffness_n_m", "N/m")]
     }

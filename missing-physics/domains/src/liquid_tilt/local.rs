@@ -11,9 +11,8 @@ const STEP: f64 = 1e-5;
 
 impl LocalCauses for LiquidTiltModel {
     fn unknowns(&self) -> Vec<LocalUnknown> {
-        let one = |name: &str, component: &str, unit: &str| LocalUnknown {
-            name: name.into(),
-            components: vec![Quantity::new(component, unit)],
+        let one = |name: &str, component: &str, unit: &str| {
+            LocalUnknown::new(name, vec![Quantity::new(component, unit)])
         };
         let mut all = vec![
             one("another amount of liquid", "relative_mass", ""),

@@ -165,7 +165,7 @@ impl LocalCauses for MotionModel {
         let (joint_count, several) = (joints.len(), self.acted_on().len() > 1);
         let unknown = |what: &str, of: &str, component: Quantity| {
             let name = if several { format!("{what} on {of}") } else { what.to_owned() };
-            LocalUnknown { name, components: vec![component] }
+            LocalUnknown::new(name, vec![component])
         };
         let of_state = |(k, (component, state)): (usize, (Quantity, usize))| match joints.get(k) {
             Some(joint) => unknown("a force", &joint.name, component),

@@ -12,7 +12,7 @@ impl LocalCauses for SloshModel {
             "N" => ("forcing_n_s2", "N/s^2"),
             _ => ("forcing_nm_s2", "N m/s^2"),
         };
-        vec![LocalUnknown { name: "a push".into(), components: vec![Quantity::new(name, unit)] }]
+        vec![LocalUnknown::new("a push", vec![Quantity::new(name, unit)])]
     }
 
     fn response(

@@ -75,7 +75,7 @@ impl LocalCauses for TrajectoryModel {
             Axes::Accelerometer => return Vec::new(),
         };
         let component = |axis: &&str| Quantity::new(format!("acceleration_{axis}_m_s2"), "m/s^2");
-        vec![LocalUnknown { name: "a force".into(), components: axes.iter().map(component).collect() }]
+        vec![LocalUnknown::new("a force", axes.iter().map(component).collect())]
     }
 
     fn response(

@@ -59,7 +59,9 @@ pub(crate) struct Scene<'a> {
 impl Scene<'_> {
     /// The hypothesis that is worth most; `None` where none can be had.
     pub(crate) fn best(&self) -> Result<Option<Cause>, PredictError> {
+        let within = |unknown: &usize| !self.unknowns[*unknown].told.at_single_rows;
         let pairs: Vec<(usize, usize)> = (0..self.unknowns.len())
+            .filter(within)
             .flat_map(|unknown| (0..self.variables.len()).map(move |along| (unknown, along)))
             .collect();
         let found: Vec<Best> = pairs

@@ -95,8 +95,11 @@ pub(crate) fn locate(
     let events = events(problem, baseline, sigma, projection, unknowns)?;
     let places = Places { problem, columns, sigma };
     let found = match (cause, events) {
-        (cause, Some(events))
-            if events.worth > SIMPLER * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth) =>
+        (cause, Some(events)) if {
+            // What acts at single rows only is no fit of many amounts to an interval.
+            let simpler = if unknowns[events.unknown].told.at_single_rows { 1.0 } else { SIMPLER };
+            events.worth > simpler * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth)
+        } =>
         {
             places.of_events(&unknowns[events.unknown], &variables[0], &events)
         }

@@ -17,7 +17,7 @@ pub(crate) fn unknowns<'a>(problem: &Problem<'a>) -> Vec<Unknown<'a>> {
         let told = causes.unknowns().into_iter().enumerate();
         told.map(move |(k, told)| Unknown { told, model: Some((causes, k)) })
     });
-    let offset = LocalUnknown { name: "an offset".into(), components: problem.recording.channels.clone() };
+    let offset = LocalUnknown::new("an offset", problem.recording.channels.clone());
     of_model.chain([Unknown { told: offset, model: None }]).collect()
 }
 

@@ -106,6 +106,21 @@ pub struct LocalUnknown {
     pub name: String,
     /// Its components, with their unit; one at least, and all are sought together as well.
     pub components: Vec<Quantity>,
+    /// Whether it acts at single rows only, each by an amount of its own (an impact that went unheard), and in no interval.
+    pub at_single_rows: bool,
+}
+
+impl LocalUnknown {
+    /// An unknown that may act within an interval.
+    pub fn new(name: impl Into<String>, components: Vec<Quantity>) -> Self {
+        Self { name: name.into(), components, at_single_rows: false }
+    }
+
+    /// The same unknown, which acts at single rows only.
+    #[must_use]
+    pub fn at_single_rows(self) -> Self {
+        Self { at_single_rows: true, ..self }
+    }
 }
 
 /// A model that knows what a cause does to its predictions which acts at some rows only. Without it a cause is sought in the readings: an

@@ -44,7 +44,7 @@ impl Model for Steps {
 
 impl LocalCauses for Steps {
     fn unknowns(&self) -> Vec<LocalUnknown> {
-        vec![LocalUnknown { name: "longer steps".into(), components: vec![Quantity::new("part", "")] }]
+        vec![LocalUnknown::new("longer steps", vec![Quantity::new("part", "")])]
     }
 
     fn response(
