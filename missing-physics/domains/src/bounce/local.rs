@@ -81,6 +81,11 @@ impl LocalCauses for BounceModel {
         all
     }
 
+    fn variable_errors(&self) -> Vec<f64> {
+        let [x, y] = self.place_errors_m();
+        vec![0.0, 0.0, x, y]
+    }
+
     fn response(
         &self,
         of: (usize, usize),

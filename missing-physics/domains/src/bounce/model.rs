@@ -83,6 +83,11 @@ impl BounceModel {
         &self.setup
     }
 
+    /// Standard errors of places along x and y, m.
+    pub(super) fn place_errors_m(&self) -> [f64; 2] {
+        self.spread.place_m
+    }
+
     /// Whether some flights seem to hide impacts that went unheard.
     pub(super) fn hides_impacts(&self) -> bool {
         self.layout.unheard.is_some()

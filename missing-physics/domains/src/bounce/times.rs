@@ -184,7 +184,10 @@ impl TimesModel {
             let gaps: Vec<f64> = known.iter().enumerate().map(more).collect();
             let mut times = vec![0.0; run.len()];
             self.times(shared, nuisance, (&gaps, &[]), &mut times)?;
-            later.iter_mut().zip(times.iter().zip(&none)).for_each(|(l, (t, n))| *l += amounts[row] * (t - n));
+            later
+                .iter_mut()
+                .zip(times.iter().zip(&none))
+                .for_each(|(l, (t, n))| *l += amounts[row] * (t - n));
         }
         Ok(later)
     }

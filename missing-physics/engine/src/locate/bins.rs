@@ -1,7 +1,7 @@
 //! Variables along which a cause may act in an interval, and bins along them.
 
 use crate::fit::optimum::Fit;
-use crate::model::{PredictError, Quantity};
+use crate::model::{LocalCauses, PredictError, Quantity};
 use crate::problem::Problem;
 
 /// Intervals have their ends at these quantiles of a variable.
@@ -13,22 +13,34 @@ const FINER: usize = 12;
 pub(crate) struct Along {
     pub(crate) quantity: Quantity,
     pub(crate) values: Vec<Vec<f64>>,
+    /// Standard error of the values; zero where they are exact.
+    pub(crate) error: f64,
+}
+
+impl Along {
+    /// Whether it counts rows, as the number of an impact does.
+    pub(crate) fn counts(&self) -> bool {
+        self.quantity.unit.is_empty() && self.values.iter().flatten().all(|value| value.fract() == 0.0)
+    }
 }
 
 /// The variables along which an interval may lie: the inputs, in the order of the recording (the number of the row where there are none),
 /// and what the model follows beside them.
 pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, PredictError> {
     let recording = &problem.recording;
+    let causes = problem.model.extensions().local_causes;
+    let errors = causes.map(LocalCauses::variable_errors).unwrap_or_default();
     let input = |(v, quantity): (usize, &Quantity)| Along {
         quantity: quantity.clone(),
         values: recording.runs.iter().map(|run| run.inputs[v].clone()).collect(),
+        error: errors.get(v).copied().unwrap_or(0.0),
     };
     let mut all: Vec<Along> = recording.variables.iter().enumerate().map(input).collect();
     if all.is_empty() {
         let rows = recording.runs.iter().map(|run| (0..run.len()).map(|row| row as f64).collect());
-        all.push(Along { quantity: Quantity::new("row", ""), values: rows.collect() });
+        all.push(Along { quantity: Quantity::new("row", ""), values: rows.collect(), error: 0.0 });
     }
-    let Some(causes) = problem.model.extensions().local_causes else { return Ok(all) };
+    let Some(causes) = causes else { return Ok(all) };
     let states = causes.states();
     let mut values = vec![Vec::new(); states.len()];
     for (run, nuisance) in recording.runs.iter().zip(&fit.nuisance) {
@@ -41,7 +53,7 @@ pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, 
             && rows.all(|(v, run)| v.len() == run.len() && v.iter().all(|x| x.is_finite()))
     };
     let followed = states.into_iter().zip(values).filter(|(_, values)| whole(values));
-    all.extend(followed.map(|(quantity, values)| Along { quantity, values }));
+    all.extend(followed.map(|(quantity, values)| Along { quantity, values, error: 0.0 }));
     Ok(all)
 }
 

@@ -8,8 +8,10 @@ use rayon::prelude::*;
 use crate::fit::optimum::Fit;
 use crate::locate::bins::{Along, Bins};
 use crate::locate::intervals::{Best, Found, Scan};
+use crate::locate::membership::{Members, Rows};
 use crate::locate::projection::{Projection, dot};
 use crate::locate::responses::{Asked, Column, Form, Responses};
+use crate::locate::single;
 use crate::locate::unknowns::Unknown;
 use crate::model::PredictError;
 use crate::problem::Problem;
@@ -19,6 +21,11 @@ const SUBSET_GAIN: f64 = 1.6;
 /// What acts at a place or a speed acts there in every run: one that acts at it in some runs only has to be worth so much more than one that
 /// acts at some time.
 const PLACE_GAIN: f64 = 1.5;
+/// The number of an impact says which rows these are and not why a cause acts there in every run: such a hypothesis has to be worth so much
+/// more than one along a speed or a place ...
+const COUNT: f64 = 10.0;
+/// ... and a part of what it is worth, since a likelihood so sharp is not known better.
+const COUNT_PART: f64 = 0.01;
 /// What is worth less than the best by this much cannot be told from it (twice a log Bayes factor, "not worth more than a bare mention":
 /// Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): unknowns and variables count in the order in which the model and the
 /// recording have them.
@@ -34,6 +41,8 @@ pub(crate) struct Cause {
     pub(crate) interval: (usize, usize),
     /// Whether it acts, by run.
     pub(crate) runs: Vec<bool>,
+    /// The rows at which it acts, where those are not all that were measured within the interval.
+    pub(crate) members: Option<Members>,
     /// Component, size, standard error.
     pub(crate) sizes: Vec<(usize, [f64; 2])>,
     /// By how much the sum of squares falls, less what was paid.
@@ -72,7 +81,7 @@ impl Scene<'_> {
         for kind in [|b: &Best| b.simple.clone(), |b: &Best| b.some_runs.clone()] {
             let beside = if judged.is_empty() { 1.0 } else { SUBSET_GAIN };
             let of_kind = || pairs.iter().zip(&found).filter_map(|(pair, best)| Some((*pair, kind(best)?)));
-            let worth = |along: usize, found: &Found| found.worth() / place_in_some_runs(along, found);
+            let worth = |along: usize, found: &Found| self.weighed(along, found);
             let most = of_kind().map(|((_, along), f)| worth(along, &f)).fold(f64::NEG_INFINITY, f64::max);
             let enough = most - (1.0 - NEAR) * most.abs();
             let near: Vec<_> = of_kind().filter(|((_, along), f)| worth(*along, f) >= enough).collect();
@@ -85,6 +94,21 @@ impl Scene<'_> {
         let most = judged.iter().map(|j| j.0).fold(f64::NEG_INFINITY, f64::max);
         let first = judged.into_iter().find(|j| j.0 >= most - UNTOLD);
         first.map(|(_, unknown, along, found)| self.cause(unknown, along, found)).transpose()
+    }
+
+    /// What a hypothesis is worth, less where it acts in an unlikely way.
+    fn weighed(&self, along: usize, found: &Found) -> f64 {
+        let everywhere = found.form == Form::Even && found.interval == (0, found.bins.len());
+        let some_runs = found.runs.contains(&false);
+        if everywhere {
+            found.worth()
+        } else if some_runs {
+            if along > 0 { found.worth() / PLACE_GAIN } else { found.worth() }
+        } else if self.variables[along].counts() {
+            found.worth() - COUNT - COUNT_PART * found.worth().abs()
+        } else {
+            found.worth()
+        }
     }
 
     fn asked<'a>(&'a self, unknown: usize, along: usize, component: usize, bins: &'a Bins) -> Asked<'a> {
@@ -108,7 +132,34 @@ impl Scene<'_> {
         let responses = components
             .map(|c| Responses::new(&self.asked(unknown, along, c, &bins), self.projection))
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(self.scan(unknown, &bins, &responses).best())
+        let scan = self.scan(unknown, &bins, &responses);
+        let mut best = scan.best();
+        for component in 0..responses.len() {
+            let beside = self.with_errors((unknown, component), along, &scan)?;
+            if let Some(found) = beside
+                && best.simple.as_ref().is_none_or(|b| found.worth() > b.worth())
+            {
+                best.simple = Some(found);
+            }
+        }
+        Ok(best)
+    }
+
+    /// The best hypothesis of a component along a variable that was measured with an error; `None` where it was not.
+    fn with_errors(
+        &self,
+        (unknown, component): (usize, usize),
+        along: usize,
+        scan: &Scan<'_>,
+    ) -> Result<Option<Found>, PredictError> {
+        let (variable, of) = (&self.variables[along], &self.unknowns[unknown]);
+        let alone = of.is_model_s() && of.runs_are_alone();
+        if variable.error <= 0.0 || !alone || !single::are_events(self.problem) {
+            return Ok(None);
+        }
+        let columns = single::columns(self.problem, self.fit, self.sigma, of, component)?;
+        let rows = Rows::new(self.projection, &columns, &variable.values, variable.error);
+        Ok(scan.with_errors(component, &rows))
     }
 
     fn scan<'a>(&self, unknown: usize, bins: &'a Bins, responses: &'a [Responses]) -> Scan<'a> {
@@ -123,7 +174,7 @@ impl Scene<'_> {
 
     /// The same hypothesis with edges that may be anywhere near those it has: each where it is as likely to be before as behind.
     fn finer(&self, unknown: usize, along: usize, found: Found) -> Result<Found, PredictError> {
-        if found.form == Form::Even && found.interval == (0, found.bins.len()) {
+        if found.members.is_some() || found.form == Form::Even && found.interval == (0, found.bins.len()) {
             return Ok(found);
         }
         let bins = found.bins.finer(self.problem, &self.variables[along], found.interval);
@@ -139,8 +190,11 @@ impl Scene<'_> {
         for &component in &found.components {
             let asked = self.asked(unknown, along, component, &found.bins);
             let beside = |Column { moved, mean }| Column { moved: self.projection.rest(moved), mean };
-            let sizes = asked.columns(found.interval, found.form, &found.runs)?.into_iter();
-            columns.extend(sizes.map(|column| (component, beside(column))));
+            let sizes = match &found.members {
+                Some(members) => vec![asked.at_rows(&members.acts)?],
+                None => asked.columns(found.interval, found.form, &found.runs)?,
+            };
+            columns.extend(sizes.into_iter().map(|column| (component, beside(column))));
         }
         let product = |a: &[Vec<f64>], b: &[Vec<f64>]| a.iter().zip(b).map(|(a, b)| dot(a, b)).sum::<f64>();
         let inverse = loop {
@@ -170,16 +224,11 @@ impl Scene<'_> {
             .collect();
         let gains = gains(self.problem, &self.projection.residual, &after);
         let worth = found.worth();
-        let Found { bins, interval, form, runs, price, .. } = found;
-        let everywhere = form == Form::Even && interval == (0, bins.len()) && !runs.contains(&false);
-        Ok(Cause { unknown, along, bins, interval, runs, sizes, worth, price, everywhere, gains })
+        let Found { bins, interval, form, runs, price, members, .. } = found;
+        let everywhere =
+            members.is_none() && form == Form::Even && interval == (0, bins.len()) && !runs.contains(&false);
+        Ok(Cause { unknown, along, bins, interval, runs, members, sizes, worth, price, everywhere, gains })
     }
-}
-
-/// What a hypothesis has to be worth more for where it acts: in some runs only, along another variable than the first.
-fn place_in_some_runs(along: usize, found: &Found) -> f64 {
-    let everywhere = found.form == Form::Even && found.interval == (0, found.bins.len());
-    if along > 0 && !everywhere && found.runs.contains(&false) { PLACE_GAIN } else { 1.0 }
 }
 
 /// By how much the sum of squares of each channel falls.

@@ -1,6 +1,7 @@
 //! Hypotheses along one variable: in which interval, in what form and in which runs an unknown acts.
 
 use crate::locate::bins::Bins;
+use crate::locate::membership::{Members, Rows};
 use crate::locate::responses::{Effect, Form, Responses};
 
 /// So many groups of neighbouring runs are told apart.
@@ -20,6 +21,8 @@ pub(crate) struct Found {
     pub(crate) form: Form,
     pub(crate) runs: Vec<bool>,
     pub(crate) components: Vec<usize>,
+    /// The rows at which it acts, where those are not all that were measured within the interval.
+    pub(crate) members: Option<Members>,
     /// By how much the sum of squares falls, and what of that is paid.
     pub(crate) gain: f64,
     pub(crate) price: f64,
@@ -66,15 +69,11 @@ impl Scan<'_> {
     pub(crate) fn best(&self) -> Best {
         let mut best = Best::default();
         let n = self.bins.len();
-        let intervals = (n * (n + 1) / 2) as f64;
         for interval in (0..n).flat_map(|from| (from + 1..=n).map(move |to| (from, to))) {
             for form in Form::ALL {
                 let effects: Vec<Vec<Effect>> =
                     self.responses.iter().map(|r| r.by_run(self.bins, interval, form)).collect();
-                let whole = interval == (0, n) && form == Form::Even;
-                let scanned = if whole { 0.0 } else { 2.0 * (Form::ALL.len() as f64 * intervals).ln() };
-                // A shift from somewhere on has another side that fits as well where each run has a level of its own: what was before.
-                let scanned = if goes_on(interval, n) { scanned - STAYS } else { scanned };
+                let scanned = self.scanned(interval, form);
                 self.all_runs(&effects, interval, form, scanned, &mut best.simple);
                 if self.alone && self.runs > 1 && form == Form::Even {
                     self.neighbouring_runs(&effects, interval, scanned, &mut best.simple);
@@ -83,6 +82,48 @@ impl Scan<'_> {
             }
         }
         best
+    }
+
+    /// What is paid for where one of the intervals begins and ends, and for its form.
+    fn scanned(&self, interval: (usize, usize), form: Form) -> f64 {
+        let n = self.bins.len();
+        if interval == (0, n) && form == Form::Even {
+            return 0.0;
+        }
+        let intervals = (n * (n + 1) / 2) as f64;
+        let scanned = 2.0 * (Form::ALL.len() as f64 * intervals).ln();
+        // A shift from somewhere on has another side that fits as well where each run has a level of its own: what was before.
+        if goes_on(interval, n) { scanned - STAYS } else { scanned }
+    }
+
+    /// The best hypothesis of a component in all runs, where the variable was measured with an error: of the intervals that begin at each
+    /// edge the one that fits best as it was measured, with the rows and edges that are the most probable near it.
+    pub(crate) fn with_errors(&self, component: usize, rows: &Rows) -> Option<Found> {
+        let n = self.bins.len();
+        let as_measured = |interval: (usize, usize)| {
+            total(self.responses[component].by_run(self.bins, interval, Form::Even).into_iter()).gain()
+        };
+        let best_from = |from: usize| {
+            let judged =
+                (from + 1..=n).filter(|to| (from, *to) != (0, n)).map(|to| (as_measured((from, to)), to));
+            judged.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, to)| (from, to))
+        };
+        let found = (0..n).filter_map(best_from).filter_map(|(from, to)| {
+            let [low, high] = [self.bins.spans[from][0], self.bins.spans[to - 1][1]];
+            let (gain, members) = rows.near(low, high)?;
+            let price = self.rows.ln() + self.scanned((from, to), Form::Even);
+            Some(Found {
+                bins: self.bins.clone(),
+                interval: (from, to),
+                form: Form::Even,
+                runs: vec![true; self.runs],
+                components: vec![component],
+                members: Some(members),
+                gain,
+                price,
+            })
+        });
+        found.max_by(|a, b| a.worth().total_cmp(&b.worth()))
     }
 
     /// The best of each component alone and of all together, in some runs.
@@ -99,7 +140,8 @@ impl Scan<'_> {
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
             if best.as_ref().is_none_or(|b| gain - price > b.worth()) && gain.is_finite() {
                 let bins = self.bins.clone();
-                *best = Some(Found { bins, interval, form, runs: runs(), components, gain, price });
+                let members = None;
+                *best = Some(Found { bins, interval, form, runs: runs(), components, members, gain, price });
             }
         };
         gains.iter().enumerate().for_each(|(c, gain)| better(*gain, price + scanned, vec![c]));
@@ -178,7 +220,8 @@ impl Scan<'_> {
                         let mut runs = vec![false; self.runs];
                         order[..=k].iter().for_each(|&r| runs[r] = true);
                         let (form, components, bins) = (Form::Even, vec![component], self.bins.clone());
-                        *best = Some(Found { bins, interval, form, runs, components, gain, price });
+                        let members = None;
+                        *best = Some(Found { bins, interval, form, runs, components, members, gain, price });
                     }
                 }
             }

@@ -6,6 +6,7 @@ use crate::fit::columns::whitened_columns;
 use crate::fit::optimum::Fit;
 use crate::locate::bins::{Along, Bins, variables};
 use crate::locate::cause::{Cause, Scene};
+use crate::locate::membership::Members;
 use crate::locate::projection::Projection;
 use crate::locate::scan::{Interval, Scan};
 use crate::locate::single::{Event, Events, events};
@@ -15,7 +16,7 @@ use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
 /// Each channel by itself, with a smooth departure or noise of its own, has to be worth so much more than a single cause.
-const SIMPLER: f64 = 1.2;
+pub(crate) const SIMPLER: f64 = 1.2;
 
 /// What is looked at: a baseline's columns, beside which unknowns act along variables.
 struct Ground<'a> {
@@ -95,11 +96,12 @@ pub(crate) fn locate(
     let events = events(problem, baseline, sigma, projection, unknowns)?;
     let places = Places { problem, columns, sigma };
     let found = match (cause, events) {
-        (cause, Some(events)) if {
-            // What acts at single rows only is no fit of many amounts to an interval.
-            let simpler = if unknowns[events.unknown].told.at_single_rows { 1.0 } else { SIMPLER };
-            events.worth > simpler * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth)
-        } =>
+        (cause, Some(events))
+            if {
+                // What acts at single rows only is no fit of many amounts to an interval.
+                let simpler = if unknowns[events.unknown].told.at_single_rows { 1.0 } else { SIMPLER };
+                events.worth > simpler * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth)
+            } =>
         {
             places.of_events(&unknowns[events.unknown], &variables[0], &events)
         }
@@ -112,7 +114,7 @@ pub(crate) fn locate(
             let of_channel =
                 |(channel, along, scan, Interval { gain, bins, .. }): &(usize, &Along, Scan, Interval)| {
                     let coefficients = scan.outside(*bins).1;
-                    let within = Within { along, bins: &scan.bins, interval: *bins };
+                    let within = Within { along, bins: &scan.bins, interval: *bins, members: None };
                     let runs = places.runs_that_miss(*channel, &within, &coefficients);
                     (*gain, places.of_rows(*channel, &within, &runs, *gain))
                 };
@@ -163,12 +165,34 @@ struct Within<'a> {
     along: &'a Along,
     bins: &'a Bins,
     interval: (usize, usize),
+    /// Its rows, where those are not all that were measured within it.
+    members: Option<&'a Members>,
 }
 
 impl Within<'_> {
     fn holds(&self, run: usize, row: usize) -> bool {
+        if let Some(members) = self.members {
+            return members.acts[run][row];
+        }
         let bin = self.bins.of(self.along.values[run][row]);
         bin >= self.interval.0 && bin < self.interval.1
+    }
+
+    /// Where it begins and ends, as far as there are rows.
+    fn edges(&self) -> [Option<f64>; 2] {
+        if let Some(Members { from, to, .. }) = self.members {
+            let [low, high] = [self.bins.spans[0][0], self.bins.spans[self.bins.len() - 1][1]];
+            return [Some(from.max(low)), Some(to.min(high))];
+        }
+        let (from, to) = self.interval;
+        let first = self.bins.spans.get(from).map(|span| span[0]);
+        [first, to.checked_sub(1).and_then(|last| self.bins.spans.get(last)).map(|span| span[1])]
+    }
+}
+
+impl Cause {
+    fn within<'a>(&'a self, along: &'a Along) -> Within<'a> {
+        Within { along, bins: &self.bins, interval: self.interval, members: self.members.as_ref() }
     }
 }
 
@@ -219,13 +243,13 @@ impl Places<'_> {
         let mean = if mean.abs() > 1e-9 * self.sigma[channel] { mean } else { 0.0 };
         let square = residuals.iter().map(|v| v * v).sum::<f64>() / residuals.len().max(1) as f64;
         let larger = |a: f64, v: f64| if v.abs() > a.abs() { v } else { a };
-        let (from, to) = within.interval;
+        let [from, to] = within.edges();
         Location {
             channel: self.problem.recording.channels[channel].name.clone(),
             variable: Some(within.along.quantity.name.clone()),
             variable_unit: within.along.quantity.unit.clone(),
-            from: within.bins.spans.get(from).map(|span| span[0]),
-            to: to.checked_sub(1).and_then(|last| within.bins.spans.get(last)).map(|span| span[1]),
+            from,
+            to,
             runs: (0..runs.len()).filter(|&r| runs[r]).map(label).collect(),
             share: 0.0,
             mean_residual: mean,
@@ -244,7 +268,7 @@ impl Places<'_> {
         let time = recording
             .noise_along
             .filter(|k| *k == 0 && along.quantity.name != recording.variables[0].name)?;
-        let within = Within { along, bins: &cause.bins, interval: cause.interval };
+        let within = cause.within(along);
         let acts = |run: &usize| {
             cause.runs[*run] && (0..along.values[*run].len()).any(|row| within.holds(*run, row))
         };
@@ -269,7 +293,7 @@ impl Places<'_> {
         cause: &Cause,
         stretch: Option<(&Along, [f64; 2])>,
     ) -> Vec<(f64, Location)> {
-        let within = Within { along, bins: &cause.bins, interval: cause.interval };
+        let within = cause.within(along);
         let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
         let runs: Vec<bool> = cause.runs.iter().enumerate().map(|(r, acts)| *acts && touched(r)).collect();
         let as_if = unknown.is_model_s().then(|| AsIf {

@@ -5,6 +5,7 @@ mod cause;
 mod intervals;
 mod least_squares;
 pub(crate) mod locations;
+mod membership;
 mod projection;
 mod responses;
 mod scan;

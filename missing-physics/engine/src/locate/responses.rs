@@ -178,6 +178,16 @@ impl Asked<'_> {
     }
 }
 
+impl Asked<'_> {
+    /// What a unit at some rows does, `acts[run][row]`.
+    pub(crate) fn at_rows(&self, acts: &[Vec<bool>]) -> Result<Column, PredictError> {
+        let amounts = acts.iter().map(|run| run.iter().map(|&acts| f64::from(u8::from(acts))).collect());
+        let moved =
+            self.unknown.response(self.problem, self.fit, self.sigma, self.component, amounts.collect())?;
+        Ok(Column { moved, mean: 1.0 })
+    }
+}
+
 impl Responses {
     pub(crate) fn new(asked: &Asked<'_>, projection: &Projection) -> Result<Self, PredictError> {
         let Asked { problem, fit, sigma, unknown, component, along, bins } = *asked;

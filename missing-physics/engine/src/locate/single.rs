@@ -2,6 +2,7 @@
 
 use crate::fit::optimum::Fit;
 use crate::locate::cause::gains;
+use crate::locate::locations::SIMPLER;
 use crate::locate::projection::{Projection, dot};
 use crate::locate::unknowns::Unknown;
 use crate::model::PredictError;
@@ -40,18 +41,21 @@ pub(crate) fn events(
     projection: &Projection,
     unknowns: &[Unknown<'_>],
 ) -> Result<Option<Events>, PredictError> {
-    let longest = problem.recording.runs.iter().map(|run| run.len()).max().unwrap_or(0);
-    let rows: usize = problem.recording.runs.iter().map(|run| run.len()).sum();
-    if longest > EVENTS || rows > ROWS {
+    if !are_events(problem) {
         return Ok(None);
     }
+    // What acts at single rows only says more than an amount by which rows differ.
+    let weight = |events: &Events| {
+        let only = unknowns[events.unknown].told.at_single_rows;
+        if only { SIMPLER * events.worth } else { events.worth }
+    };
     let mut best: Option<Events> = None;
     for (number, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_model_s() && u.runs_are_alone())
     {
         for component in 0..unknown.told.components.len() {
-            let columns = columns(problem, fit, sigma, unknown, component, longest)?;
+            let columns = columns(problem, fit, sigma, unknown, component)?;
             let found = greedy(problem, projection.clone(), &columns, number, component);
-            if !found.rows.is_empty() && best.as_ref().is_none_or(|b| found.worth > b.worth) {
+            if !found.rows.is_empty() && best.as_ref().is_none_or(|b| weight(&found) > weight(b)) {
                 best = Some(found);
             }
         }
@@ -59,16 +63,22 @@ pub(crate) fn events(
     Ok(best)
 }
 
+/// Whether rows are events: few in each run, and not too many in all.
+pub(crate) fn are_events(problem: &Problem<'_>) -> bool {
+    let lengths = || problem.recording.runs.iter().map(|run| run.len());
+    lengths().max().unwrap_or(0) <= EVENTS && lengths().sum::<usize>() <= ROWS
+}
+
 /// What a unit at each single row does to its run, `[run][row]`.
-fn columns(
+pub(crate) fn columns(
     problem: &Problem<'_>,
     fit: &Fit,
     sigma: &[f64],
     unknown: &Unknown<'_>,
     component: usize,
-    longest: usize,
 ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
     let runs = &problem.recording.runs;
+    let longest = runs.iter().map(|run| run.len()).max().unwrap_or(0);
     let mut columns = vec![Vec::new(); runs.len()];
     for row in 0..longest {
         let only = |n: usize| (0..n).map(|i| f64::from(u8::from(i == row))).collect();

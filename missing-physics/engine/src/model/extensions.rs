@@ -165,6 +165,12 @@ pub trait LocalCauses: Sync {
         true
     }
 
+    /// With what standard error each of the recording's variables was measured, in their order: a row near the edge of an interval may
+    /// truly lie on the other side of it. None (the default), or zero, where a variable is exact.
+    fn variable_errors(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// What the model follows beside the recording's variables (a height, a speed), along which a cause may act as well; none by default.
     fn states(&self) -> Vec<Quantity> {
         Vec::new()

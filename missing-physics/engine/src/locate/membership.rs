@@ -1,0 +1,200 @@
+//! Which rows a cause acts at where the variable along which it acts was measured with an error: a place that was misheard by a centimetre is
+//! on either side of the edge of a stripe.
+//!
+//! A row acts with the probability that its true value lies within the interval. The most probable rows and edges together are sought from
+//! an interval that fits as it was measured: rows near an edge change sides as long as that makes the whole more probable, then the edges
+//! move to where they make the rows most probable.
+
+use statrs::function::erf::erfc;
+
+use crate::locate::projection::{Projection, dot};
+
+/// Rows change sides within so many standard errors of an edge.
+const REACH: f64 = 4.0;
+/// Edges move in steps of this part of a standard error.
+const STEP: f64 = 0.25;
+/// Rows and edges are sought in turn so many times at most.
+const TURNS: usize = 12;
+
+/// A row: its value, and what a unit of the cause at it does to its run.
+struct Row {
+    run: usize,
+    number: usize,
+    value: f64,
+    product: f64,
+    along_shared: Vec<f64>,
+    /// Products with the rows of its run, all of them.
+    beside: Vec<f64>,
+}
+
+/// All rows at which a component of an unknown may act.
+pub(crate) struct Rows {
+    rows: Vec<Row>,
+    /// By run: the number of its first row among all.
+    first: Vec<usize>,
+    sigma: f64,
+}
+
+/// Rows that act, and the interval in which their true values lie.
+#[derive(Debug, Clone)]
+pub(crate) struct Members {
+    /// `[run][row]`.
+    pub(crate) acts: Vec<Vec<bool>>,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+}
+
+/// Sums over the rows that act.
+#[derive(Clone)]
+struct Sums {
+    product: f64,
+    square: f64,
+    along_shared: Vec<f64>,
+}
+
+impl Sums {
+    fn gain(&self) -> f64 {
+        let square = self.square - dot(&self.along_shared, &self.along_shared);
+        if square > 1e-6 * self.square { self.product * self.product / square } else { 0.0 }
+    }
+}
+
+impl Rows {
+    /// Of what a unit at each single row does, `columns[run][row]`, and each row's value along the variable, known to a standard error
+    /// `sigma`.
+    pub(crate) fn new(
+        projection: &Projection,
+        columns: &[Vec<Vec<f64>>],
+        values: &[Vec<f64>],
+        sigma: f64,
+    ) -> Self {
+        let mut rows = Vec::new();
+        let mut first = Vec::new();
+        for (run, (columns, values)) in columns.iter().zip(values).enumerate() {
+            first.push(rows.len());
+            let beside = |column: &Vec<f64>| {
+                let mut column = column.clone();
+                projection.beside_nuisance(run, &mut column);
+                column
+            };
+            let columns: Vec<Vec<f64>> = columns.iter().map(beside).collect();
+            rows.extend(columns.iter().zip(values).enumerate().map(|(number, (column, value))| Row {
+                run,
+                number,
+                value: *value,
+                product: dot(column, &projection.residual[run]),
+                along_shared: projection.along_shared(run, column),
+                beside: columns.iter().map(|other| dot(column, other)).collect(),
+            }));
+        }
+        Self { rows, first, sigma }
+    }
+
+    /// The most probable rows and edges near an interval, and twice the logarithm of by how much they are more probable than that
+    /// nothing acts, before anything is paid; `None` where no row is left.
+    pub(crate) fn near(&self, from: f64, to: f64) -> Option<(f64, Members)> {
+        let mut edges = [from, to];
+        let mut acts: Vec<bool> = self.rows.iter().map(|row| row.value >= from && row.value <= to).collect();
+        for _ in 0..TURNS {
+            let changed = self.change_sides(&mut acts, edges);
+            let moved = self.moved(&acts, edges);
+            if !changed && moved == edges {
+                break;
+            }
+            edges = moved;
+        }
+        let gain = self.sums(&acts).gain();
+        let worth = gain + 2.0 * self.log_probability(&acts, edges);
+        let mut members: Vec<Vec<bool>> = Vec::new();
+        for (row, acts) in self.rows.iter().zip(&acts) {
+            members.resize(members.len().max(row.run + 1), Vec::new());
+            members[row.run].push(*acts);
+        }
+        members.resize(self.first.len(), Vec::new());
+        let [from, to] = edges;
+        (gain > 0.0 && worth.is_finite()).then_some((worth, Members { acts: members, from, to }))
+    }
+
+    /// Whether a row acts, by the logarithm of its probability.
+    fn log_odds(&self, value: f64, [from, to]: [f64; 2], acts: bool) -> f64 {
+        // The nearer edge says nearly all; a value that is far on the wrong side of it is next to impossible.
+        let inside = (value - from).min(to - value) / self.sigma;
+        let towards = if acts { inside } else { -inside };
+        (0.5 * erfc(-towards / std::f64::consts::SQRT_2)).max(1e-300).ln()
+    }
+
+    fn log_probability(&self, acts: &[bool], edges: [f64; 2]) -> f64 {
+        self.rows.iter().zip(acts).map(|(row, acts)| self.log_odds(row.value, edges, *acts)).sum()
+    }
+
+    fn sums(&self, acts: &[bool]) -> Sums {
+        let shared = self.rows.first().map_or(0, |row| row.along_shared.len());
+        let mut sums = Sums { product: 0.0, square: 0.0, along_shared: vec![0.0; shared] };
+        let mut none = vec![false; acts.len()];
+        for at in (0..acts.len()).filter(|&at| acts[at]) {
+            sums = self.changed(&sums, &none, at);
+            none[at] = true;
+        }
+        sums
+    }
+
+    /// The sums where a row changes sides.
+    fn changed(&self, sums: &Sums, acts: &[bool], at: usize) -> Sums {
+        let row = &self.rows[at];
+        let sign = if acts[at] { -1.0 } else { 1.0 };
+        let first = self.first[row.run];
+        let of_others = row.beside.iter().enumerate().filter(|(k, _)| *k != row.number && acts[first + k]);
+        let cross: f64 = of_others.map(|(_, product)| product).sum();
+        let along = sums.along_shared.iter().zip(&row.along_shared).map(|(sum, along)| sum + sign * along);
+        Sums {
+            product: sums.product + sign * row.product,
+            square: sums.square + sign * 2.0 * cross + row.beside[row.number],
+            along_shared: along.collect(),
+        }
+    }
+
+    /// Lets rows near an edge change sides, one after the other, as long as that makes the whole more probable; whether any did.
+    fn change_sides(&self, acts: &mut [bool], edges: [f64; 2]) -> bool {
+        let near = |row: &Row| edges.iter().any(|edge| (row.value - edge).abs() <= REACH * self.sigma);
+        let candidates: Vec<usize> = (0..self.rows.len()).filter(|&at| near(&self.rows[at])).collect();
+        let mut sums = self.sums(acts);
+        let mut any = false;
+        for _ in 0..2 * candidates.len() {
+            let worth = |at: &usize| {
+                let changed = self.changed(&sums, acts, *at);
+                let side = |acts| self.log_odds(self.rows[*at].value, edges, acts);
+                let gain = changed.gain() - sums.gain() + 2.0 * (side(!acts[*at]) - side(acts[*at]));
+                (gain, *at, changed)
+            };
+            let best = candidates.iter().map(worth).max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, at, changed)) = best.filter(|(gain, ..)| *gain > 1e-9) else { break };
+            acts[at] = !acts[at];
+            sums = changed;
+            any = true;
+        }
+        any
+    }
+
+    /// The edges near some others that make the rows most probable.
+    fn moved(&self, acts: &[bool], mut edges: [f64; 2]) -> [f64; 2] {
+        let steps = (REACH / STEP) as i32;
+        for edge in 0..2 {
+            let tried = (-steps..=steps).map(|step| {
+                let mut moved = edges;
+                moved[edge] += f64::from(step) * STEP * self.sigma;
+                moved
+            });
+            let sensible = tried.filter(|[from, to]| from < to);
+            let probable = sensible.map(|moved| (self.log_probability(acts, moved), moved));
+            // Of edges that are as probable the one that is there.
+            let now = self.log_probability(acts, edges);
+            let best = probable.max_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((most, moved)) = best
+                && most > now + 1e-9
+            {
+                edges = moved;
+            }
+        }
+        edges
+    }
+}
