@@ -53,7 +53,7 @@ impl Maker for Bounce {
         let ([header, data], unheard) = made;
         key.state_missed(unheard.len(), world.runs);
         if let Some(place) = key.place.as_mut().filter(|place| place.variable == "x_m") {
-            place.runs = coming_there(&data, place);
+            place.runs = coming_there(&data, place, world.height_known);
         }
         if hidden == Hidden::Local && world.effects.unheard > 0.0 {
             key.events = unheard.iter().map(|[run, impact]| (run.to_string(), *impact as f64)).collect();
@@ -62,14 +62,16 @@ impl Maker for Bounce {
     }
 }
 
-/// The runs that come to a place along x, as recorded: a stripe does nothing to the others.
-fn coming_there(data: &str, place: &Place) -> Vec<String> {
+/// The runs that come to a place along x, as recorded, at an impact before and after which a speed is recorded: a stripe shows in no other.
+fn coming_there(data: &str, place: &Place, fall_is_known: bool) -> Vec<String> {
+    let rows: Vec<Vec<&str>> = data.lines().skip(1).map(|row| row.split(',').collect()).collect();
     let mut runs: Vec<String> = Vec::new();
-    for row in data.lines().skip(1) {
-        let cells: Vec<&str> = row.split(',').collect();
-        let there =
-            cells.get(3).and_then(|x| x.parse().ok()).is_some_and(|x: f64| x >= place.from && x <= place.to);
-        if there && !runs.iter().any(|run| run == cells[0]) {
+    for (at, cells) in rows.iter().enumerate() {
+        let same = |other: Option<&Vec<&str>>| other.is_some_and(|other| other[0] == cells[0]);
+        let before = fall_is_known || same(at.checked_sub(1).and_then(|before| rows.get(before)));
+        let x_m = cells.get(3).and_then(|x| x.parse::<f64>().ok());
+        let there = x_m.is_some_and(|x| x >= place.from && x <= place.to);
+        if there && before && same(rows.get(at + 1)) && !runs.iter().any(|run| run == cells[0]) {
             runs.push(cells[0].into());
         }
     }
