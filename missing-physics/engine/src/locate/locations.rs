@@ -178,15 +178,25 @@ impl Within<'_> {
         bin >= self.interval.0 && bin < self.interval.1
     }
 
-    /// Where it begins and ends, as far as there are rows.
+    /// Where it begins and ends, as far as there are rows: halfway between the last row outside and the first one inside, where the variable
+    /// may have any value.
     fn edges(&self) -> [Option<f64>; 2] {
         if let Some(Members { from, to, .. }) = self.members {
             let [low, high] = [self.bins.spans[0][0], self.bins.spans[self.bins.len() - 1][1]];
             return [Some(from.max(low)), Some(to.min(high))];
         }
+        let span = |at: Option<usize>| at.and_then(|at| self.bins.spans.get(at));
+        let halfway = |inside: f64, outside: Option<f64>| match outside {
+            Some(outside) if !self.along.counts() => 0.5 * (inside + outside),
+            _ => inside,
+        };
         let (from, to) = self.interval;
-        let first = self.bins.spans.get(from).map(|span| span[0]);
-        [first, to.checked_sub(1).and_then(|last| self.bins.spans.get(last)).map(|span| span[1])]
+        let before = span(from.checked_sub(1)).map(|span| span[1]);
+        let after = span(Some(to)).map(|span| span[0]);
+        [
+            span(Some(from)).map(|span| halfway(span[0], before)),
+            span(to.checked_sub(1)).map(|span| halfway(span[1], after)),
+        ]
     }
 }
 
