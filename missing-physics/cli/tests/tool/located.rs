@@ -1,6 +1,8 @@
-//! A dough that the band answers less once it is longer than a length: the answer says from which length on.
+//! Where a concealed cause acts: from which length on the band answers a dough less, which impacts went unheard, where a table is softer.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+use missing_physics::data::Recording;
+use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
 use worlds::concealed::{Concealed, Hidden, makers};
@@ -8,10 +10,15 @@ use worlds::concealed::{Concealed, Hidden, makers};
 /// Wanted nearer than this part of the lengths that there are.
 const CLOSE: f64 = 0.1;
 
-/// Worlds in which a place is concealed, in the order of their seeds.
+/// Worlds of a domain, in the order of their seeds.
+fn worlds_of(domain: &str, hidden: Hidden) -> impl Iterator<Item = Concealed> {
+    let maker = makers().iter().find(|maker| maker.domain() == domain).unwrap();
+    (1..).map(move |seed| maker.conceal(hidden, seed))
+}
+
+/// Doughs in which a place is concealed.
 fn local() -> impl Iterator<Item = Concealed> {
-    let doughs = makers().iter().find(|maker| maker.domain() == "dough-roll").unwrap();
-    (1..).map(|seed| doughs.conceal(Hidden::Unlisted, seed)).filter(|w| w.key.place.is_some())
+    worlds_of("dough-roll", Hidden::Unlisted).filter(|w| w.key.place.is_some())
 }
 
 #[test]
@@ -25,15 +32,20 @@ fn long_doughs_too_long_for_the_band_are_found_by_their_lengths() {
     local().take(3).for_each(|world| assert_found(&world));
 }
 
-fn assert_found(world: &Concealed) {
+/// What was recorded in a world, and the answer.
+fn diagnosed(world: &Concealed) -> (Recording, Diagnosis) {
     let folder = tempfile::tempdir().unwrap();
     for (name, contents) in &world.files {
         std::fs::write(folder.path().join(name), contents).unwrap();
     }
     let (_, loaded) = missing_physics_domains::load(folder.path()).unwrap();
     let options = Options { replicates: 49, ..Options::default() };
-    let recording = &loaded.recording;
-    let answer = diagnose(&*loaded.model, recording, &loaded.experiments, &options, &Silent).unwrap();
+    let answer = diagnose(&*loaded.model, &loaded.recording, &loaded.experiments, &options, &Silent).unwrap();
+    (loaded.recording, answer)
+}
+
+fn assert_found(world: &Concealed) {
+    let (recording, answer) = diagnosed(world);
     let (place, hidden) = (answer.location.first().unwrap(), world.key.place.as_ref().unwrap());
     let along = recording.variables.iter().position(|v| Some(&v.name) == place.variable.as_ref()).unwrap();
     let values = || recording.runs.iter().flat_map(|run| &run.inputs[along]).copied();
@@ -41,4 +53,37 @@ fn assert_found(world: &Concealed) {
     assert_eq!(place.variable.as_ref(), Some(&hidden.variable));
     let from = place.from.unwrap();
     assert!((from - hidden.from).abs() < CLOSE * extent, "{from} m, and not {} m", hidden.from);
+}
+
+/// Each at the impact before it or the one after it, and nothing else.
+#[test]
+fn impacts_that_went_unheard_are_found_one_by_one() {
+    let several = |world: &Concealed| world.key.events.len() > 2;
+    let world = worlds_of("bounce", Hidden::Local).find(several).unwrap();
+    let (_, answer) = diagnosed(&world);
+    let found: Vec<(&String, f64)> =
+        answer.location.iter().map(|place| (&place.runs[0], place.from.unwrap())).collect();
+    assert_eq!(found.len(), world.key.events.len(), "{found:?} {:?}", world.key.events);
+    for (run, impact) in &world.key.events {
+        let there = |(r, at): &(&String, f64)| *r == run && (*at == *impact || *at == impact + 1.0);
+        assert!(found.iter().any(there), "{found:?} {:?}", world.key.events);
+    }
+    let unheard = |place: &missing_physics::diagnosis::Location| place.as_if.as_ref().unwrap().what.clone();
+    assert!(answer.location.iter().all(|place| unheard(place) == "impacts that were not heard"));
+}
+
+/// Places are heard to some millimetres, the stripe is two to four centimetres wide.
+#[test]
+fn a_softer_stripe_of_the_table_is_found_where_it_is() {
+    const WITHIN_M: f64 = 0.01;
+    let stripe = |world: &Concealed| world.key.place.as_ref().is_some_and(|place| place.variable == "x_m");
+    for world in worlds_of("bounce", Hidden::Local).filter(stripe).take(3) {
+        let (_, answer) = diagnosed(&world);
+        let (place, hidden) = (answer.location.first().unwrap(), world.key.place.as_ref().unwrap());
+        assert_eq!(place.variable.as_deref(), Some("x_m"));
+        let off = |found: Option<f64>, true_m: f64| (found.unwrap() - true_m).abs();
+        let off = off(place.from, hidden.from).max(off(place.to, hidden.to));
+        assert!(off < WITHIN_M, "{place:?} {hidden:?}");
+        assert_eq!(place.as_if.as_ref().unwrap().what, "another restitution");
+    }
 }

@@ -198,3 +198,54 @@ impl Rows {
         edges
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution as _, StandardNormal};
+
+    use super::*;
+
+    /// Runs of four rows; where the true value is between 0.3 and 0.6 a cause of five sigmas acts on its row and, by half, on the next.
+    #[test]
+    fn rows_are_found_whose_values_were_measured_on_the_wrong_side() {
+        const SIGMA: f64 = 0.05;
+        const SIZE: f64 = 5.0;
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let response = |row: usize| -> Vec<f64> {
+            let at = |k: usize| k.checked_sub(row).and_then(|after| [1.0, 0.5].get(after)).copied();
+            (0..4).map(|k| at(k).unwrap_or(0.0)).collect()
+        };
+        let (mut residuals, mut values, mut truth) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..50 {
+            let x: Vec<f64> = (0..4).map(|_| rng.random_range(0.0..1.0)).collect();
+            let acts: Vec<bool> = x.iter().map(|x| (0.3..0.6).contains(x)).collect();
+            let mut residual: Vec<f64> = (0..4).map(|_| StandardNormal.sample(&mut rng)).collect();
+            for row in (0..4).filter(|&row| acts[row]) {
+                residual.iter_mut().zip(response(row)).for_each(|(r, by)| *r += SIZE * by);
+            }
+            let error = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
+            values.push(x.iter().map(|x| x + SIGMA * error(&mut rng)).collect::<Vec<f64>>());
+            residuals.push(vec![residual]);
+            truth.push(acts);
+        }
+        let projection = Projection::new(&residuals, (0, 0));
+        let columns: Vec<Vec<Vec<f64>>> = (0..50).map(|_| (0..4).map(response).collect()).collect();
+        let rows = Rows::new(&projection, &columns, &values, SIGMA);
+        let (_, members) = rows.near(0.25, 0.7).unwrap();
+        let count = |found: &dyn Fn(usize, usize) -> bool| {
+            let rows = (0..50).flat_map(|run| (0..4).map(move |row| (run, row)));
+            rows.filter(|&(run, row)| found(run, row) != truth[run][row]).count()
+        };
+        let as_measured = count(&|run, row| (0.3..0.6).contains(&values[run][row]));
+        let wrong = count(&|run, row| members.acts[run][row]);
+        assert!(as_measured > 12 && wrong <= 2, "{wrong} rows are wrong, {as_measured} as measured");
+        assert!((members.from - 0.3).abs() < 0.03 && (members.to - 0.6).abs() < 0.03, "{members:?}");
+        let size = {
+            let sums = rows.sums(&members.acts.concat());
+            sums.product / sums.square
+        };
+        assert!((size - SIZE).abs() < 0.3, "{size}");
+    }
+}
