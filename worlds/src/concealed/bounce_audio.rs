@@ -53,13 +53,16 @@ impl Maker for BounceAudio {
             world.ball.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
             key.unlisted = Some("a table that is softer on one side".into());
         }
-        let (mut files, mut unheard) = world.files(&mut rng);
+        let mut heard = world.heard(&mut rng);
         // Drops in which all was heard hide no unheard impact.
-        while unheard == 0 && world.ball.effects.unheard > 0.0 {
-            (files, unheard) = world.files(&mut rng);
+        while heard.unheard == 0 && world.ball.effects.unheard > 0.0 {
+            heard = world.heard(&mut rng);
         }
-        key.state_missed(unheard, world.ball.runs);
-        Concealed { files, key }
+        key.state_missed(heard.unheard, world.ball.runs);
+        if let Some(place) = key.place.as_mut().filter(|place| place.variable == "x_m") {
+            place.runs = heard.coming_between(place.from, place.to);
+        }
+        Concealed { files: heard.files, key }
     }
 }
 
@@ -79,6 +82,24 @@ struct SoundWorld {
     snr_db: f64,
     /// Clicks from elsewhere in a run, on average.
     clicks: f64,
+}
+
+/// What is recorded in a world.
+struct Recorded {
+    files: Vec<(String, Vec<u8>)>,
+    /// The number of runs in which an impact cannot be heard.
+    unheard: usize,
+    /// By run: where along x the impacts are before and after which a speed is heard.
+    across_m: Vec<Vec<f64>>,
+}
+
+impl Recorded {
+    /// The runs that come between two places along x: a stripe there shows in no other.
+    fn coming_between(&self, from: f64, to: f64) -> Vec<String> {
+        let there = |x: &Vec<f64>| x.iter().any(|x| (from..=to).contains(x));
+        let runs = self.across_m.iter().enumerate().filter(|(_, x)| there(x));
+        runs.map(|(run, _)| (run + 1).to_string()).collect()
+    }
 }
 
 impl SoundWorld {
@@ -147,15 +168,18 @@ impl SoundWorld {
         }
     }
 
-    /// The recording's files, and the number of runs in which an impact cannot be heard.
-    fn files(&self, rng: &mut ChaCha8Rng) -> (Vec<(String, Vec<u8>)>, usize) {
+    /// The recording.
+    fn heard(&self, rng: &mut ChaCha8Rng) -> Recorded {
         let table = TableModes::new(0.42 * self.room.rate_hz.min(22e3), rng);
         let mut unheard = 0;
-        let mut files = Vec::new();
+        let (mut files, mut across_m) = (Vec::new(), Vec::new());
         for run in 0..self.ball.runs {
             let silent = self.ball.unheard(rng);
             unheard += usize::from(silent.is_some());
-            files.push((format!("drop-{run:02}.wav"), self.sound(&table, silent, run, rng)));
+            let (sound, events) = self.sound(&table, silent, run, rng);
+            files.push((format!("drop-{run:02}.wav"), sound));
+            let known = usize::from(!self.ball.height_known)..events.len() - 1;
+            across_m.push(events[known].iter().map(|[_, x, _]| *x).collect());
         }
         let names: Vec<String> = files.iter().map(|(name, _)| format!("{name:?}")).collect();
         let mut header = format!(
@@ -168,11 +192,17 @@ impl SoundWorld {
             let _ = write!(header, "\n[rig]\ndrop_height_m = {}\n", self.ball.height_m);
         }
         files.insert(0, ("recording.toml".into(), header.into_bytes()));
-        (files, unheard)
+        Recorded { files, unheard, across_m }
     }
 
-    /// The sound of one run, in which the impact of a number may be silent.
-    fn sound(&self, table: &TableModes, silent: Option<usize>, run: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    /// The sound of one run, in which the impact of a number may be silent, and the time and place of each impact.
+    fn sound(
+        &self,
+        table: &TableModes,
+        silent: Option<usize>,
+        run: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> (Vec<u8>, Vec<[f64; 3]>) {
         let from = [between(rng, 0.25, 0.75) * SIDE_M, between(rng, 0.25, 0.75) * SIDE_M];
         let height = self.ball.height_m * if self.ball.height_known { 1.0 } else { between(rng, 0.7, 1.3) };
         let impacts = self.ball.impacts + usize::from(silent.is_some());
@@ -200,7 +230,7 @@ impl SoundWorld {
         }
         let sigma = 2.0 * loudness * 10f64.powf(-self.snr_db / 20.0);
         add_noise(sigma, self.room.rate_hz, rng, &mut channels);
-        wav(&channels, self.rate_hz, between(rng, 0.3, 0.9))
+        (wav(&channels, self.rate_hz, between(rng, 0.3, 0.9)), events)
     }
 
     /// A sound from elsewhere in the room, between two impacts.
