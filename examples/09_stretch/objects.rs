@@ -13,16 +13,38 @@ use stretch::shape::{Rolling, Settling, circularity, roll};
 
 use super::{Outcome, at, look};
 
-/// Objects: what they are, half their sides along x and y (m), and where they are touched along x (m).
-const OBJECTS: [(&str, Shape, [f64; 2], &[f64]); 3] = [
-    ("cube, 1 touch", Shape::Box { half_m: [0.015, 0.015] }, [0.015, 0.015], &[0.0]),
+/// An object, the least and the largest x and y of it (m), and where it is touched: along x, and how far below its highest point (m).
+type Object = (&'static str, Shape, [[f64; 2]; 2], &'static [[f64; 2]]);
+
+const OBJECTS: [Object; 8] = [
+    ("cube, 1 touch", Shape::Box { half_m: [0.015, 0.015] }, [[-0.015, 0.015]; 2], &[[0.0, 0.008]]),
+    ("cylinder, 1", Shape::Cylinder { radius_m: 0.015 }, [[-0.015, 0.015]; 2], &[[0.0, 0.008]]),
+    ("ball, 1", Shape::Ball { radius_m: 0.02 }, [[-0.02, 0.02]; 2], &[[0.0, 0.012]]),
     (
         "half-cylinder, 3",
         Shape::Ridge { radius_m: 0.012, half_length_m: 0.03 },
-        [0.03, 0.012],
-        &[-0.016, 0.0, 0.016],
+        [[-0.03, 0.03], [-0.012, 0.012]],
+        &[[-0.016, 0.008], [0.0, 0.008], [0.016, 0.008]],
     ),
-    ("bridge, 3", Shape::Box { half_m: [0.03, 0.01] }, [0.03, 0.01], &[-0.016, 0.0, 0.016]),
+    (
+        "bridge, 3",
+        Shape::Box { half_m: [0.03, 0.01] },
+        [[-0.03, 0.03], [-0.01, 0.01]],
+        &[[-0.016, 0.008], [0.0, 0.008], [0.016, 0.008]],
+    ),
+    (
+        "snowman, 3",
+        Shape::Snowman { radii_m: [0.015, 0.0135, 0.012] },
+        [[-0.015, 0.066], [-0.015, 0.015]],
+        &[[0.0, 0.008], [0.0285, 0.011], [0.054, 0.014]],
+    ),
+    ("wire circle, 1", Shape::Hoop { radius_m: 0.02, wire_m: 0.002 }, [[-0.022, 0.022]; 2], &[[0.0, 0.008]]),
+    (
+        "wire triangle, 1",
+        Shape::Triangle { radius_m: 0.025, wire_m: 0.002 },
+        [[-0.015, 0.027], [-0.024, 0.024]],
+        &[[0.0, 0.008]],
+    ),
 ];
 
 /// Figure 6.6: touches at no stretch, merged in the world.
@@ -30,34 +52,33 @@ pub(crate) fn reconstructed(panels: &mut Vec<Panel>) -> Outcome<()> {
     println!("\nObjects from touches at no stretch (figure 6.6; [Matl 2021]: dimensions within 2 mm)");
     println!("{:>18} {:>8} {:>24} {:>14}", "", "points", "off the surface: median", "95 % (mm)");
     let objects = if examples::small() { &OBJECTS[..1] } else { &OBJECTS[..] };
-    for (name, shape, half_m, places) in objects.iter().copied() {
+    for (name, shape, extent_m, places) in objects.iter().copied() {
         let mut merged = Merged::new(1.5e-3)?;
-        for (k, &x) in places.iter().enumerate() {
+        for (k, &[x, below]) in places.iter().enumerate() {
             let mut rig = Rig::new(shape, Filling::Rigid, 660 + k as u64);
-            let (cloud, segmenter) = look(&mut rig, 0.0, at(x, -8e-3))?;
+            let (cloud, segmenter) = look(&mut rig, 0.0, at(x, -below))?;
             // The camera looks down on the membrane: its rows go against the world's y.
-            let z = rig.eye.distance_m - 8e-3;
+            let z = rig.eye.distance_m - below;
             let camera = Pose { position_m: [x, 0.0, z], rotation_xyzw: [1.0, 0.0, 0.0, 0.0] };
             merged.add(&camera, &points(&cloud, &segmenter.states))?;
         }
         let seen = merged.points(3);
-        let surface = surface(&shape, half_m);
+        let surface = surface(&shape, extent_m);
         let mut off: Vec<f64> = seen.iter().map(|p| nearest_m(&surface, p)).collect();
         off.sort_by(f64::total_cmp);
         let share = |part: usize| off.get(off.len() * part / 100).map_or(f64::NAN, |d| 1e3 * d);
         println!("{name:>18} {:>8} {:>24.2} {:>14.2}", seen.len(), share(50), share(95));
-        panels.push(heights(name, &seen, half_m));
+        panels.push(heights(name, &seen, extent_m));
     }
     Ok(())
 }
 
 /// Points of an object's upper side every half millimetre, m.
-fn surface(shape: &Shape, half_m: [f64; 2]) -> Vec<[f64; 3]> {
-    let steps = |half: f64| (0..=(4e3 * half) as usize).map(move |k| 5e-4 * k as f64 - half);
+fn surface(shape: &Shape, [along_x, along_y]: [[f64; 2]; 2]) -> Vec<[f64; 3]> {
+    let steps =
+        |[from, to]: [f64; 2]| (0..=(2e3 * (to - from)) as usize).map(move |k| 5e-4 * k as f64 + from);
     let at = |x: f64, y: f64| shape.height_m(x, y).map(|z| [x, y, z]);
-    steps(half_m[0])
-        .flat_map(|x| steps(half_m[1]).filter_map(move |y| at(x, y)).collect::<Vec<_>>())
-        .collect()
+    steps(along_x).flat_map(|x| steps(along_y).filter_map(move |y| at(x, y)).collect::<Vec<_>>()).collect()
 }
 
 /// Distance from the nearest of some points, m.
@@ -67,15 +88,15 @@ fn nearest_m(points: &[[f64; 3]], to: &[f64; 3]) -> f64 {
 }
 
 /// A map of heights with the object's outline.
-fn heights(name: &str, seen: &[[f64; 3]], half_m: [f64; 2]) -> Panel {
+fn heights(name: &str, seen: &[[f64; 3]], extent_m: [[f64; 2]; 2]) -> Panel {
     let mut panel =
         Panel::new(format!("6.6: {name}"), "x (mm)", "y (mm), colour: height, blue 0, red -5 mm").map();
     for p in seen {
         let level = (10.0 + 2e3 * p[2]).clamp(0.0, 10.0) as usize;
         panel.cell([1e3 * p[0], 1e3 * p[1]], [1.5, 1.5], &hue(10 - level, 11));
     }
-    let [a, b] = half_m.map(|h| 1e3 * h);
-    panel.line([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]], "black");
+    let [[left, right], [down, up]] = extent_m.map(|along| along.map(|m| 1e3 * m));
+    panel.line([[left, down], [right, down], [right, up], [left, up], [left, down]], "black");
     panel
 }
 

@@ -32,8 +32,46 @@ pub enum Shape {
         /// Half its length, m.
         half_length_m: f64,
     },
+    /// Three balls in a row along x that lie on one table, the first on the axis.
+    Snowman {
+        /// Radii, the largest first, m.
+        radii_m: [f64; 3],
+    },
+    /// A wire bent to a circle about the axis.
+    Hoop {
+        /// Radius of the circle, m.
+        radius_m: f64,
+        /// Radius of the wire, m.
+        wire_m: f64,
+    },
+    /// A wire bent to a triangle of equal sides about the axis, one corner along x.
+    Triangle {
+        /// Distance of the corners from the axis, m.
+        radius_m: f64,
+        /// Radius of the wire, m.
+        wire_m: f64,
+    },
     /// A lump of dough.
     Lump(Lump),
+}
+
+/// Height of a ball's, or a lying wire's, upper side at a distance from its middle: at most 0; none beyond it.
+fn round_m(radius_m: f64, away_m: f64) -> Option<f64> {
+    (away_m < radius_m).then(|| (radius_m * radius_m - away_m * away_m).sqrt() - radius_m)
+}
+
+/// Distance of a place from the sides of a triangle of equal sides about the origin, one corner along x.
+fn from_triangle_m(corner_m: f64, x: f64, y: f64) -> f64 {
+    let side = |k: u32| {
+        let [(ay, ax), (by, bx)] =
+            [k, k + 1].map(|corner| (f64::from(corner) * std::f64::consts::TAU / 3.0).sin_cos());
+        let [ax, ay, bx, by] = [ax, ay, bx, by].map(|at| corner_m * at);
+        let (along, across) = ([bx - ax, by - ay], [x - ax, y - ay]);
+        let length = along[0].hypot(along[1]);
+        let part = ((across[0] * along[0] + across[1] * along[1]) / (length * length)).clamp(0.0, 1.0);
+        (across[0] - part * along[0]).hypot(across[1] - part * along[1])
+    };
+    (0..3).map(side).fold(f64::INFINITY, f64::min)
 }
 
 impl Shape {
@@ -41,15 +79,61 @@ impl Shape {
     pub fn height_m(&self, x: f64, y: f64) -> Option<f64> {
         let r = x.hypot(y);
         match *self {
-            Self::Ball { radius_m } => {
-                (r < radius_m).then(|| (radius_m * radius_m - r * r).sqrt() - radius_m)
-            }
+            Self::Ball { radius_m } => round_m(radius_m, r),
             Self::Cylinder { radius_m } => (r <= radius_m).then_some(0.0),
             Self::Cone { angle_rad } => Some(-r * angle_rad.tan()),
             Self::Box { half_m } => (x.abs() <= half_m[0] && y.abs() <= half_m[1]).then_some(0.0),
-            Self::Ridge { radius_m, half_length_m } => (x.abs() <= half_length_m && y.abs() < radius_m)
-                .then(|| (radius_m * radius_m - y * y).sqrt() - radius_m),
+            Self::Ridge { radius_m, half_length_m } => {
+                (x.abs() <= half_length_m).then(|| round_m(radius_m, y.abs())).flatten()
+            }
+            Self::Snowman { radii_m } => {
+                let mut middle_m = 0.0;
+                let mut before_m = None;
+                let ball = |radius_m: f64| {
+                    middle_m += before_m.map_or(0.0, |before_m: f64| before_m + radius_m);
+                    before_m = Some(radius_m);
+                    let lower_m = 2.0 * (radii_m[0] - radius_m);
+                    round_m(radius_m, (x - middle_m).hypot(y)).map(|height_m| height_m - lower_m)
+                };
+                radii_m.map(ball).into_iter().flatten().reduce(f64::max)
+            }
+            Self::Hoop { radius_m, wire_m } => round_m(wire_m, (r - radius_m).abs()),
+            Self::Triangle { radius_m, wire_m } => round_m(wire_m, from_triangle_m(radius_m, x, y)),
             Self::Lump(lump) => lump.below_top_m(x, y),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    fn height_m(shape: &Shape, x: f64, y: f64) -> f64 {
+        shape.height_m(x, y).unwrap_or(f64::NAN)
+    }
+
+    #[test]
+    fn balls_in_a_row_touch_and_lie_on_one_table() {
+        let row = Shape::Snowman { radii_m: [3.0, 2.0, 1.0] };
+        for (x, top) in [(0.0, 0.0), (5.0, -2.0), (8.0, -4.0)] {
+            assert_relative_eq!(height_m(&row, x, 0.0), top, epsilon = 1e-12);
+        }
+        assert_relative_eq!(height_m(&row, 5.0, 1.0), -2.0 + 3f64.sqrt() - 2.0, epsilon = 1e-12);
+        assert!(row.height_m(3.0, 0.0).is_none() && row.height_m(9.5, 0.0).is_none());
+    }
+
+    #[test]
+    fn a_wire_is_highest_along_its_middle_and_hollow_within() {
+        let (circle, triangle) =
+            (Shape::Hoop { radius_m: 2.0, wire_m: 0.2 }, Shape::Triangle { radius_m: 2.0, wire_m: 0.2 });
+        assert_relative_eq!(height_m(&circle, 0.0, -2.0), 0.0, epsilon = 1e-12);
+        assert_relative_eq!(height_m(&circle, 2.12, 0.0), 0.16 - 0.2, epsilon = 1e-12);
+        // A corner, and the middle of the side across.
+        assert_relative_eq!(height_m(&triangle, 2.0, 0.0), 0.0, epsilon = 1e-12);
+        assert_relative_eq!(height_m(&triangle, -1.12, 0.0), 0.16 - 0.2, epsilon = 1e-12);
+        assert!(circle.height_m(0.0, 0.0).is_none() && triangle.height_m(0.0, 0.0).is_none());
+        assert!(triangle.height_m(1.5, 1.5).is_none());
     }
 }

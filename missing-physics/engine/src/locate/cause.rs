@@ -11,11 +11,13 @@ use crate::locate::intervals::{Best, Found, Scan};
 use crate::locate::membership::{Members, Rows};
 use crate::locate::projection::{Projection, dot};
 use crate::locate::responses::{Asked, Column, Form, Responses};
-use crate::locate::single;
-use crate::locate::unknowns::Unknown;
+use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
 use crate::problem::Problem;
 
+/// Each channel by itself, with a smooth departure or noise of its own, has to be worth so much more than a single cause; so have single rows,
+/// each with an amount of its own.
+pub(crate) const SIMPLER: f64 = 1.2;
 /// Any subset of the runs fits a little better than all of them: one in which alone a cause acts takes away so much more.
 const SUBSET_GAIN: f64 = 1.6;
 /// What acts at a place or a speed acts there in every run: one that acts at it in some runs only has to be worth so much more than one that
@@ -154,10 +156,10 @@ impl Scene<'_> {
     ) -> Result<Option<Found>, PredictError> {
         let (variable, of) = (&self.variables[along], &self.unknowns[unknown]);
         let alone = of.is_model_s() && of.runs_are_alone();
-        if variable.error <= 0.0 || !alone || !single::are_events(self.problem) {
+        if variable.error <= 0.0 || !alone || !are_events(self.problem) {
             return Ok(None);
         }
-        let columns = single::columns(self.problem, self.fit, self.sigma, of, component)?;
+        let columns = of.at_each_row(self.problem, self.fit, self.sigma, component)?;
         let rows = Rows::new(self.projection, &columns, &variable.values, variable.error);
         Ok(scan.with_errors(component, &rows))
     }

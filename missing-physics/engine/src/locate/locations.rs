@@ -5,7 +5,7 @@ use crate::diagnosis::{AsIf, Estimate, Location};
 use crate::fit::columns::whitened_columns;
 use crate::fit::optimum::Fit;
 use crate::locate::bins::{Along, Bins, variables};
-use crate::locate::cause::{Cause, Scene};
+use crate::locate::cause::{Cause, SIMPLER, Scene};
 use crate::locate::membership::Members;
 use crate::locate::projection::Projection;
 use crate::locate::scan::{Interval, Scan};
@@ -14,9 +14,6 @@ use crate::locate::unknowns::{Unknown, unknowns};
 use crate::model::{PredictError, Quantity};
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
-
-/// Each channel by itself, with a smooth departure or noise of its own, has to be worth so much more than a single cause.
-pub(crate) const SIMPLER: f64 = 1.2;
 
 /// What is looked at: a baseline's columns, beside which unknowns act along variables.
 struct Ground<'a> {

@@ -1,18 +1,13 @@
 //! Where an unknown acts at a few single rows (the impacts that went unheard), each by an amount of its own.
 
 use crate::fit::optimum::Fit;
-use crate::locate::cause::gains;
-use crate::locate::locations::SIMPLER;
+use crate::locate::cause::{SIMPLER, gains};
 use crate::locate::projection::{Projection, dot};
-use crate::locate::unknowns::Unknown;
+use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
 use crate::problem::Problem;
 
-/// Runs of more rows than this have no rows of which each is an event.
-const EVENTS: usize = 40;
-/// So many events of more than these rows ...
-const ROWS: usize = 6000;
-/// ... and no more than this many are single ones.
+/// No more than this many events are single ones.
 const MOST: usize = 12;
 
 /// A row at which an unknown acts.
@@ -53,7 +48,7 @@ pub(crate) fn events(
     for (number, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_model_s() && u.runs_are_alone())
     {
         for component in 0..unknown.told.components.len() {
-            let columns = columns(problem, fit, sigma, unknown, component)?;
+            let columns = unknown.at_each_row(problem, fit, sigma, component)?;
             let found = greedy(problem, projection.clone(), &columns, number, component);
             if !found.rows.is_empty() && best.as_ref().is_none_or(|b| weight(&found) > weight(b)) {
                 best = Some(found);
@@ -61,36 +56,6 @@ pub(crate) fn events(
         }
     }
     Ok(best)
-}
-
-/// Whether rows are events: few in each run, and not too many in all.
-pub(crate) fn are_events(problem: &Problem<'_>) -> bool {
-    let lengths = || problem.recording.runs.iter().map(|run| run.len());
-    lengths().max().unwrap_or(0) <= EVENTS && lengths().sum::<usize>() <= ROWS
-}
-
-/// What a unit at each single row does to its run, `[run][row]`.
-pub(crate) fn columns(
-    problem: &Problem<'_>,
-    fit: &Fit,
-    sigma: &[f64],
-    unknown: &Unknown<'_>,
-    component: usize,
-) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
-    let runs = &problem.recording.runs;
-    let longest = runs.iter().map(|run| run.len()).max().unwrap_or(0);
-    let mut columns = vec![Vec::new(); runs.len()];
-    for row in 0..longest {
-        let only = |n: usize| (0..n).map(|i| f64::from(u8::from(i == row))).collect();
-        let amounts: Vec<Vec<f64>> = runs.iter().map(|run| only(run.len())).collect();
-        let moved = unknown.response(problem, fit, sigma, component, amounts)?;
-        for ((all, moved), run) in columns.iter_mut().zip(moved).zip(runs) {
-            if row < run.len() {
-                all.push(moved);
-            }
-        }
-    }
-    Ok(columns)
 }
 
 /// Takes the row that is worth most, and the next one beside it, as long as one is worth its price.

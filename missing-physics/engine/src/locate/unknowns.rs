@@ -4,11 +4,22 @@ use crate::fit::optimum::Fit;
 use crate::model::{LocalCauses, LocalUnknown, PredictError};
 use crate::problem::Problem;
 
+/// Runs of more rows than this have no rows of which each is an event.
+const EVENTS: usize = 40;
+/// All runs of more rows than this together have none either.
+const ROWS: usize = 6000;
+
 /// An unknown, and how to ask for its effect.
 pub(crate) struct Unknown<'a> {
     pub(crate) told: LocalUnknown,
     /// The model's number of it; an offset of the readings where there is none.
     model: Option<(&'a dyn LocalCauses, usize)>,
+}
+
+/// Whether rows are events: few in each run, and not too many in all.
+pub(crate) fn are_events(problem: &Problem<'_>) -> bool {
+    let lengths = || problem.recording.runs.iter().map(|run| run.len());
+    lengths().max().unwrap_or(0) <= EVENTS && lengths().sum::<usize>() <= ROWS
 }
 
 /// The model's unknowns, and an offset of the readings.
@@ -77,5 +88,29 @@ impl Unknown<'_> {
             (0..problem.channels()).flat_map(channel).collect()
         };
         Ok(moved.iter().map(|moved| moved.iter().enumerate().map(white).collect()).collect())
+    }
+
+    /// What a unit of a component at each single row does to its run, `[run][row]`.
+    pub(crate) fn at_each_row(
+        &self,
+        problem: &Problem<'_>,
+        fit: &Fit,
+        sigma: &[f64],
+        component: usize,
+    ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
+        let runs = &problem.recording.runs;
+        let longest = runs.iter().map(|run| run.len()).max().unwrap_or(0);
+        let mut columns = vec![Vec::new(); runs.len()];
+        for row in 0..longest {
+            let only = |n: usize| (0..n).map(|i| f64::from(u8::from(i == row))).collect();
+            let amounts: Vec<Vec<f64>> = runs.iter().map(|run| only(run.len())).collect();
+            let moved = self.response(problem, fit, sigma, component, amounts)?;
+            for ((all, moved), run) in columns.iter_mut().zip(moved).zip(runs) {
+                if row < run.len() {
+                    all.push(moved);
+                }
+            }
+        }
+        Ok(columns)
     }
 }
