@@ -105,7 +105,7 @@ impl Drops {
             (h.row, format!("times and places of a bouncing ball in run {label}"))
         };
         let judged = judge(&drops, &Effects { unheard: 1.0, ..nominal }, self.calibration)
-            .ok_or_else(|| senseless(&self.heard[0]))?;
+            .map_err(|drop| senseless(&self.heard[drop]))?;
         let kappa = judged.spread.kappa;
         (nominal.heads, nominal.outwards_per_m) = (judged.heads, judged.outwards_per_m);
         let mut model = BounceModel::new(

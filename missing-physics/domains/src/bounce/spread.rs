@@ -60,26 +60,43 @@ enum Unknown {
     Approach,
 }
 
-type Change = fn(&mut Effects, f64);
+/// One of the effects.
+type Effect = fn(&mut Effects) -> &mut f64;
+
+/// An effect that is fitted beside the noise, and how far from its start it is beforehand: drops from one height hardly tell restitution, its
+/// slope, drag and the clock apart, and a few that come apart would have a hand throw balls along the table.
+#[derive(Clone, Copy)]
+struct Nuisance {
+    effect: Effect,
+    width: f64,
+}
+
+impl Nuisance {
+    const fn new(effect: Effect, width: f64) -> Self {
+        Self { effect, width }
+    }
+}
 
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
 /// only about the likely drop.
-const NUISANCES: [Change; 6] = [
-    |e, d| e.restitution += d,
-    |e, d| e.slope_s_m += d,
-    |e, d| e.drag_per_m += d,
-    |e, d| e.table[0] += d,
-    |e, d| e.table[1] += d,
-    |e, d| e.walk_s += d,
+const NUISANCES: [Nuisance; 6] = [
+    Nuisance::new(|e| &mut e.restitution, 0.3),
+    Nuisance::new(|e| &mut e.slope_s_m, 0.1),
+    Nuisance::new(|e| &mut e.drag_per_m, 0.5),
+    Nuisance::new(|e| &mut e.table[0], 0.3),
+    Nuisance::new(|e| &mut e.table[1], 0.3),
+    Nuisance::new(|e| &mut e.walk_s, 1e-4),
 ];
+const CLOCK: Nuisance = Nuisance::new(|e| &mut e.clock_rate, 0.1);
 /// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
 /// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
 /// take for a smaller slope.
-const HAND: [Change; 3] = [|e, d| e.heads[0] += d, |e, d| e.heads[1] += d, |e, d| e.outwards_per_m += d];
+const HAND: [Nuisance; 3] = [
+    Nuisance::new(|e| &mut e.heads[0], 0.3),
+    Nuisance::new(|e| &mut e.heads[1], 0.3),
+    Nuisance::new(|e| &mut e.outwards_per_m, 10.0),
+];
 
-/// What each of them is beforehand, give or take, in rad and rad/m: few drops that come apart would have a hand throw balls along the
-/// table.
-const HAND_WIDTH: [f64; 3] = [0.3, 0.3, 10.0];
 /// Where a heading (rad), and how it changes outwards (rad/m), may lie.
 pub(super) const HEADS: [f64; 2] = [-1.0, 1.0];
 pub(super) const OUTWARDS: [f64; 2] = [-50.0, 50.0];
@@ -89,11 +106,11 @@ pub(super) const fn released(drops: usize) -> bool {
     drops >= 5
 }
 
-fn nuisances(drops: &[Drop]) -> Vec<Change> {
+fn nuisances(drops: &[Drop]) -> Vec<Nuisance> {
     let mut all = NUISANCES.to_vec();
     // Where the height says how fast a ball comes, times that are all too long would be taken for balls that come aslant.
     if drops.iter().any(|d| d.height_m.is_some()) {
-        all.push(|e, d| e.clock_rate += d);
+        all.push(CLOCK);
     }
     if released(drops.len()) {
         all.extend(HAND);
@@ -236,8 +253,11 @@ pub(super) struct Judged {
 /// How many plausible spreads are drawn.
 const PLAUSIBLE: usize = 16;
 
-/// The spread of all drops and each drop about its likely course; `None` where a drop makes no sense.
-pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration) -> Option<Judged> {
+/// The spread of all drops and each drop about its likely course.
+///
+/// # Errors
+/// The number of the drop that makes no sense; of the first, where all together make none.
+pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration) -> Result<Judged, usize> {
     let [x, y] = calibration.place_m;
     let [time_s, place_m] = calibration.estimated.unwrap_or([TYPICAL.time_s, TYPICAL.place_m[0]]);
     let mut spread = Spread {
@@ -252,43 +272,43 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
     let nuisances = nuisances(drops);
     for _ in 0..ROUNDS {
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, &nuisances)).collect();
-        let mut beforehand = vec![[1e-9, 0.0]; nuisances.len()];
-        if released(drops.len()) {
-            // The hand's are the last.
-            let [x, y] = begin.heads;
-            let by_hand = HAND_WIDTH.iter().zip([x, y, begin.outwards_per_m]);
-            beforehand.truncate(nuisances.len() - HAND.len());
-            beforehand.extend(by_hand.map(|(width, from)| [width.powi(-2), from]));
-        }
+        // A hand sends balls nowhere, beforehand; the other effects are those that the drops begin with.
+        let expected = Effects { heads: [0.0; 2], outwards_per_m: 0.0, ..*effects };
+        let beforehand: Vec<[f64; 2]> = (nuisances.iter())
+            .map(|Nuisance { effect, width }| {
+                [width.powi(-2), *effect(&mut begin.clone()) - *effect(&mut expected.clone())]
+            })
+            .collect();
         let likelihood = Likelihood { drops: &parts, beforehand: &beforehand, calibration, start: spread };
-        spread = likelihood.spread(&best(&likelihood)?);
-        let (_, moved) = likelihood.value(&spread)?;
+        spread = likelihood.spread(&best(&likelihood).ok_or(0_usize)?);
+        let (_, moved) = likelihood.value(&spread).ok_or(0_usize)?;
         plausible = Likelihood { start: spread, ..likelihood }.plausible();
         let mut likely = begin;
-        nuisances.iter().zip(moved.iter()).for_each(|(change, by)| change(&mut likely, *by));
+        nuisances.iter().zip(moved.iter()).for_each(|(nuisance, by)| *(nuisance.effect)(&mut likely) += by);
         likely.friction = 0.0;
         likely.drag_per_m = likely.drag_per_m.max(0.0);
         begin.heads = likely.heads.map(|v| v.clamp(HEADS[0], HEADS[1]));
         begin.outwards_per_m = likely.outwards_per_m.clamp(OUTWARDS[0], OUTWARDS[1]);
-        linear = linear.iter().map(|l| l.likely(&likely, &spread)).collect::<Option<_>>()?;
+        let about = |(number, drop): (usize, &Linear)| drop.likely(&likely, &spread).ok_or(number);
+        linear = linear.iter().enumerate().map(about).collect::<Result<_, _>>()?;
     }
     let Effects { heads, outwards_per_m, .. } = begin;
-    Some(Judged { spread, plausible, drops: linear, heads, outwards_per_m })
+    Ok(Judged { spread, plausible, drops: linear, heads, outwards_per_m })
 }
 
 /// A drop with its errors and what the nuisances make of them.
 fn with_design(
     linear: &Linear,
     effects: &Effects,
-    nuisances: &[Change],
+    nuisances: &[Nuisance],
 ) -> (Linear, DVector<f64>, DMatrix<f64>) {
     const STEP: f64 = 1e-4;
     let errors = linear.errors(effects);
     let columns: Vec<DVector<f64>> = nuisances
         .iter()
-        .map(|change| {
+        .map(|nuisance| {
             let mut moved = *effects;
-            change(&mut moved, STEP);
+            *(nuisance.effect)(&mut moved) += STEP;
             (linear.errors(&moved) - &errors) / STEP
         })
         .collect();
