@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::draw::{between, choose, log_between, sign, whole};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
-use crate::physics::bounce::{BounceWorld, Effects, Softer};
+use crate::physics::bounce::{BounceWorld, Effects, Recorded, Softer};
 
 /// Makes worlds of the domain `bounce` from times and places of impacts.
 #[derive(Debug, Clone, Copy)]
@@ -44,38 +44,22 @@ impl Maker for Bounce {
             key.unlisted = Some("a table that is softer on one side".into());
         }
         let mut seed = seed ^ 0x5eed;
-        let mut made = world.files_and_unheard(seed);
+        let mut made = world.recorded(seed);
         // Drops in which all was heard hide no unheard impact.
-        while made.1.is_empty() && world.effects.unheard > 0.0 {
+        while made.unheard.is_empty() && world.effects.unheard > 0.0 {
             seed = seed.wrapping_add(1);
-            made = world.files_and_unheard(seed);
+            made = world.recorded(seed);
         }
-        let ([header, data], unheard) = made;
+        let Recorded { files: [header, data], unheard, softer } = made;
         key.state_missed(unheard.len(), world.runs);
         if let Some(place) = key.place.as_mut().filter(|place| place.variable == "x_m") {
-            place.runs = coming_there(&data, place, world.height_known);
+            place.runs = softer.iter().map(usize::to_string).collect();
         }
         if hidden == Hidden::Local && world.effects.unheard > 0.0 {
             key.events = unheard.iter().map(|[run, impact]| (run.to_string(), *impact as f64)).collect();
         }
         Concealed::table(header, data, key)
     }
-}
-
-/// The runs that come to a place along x, as recorded, at an impact before and after which a speed is recorded: a stripe shows in no other.
-fn coming_there(data: &str, place: &Place, fall_is_known: bool) -> Vec<String> {
-    let rows: Vec<Vec<&str>> = data.lines().skip(1).map(|row| row.split(',').collect()).collect();
-    let mut runs: Vec<String> = Vec::new();
-    for (at, cells) in rows.iter().enumerate() {
-        let same = |other: Option<&Vec<&str>>| other.is_some_and(|other| other[0] == cells[0]);
-        let before = fall_is_known || same(at.checked_sub(1).and_then(|before| rows.get(before)));
-        let x_m = cells.get(3).and_then(|x| x.parse::<f64>().ok());
-        let there = x_m.is_some_and(|x| x >= place.from && x <= place.to);
-        if there && before && same(rows.get(at + 1)) && !runs.iter().any(|run| run == cells[0]) {
-            runs.push(cells[0].into());
-        }
-    }
-    runs
 }
 
 /// A restitution that is lower on a stripe of the table, from a drop on, or at some speeds; or a few impacts that go unheard.

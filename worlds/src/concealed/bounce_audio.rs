@@ -10,7 +10,7 @@ use super::draw::{between, choose, log_between, whole};
 use super::key::{Concealed, Hidden, Key};
 use super::maker::Maker;
 use crate::GRAVITY_M_S2;
-use crate::physics::bounce::BounceWorld;
+use crate::physics::bounce::{BounceWorld, Impact, shows_softer};
 use crate::physics::sound::{Room, TableModes, add_noise, wav};
 
 /// Makes worlds of the domain `bounce` from sound.
@@ -60,7 +60,7 @@ impl Maker for BounceAudio {
         }
         key.state_missed(heard.unheard, world.ball.runs);
         if let Some(place) = key.place.as_mut().filter(|place| place.variable == "x_m") {
-            place.runs = heard.coming_between(place.from, place.to);
+            place.runs = heard.softer;
         }
         Concealed { files: heard.files, key }
     }
@@ -89,17 +89,8 @@ struct Recorded {
     files: Vec<(String, Vec<u8>)>,
     /// The number of runs in which an impact cannot be heard.
     unheard: usize,
-    /// By run: where along x the impacts are before and after which a speed is heard.
-    across_m: Vec<Vec<f64>>,
-}
-
-impl Recorded {
-    /// The runs that come between two places along x: a stripe there shows in no other.
-    fn coming_between(&self, from: f64, to: f64) -> Vec<String> {
-        let there = |x: &Vec<f64>| x.iter().any(|x| (from..=to).contains(x));
-        let runs = self.across_m.iter().enumerate().filter(|(_, x)| there(x));
-        runs.map(|(run, _)| (run + 1).to_string()).collect()
-    }
+    /// The runs in which a softer restitution shows.
+    softer: Vec<String>,
 }
 
 impl SoundWorld {
@@ -172,14 +163,13 @@ impl SoundWorld {
     fn heard(&self, rng: &mut ChaCha8Rng) -> Recorded {
         let table = TableModes::new(0.42 * self.room.rate_hz.min(22e3), rng);
         let mut unheard = 0;
-        let (mut files, mut across_m) = (Vec::new(), Vec::new());
+        let (mut files, mut softer) = (Vec::new(), Vec::new());
         for run in 0..self.ball.runs {
             let silent = self.ball.unheard(rng);
             unheard += usize::from(silent.is_some());
             let (sound, events) = self.sound(&table, silent, run, rng);
             files.push((format!("drop-{run:02}.wav"), sound));
-            let known = usize::from(!self.ball.height_known)..events.len() - 1;
-            across_m.push(events[known].iter().map(|[_, x, _]| *x).collect());
+            softer.extend(shows_softer(&events, self.ball.height_known).then(|| (run + 1).to_string()));
         }
         let names: Vec<String> = files.iter().map(|(name, _)| format!("{name:?}")).collect();
         let mut header = format!(
@@ -192,31 +182,31 @@ impl SoundWorld {
             let _ = write!(header, "\n[rig]\ndrop_height_m = {}\n", self.ball.height_m);
         }
         files.insert(0, ("recording.toml".into(), header.into_bytes()));
-        Recorded { files, unheard, across_m }
+        Recorded { files, unheard, softer }
     }
 
-    /// The sound of one run, in which the impact of a number may be silent, and the time and place of each impact.
+    /// The sound of one run, in which the impact of a number may be silent, and its impacts.
     fn sound(
         &self,
         table: &TableModes,
         silent: Option<usize>,
         run: usize,
         rng: &mut ChaCha8Rng,
-    ) -> (Vec<u8>, Vec<[f64; 3]>) {
+    ) -> (Vec<u8>, Vec<Impact>) {
         let from = [between(rng, 0.25, 0.75) * SIDE_M, between(rng, 0.25, 0.75) * SIDE_M];
         let height = self.ball.height_m * if self.ball.height_known { 1.0 } else { between(rng, 0.7, 1.3) };
         let impacts = self.ball.impacts + usize::from(silent.is_some());
         let mut events = self.ball.in_run(run).drop(from, height, 0.0..1e-3, impacts, rng);
-        let early = events[0][0] - between(rng, 0.03, 0.12);
-        events.iter_mut().for_each(|e| e[0] -= early);
-        let last = events.last().map_or(0.0, |e| e[0]);
+        let early = events[0].heard[0] - between(rng, 0.03, 0.12);
+        events.iter_mut().for_each(|e| e.heard[0] -= early);
+        let last = events.last().map_or(0.0, |e| e.heard[0]);
         let length = ((last + 0.15) * self.room.rate_hz) as usize;
         let mut channels = vec![vec![0.0; length]; self.stated_m.len()];
         let mut speed = (2.0 * GRAVITY_M_S2 * height).sqrt();
         let mut loudness = 0.0;
-        for (number, [t, x, y]) in events.iter().enumerate() {
+        for (number, Impact { heard: [t, x, y], .. }) in events.iter().enumerate() {
             if let Some(next) = events.get(number + 1).filter(|_| number > 0) {
-                speed = 0.5 * GRAVITY_M_S2 * (next[0] - t) / self.ball.restitution;
+                speed = 0.5 * GRAVITY_M_S2 * (next.heard[0] - t) / self.ball.restitution;
             }
             if Some(number) != silent {
                 let burst = table.strike(speed, self.room.rate_hz, rng);
@@ -234,12 +224,13 @@ impl SoundWorld {
     }
 
     /// A sound from elsewhere in the room, between two impacts.
-    fn click(&self, events: &[[f64; 3]], rng: &mut ChaCha8Rng, channels: &mut [Vec<f64>]) {
+    fn click(&self, events: &[Impact], rng: &mut ChaCha8Rng, channels: &mut [Vec<f64>]) {
         let (turn, away) = (between(rng, 0.0, std::f64::consts::TAU), between(rng, 1.2, 1.4));
         let place =
             [0.5 * SIDE_M + away * turn.cos(), 0.5 * SIDE_M + away * turn.sin(), between(rng, 0.2, 1.0)];
         let gap = whole(rng, 0, events.len() - 2);
-        let t = events[gap][0] + between(rng, 0.35, 0.65) * (events[gap + 1][0] - events[gap][0]);
+        let [before, after] = [events[gap].heard[0], events[gap + 1].heard[0]];
+        let t = before + between(rng, 0.35, 0.65) * (after - before);
         let burst =
             TableModes::new(0.42 * self.room.rate_hz.min(22e3), rng).strike(1.0, self.room.rate_hz, rng);
         self.room.play(&burst, place, t, rng, channels);

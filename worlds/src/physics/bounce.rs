@@ -50,6 +50,14 @@ pub struct Softer {
     pub from_run: usize,
 }
 
+impl Softer {
+    /// Whether it acts at an impact at a place along x, m, with a speed, m/s.
+    fn acts(&self, x: f64, speed: f64) -> bool {
+        let within = |value: f64, [low, high]: [f64; 2]| value > low && value < high;
+        self.by != 0.0 && within(x, self.x_m) && within(speed, self.speed_m_s)
+    }
+}
+
 impl Default for Softer {
     fn default() -> Self {
         let all = [f64::NEG_INFINITY, f64::INFINITY];
@@ -88,6 +96,33 @@ pub struct BounceWorld {
     pub effects: Effects,
 }
 
+/// An impact.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Impact {
+    /// When and where it is heard, s and m.
+    pub(crate) heard: Vec3,
+    /// Whether a [`Softer`] restitution acts at it.
+    pub(crate) softer: bool,
+}
+
+/// Whether a softer restitution shows in a drop: acts at an impact before and after which a speed is recorded, the first one among them where
+/// the height of the fall is known.
+pub(crate) fn shows_softer(heard: &[Impact], height_known: bool) -> bool {
+    let inner = usize::from(!height_known)..heard.len().saturating_sub(1);
+    heard.get(inner).is_some_and(|inner| inner.iter().any(|impact| impact.softer))
+}
+
+/// What is recorded of drops.
+#[derive(Debug, Clone)]
+pub(crate) struct Recorded {
+    /// The contents of `recording.toml` and `data.csv`.
+    pub(crate) files: [String; 2],
+    /// For each impact that went unheard its run and the number of the last impact before it that was heard, both counted from 1.
+    pub(crate) unheard: Vec<[usize; 2]>,
+    /// Runs in which a softer restitution shows, counted from 1.
+    pub(crate) softer: Vec<usize>,
+}
+
 impl BounceWorld {
     /// Thirty drops from 0.3 m, six impacts each, heard to 30 us and 6 mm.
     pub fn drops() -> Self {
@@ -110,7 +145,7 @@ impl BounceWorld {
 
     /// The contents of `recording.toml` and `data.csv`.
     pub fn files(&self, seed: u64) -> [String; 2] {
-        self.files_and_unheard(seed).0
+        self.recorded(seed).files
     }
 
     /// The same ball in a run, counted from 0.
@@ -122,10 +157,9 @@ impl BounceWorld {
         world
     }
 
-    /// The contents of `recording.toml` and `data.csv`, and for each impact that went unheard its run and the number of the last impact
-    /// before it that was heard, both counted from 1.
-    pub fn files_and_unheard(&self, seed: u64) -> ([String; 2], Vec<[usize; 2]>) {
-        let mut all_unheard = Vec::new();
+    /// The recording, with what is known of its making.
+    pub(crate) fn recorded(&self, seed: u64) -> Recorded {
+        let (mut all_unheard, mut softer) = (Vec::new(), Vec::new());
         let mut header = String::from("format = 1\ndomain = \"bounce\"\ndata = \"data.csv\"\n");
         if self.noise_known {
             let [time, place] = self.noise;
@@ -147,13 +181,14 @@ impl BounceWorld {
             let impacts = self.impacts + usize::from(unheard.is_some());
             let heard =
                 self.in_run(run - 1).drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
+            softer.extend(shows_softer(&heard, self.height_known).then_some(run));
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
-            for (number, (_, [t, x, y])) in kept.enumerate() {
+            for (number, (_, Impact { heard: [t, x, y], .. })) in kept.enumerate() {
                 let _ = write!(data, "{run},{},{t:.7}", number + 1);
                 let _ = if self.placed { writeln!(data, ",{x:.5},{y:.5}") } else { writeln!(data) };
             }
         }
-        ([header, data], all_unheard)
+        Recorded { files: [header, data], unheard: all_unheard, softer }
     }
 
     /// The impact of a run that goes unheard, if one does.
@@ -169,7 +204,7 @@ impl BounceWorld {
         begin_s: Range<f64>,
         impacts: usize,
         rng: &mut ChaCha8Rng,
-    ) -> Vec<Vec3> {
+    ) -> Vec<Impact> {
         let e = &self.effects;
         let normal = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
         // The stated height is that above the place where it lands.
@@ -183,11 +218,12 @@ impl BounceWorld {
             let table = if impact == 0 { &level } else { self };
             t += table.fly(&mut place, &mut velocity);
             place[2] = e.table_slope[0] * place[0] + e.table_slope[1] * place[1];
-            heard.push([
+            let at = [
                 t * (1.0 + e.clock_rate) + self.noise[0] * normal(rng),
                 place[0] * (1.0 + e.position_scale) + self.noise[1] * normal(rng),
                 place[1] * (1.0 + e.position_scale) + self.noise[1] * normal(rng),
-            ]);
+            ];
+            heard.push(Impact { heard: at, softer: e.softer.acts(place[0], norm(&velocity)) });
             velocity = self.rebound(&place, &velocity, rng);
         }
         heard
@@ -232,9 +268,8 @@ impl BounceWorld {
         if place[0] > self.soft_from_m {
             restitution -= e.softer_side;
         }
-        let Softer { by, x_m, speed_m_s, .. } = e.softer;
-        if place[0] > x_m[0] && place[0] < x_m[1] && speed > speed_m_s[0] && speed < speed_m_s[1] {
-            restitution -= by;
+        if e.softer.acts(place[0], speed) {
+            restitution -= e.softer.by;
         }
         let up = unit(&[-e.table_slope[0], -e.table_slope[1], 1.0]);
         let into = v[0] * up[0] + v[1] * up[1] + v[2] * up[2];

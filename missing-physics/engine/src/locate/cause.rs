@@ -27,7 +27,7 @@ const PLACE_GAIN: f64 = 1.5;
 /// more than one along a speed or a place ...
 const COUNT: f64 = 10.0;
 /// ... and a part of what it is worth, since a likelihood so sharp is not known better.
-const COUNT_PART: f64 = 0.01;
+const COUNT_PART: f64 = 0.05;
 /// What is worth less than the best by this much cannot be told from it (twice a log Bayes factor, "not worth more than a bare mention":
 /// Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): unknowns and variables count in the order in which the model and the
 /// recording have them.
@@ -171,6 +171,7 @@ impl Scene<'_> {
             runs: self.problem.rows.len(),
             alone: self.unknowns[unknown].runs_are_alone(),
             rows: self.projection.rows,
+            whole: self.projection.residual.iter().map(|run| dot(run, run)).sum(),
         }
     }
 

@@ -62,6 +62,8 @@ pub(crate) struct Scan<'a> {
     /// Whether what acts in a run shows in that run alone.
     pub(crate) alone: bool,
     pub(crate) rows: f64,
+    /// The sum of squares of all that is left.
+    pub(crate) whole: f64,
 }
 
 impl Scan<'_> {
@@ -139,7 +141,9 @@ impl Scan<'_> {
         let gains: Vec<f64> = effects.iter().map(Effect::gain).collect();
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
             let price = price + form.part() * gain;
-            if best.as_ref().is_none_or(|b| gain - price > b.worth()) && gain.is_finite() {
+            // What takes away more than there is takes it by rounding.
+            let sound = gain <= self.whole * (1.0 + EVEN);
+            if best.as_ref().is_none_or(|b| gain - price > b.worth()) && sound {
                 let bins = self.bins.clone();
                 let members = None;
                 *best = Some(Found { bins, interval, form, runs: runs(), components, members, gain, price });

@@ -95,8 +95,9 @@ pub(crate) fn locate(
     let found = match (cause, events) {
         (cause, Some(events))
             if {
-                // What acts at single rows only is no fit of many amounts to an interval.
-                let simpler = if unknowns[events.unknown].told.at_single_rows { 1.0 } else { SIMPLER };
+                // What acts at single rows only says more than an amount, so that it need not be worth quite as much.
+                let only = unknowns[events.unknown].told.at_single_rows;
+                let simpler = if only { SIMPLER.recip() } else { SIMPLER };
                 events.worth > simpler * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth)
             } =>
         {
