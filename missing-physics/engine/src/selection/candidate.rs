@@ -58,6 +58,11 @@ pub(crate) fn candidate(
     Ok(Candidate { set: set.to_vec(), selection, fit, alternative_modes, evidence, ruled_out })
 }
 
+/// A fit with everything off that a set has not.
+pub(crate) fn without_more(problem: &Problem<'_>, set: &[usize], fit: &Fit) -> Fit {
+    without_others(problem, &problem.select(set, &[]), &problem.integer_slots(set), fit)
+}
+
 /// A neighbour's fit: what it had on and this set does not is off again.
 fn without_others(problem: &Problem<'_>, selection: &Selection, integers: &[usize], near: &Fit) -> Fit {
     let mut near = near.clone();

@@ -4,11 +4,12 @@ use rayon::prelude::*;
 
 use crate::data::Run;
 use crate::estimate::profile::better_top;
+use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
-use crate::selection::candidate::{Candidate, Guess, candidate};
+use crate::selection::candidate::{Candidate, Guess, candidate, without_more};
 use crate::selection::screening::Screening;
 use crate::statistics::median;
 
@@ -77,6 +78,7 @@ pub(crate) fn search(
         }
         layer = order;
     }
+    from_larger(problem, rule, &mut all);
     // Beside a leftover no difference between neighbouring tops decides anything.
     let likeliest = all.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence));
     if screening.is_none() || likeliest.is_some_and(|best| down_to_noise(problem, rule, best)) {
@@ -173,6 +175,54 @@ fn fitted(
         }
         (found, other) => found.or(other),
     }
+}
+
+/// Fits sets again from the fits of larger ones, where these leave less with the member off that they have more.
+///
+/// A set that is stuck in a local minimum is left by a member that hardly does anything, which would then be named.
+fn from_larger(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
+    for size in (2..=MOST).rev() {
+        let mut larger: Vec<usize> = (0..all.len())
+            .filter(|&i| {
+                all[i].set.len() == size && all[i].evidence.is_finite() && all[i].ruled_out.is_none()
+            })
+            .collect();
+        larger.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
+        larger.truncate(BEAM);
+        let known: &[Candidate] = all;
+        let parts: Vec<(usize, usize)> = larger
+            .iter()
+            .flat_map(|&whole| {
+                let is_part = move |part: &usize| {
+                    let set = &known[*part].set;
+                    set.len() + 1 == size && set.iter().all(|m| known[whole].set.contains(m))
+                };
+                (0..known.len()).filter(is_part).map(move |part| (part, whole))
+            })
+            .collect();
+        let again = |&(part, whole): &(usize, usize)| -> Option<(usize, Candidate)> {
+            let (part_of, whole) = (&known[part], &known[whole]);
+            let begins = without_more(problem, &part_of.set, &whole.fit);
+            let left = |fit| squares(problem, fit, &whole.fit.noise.sigma);
+            (left(&begins)? < left(&part_of.fit)?).then_some(())?;
+            let found = candidate(problem, rule, &part_of.set, &[], &whole.fit, &[vec![]]).ok()?;
+            (found.evidence > part_of.evidence).then_some((part, found))
+        };
+        let found: Vec<(usize, Candidate)> = parts.par_iter().filter_map(again).collect();
+        for (part, better) in found {
+            if better.evidence > all[part].evidence {
+                all[part] = better.in_place_of(all[part].clone(), problem, rule);
+            }
+        }
+    }
+}
+
+/// Sum of squares of what a fit leaves, in sigmas of each channel; `None` where nothing can be predicted.
+fn squares(problem: &Problem<'_>, fit: &Fit, sigma: &[f64]) -> Option<f64> {
+    let left = residuals(problem, fit).ok()?;
+    let of_channel =
+        |(column, sigma): (&Vec<f64>, &f64)| column.iter().map(|v| (v / sigma).powi(2)).sum::<f64>();
+    Some(left.iter().map(|run| run.iter().zip(sigma).map(of_channel).sum::<f64>()).sum())
 }
 
 /// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
