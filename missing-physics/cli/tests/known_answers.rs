@@ -206,6 +206,13 @@ fn shared_long_practice_machines() {
     shared_practice("motion");
 }
 
+/// A stop that the first fit of it alone misses: it is found beside a sensor's gain, which is next to nothing.
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_practice_stop() {
+    practice_case_gets_the_verdict_of_its_key(&shared("practice").join("motion").join("c07"));
+}
+
 /// Where the response is half the learned one (c05), the right mechanism is closest, its factor is right, and it is not said to
 /// explain: something of the width is left.
 #[test]

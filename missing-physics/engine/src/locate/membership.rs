@@ -148,7 +148,7 @@ impl Rows {
         let along = sums.along_shared.iter().zip(&row.along_shared).map(|(sum, along)| sum + sign * along);
         Sums {
             product: sums.product + sign * row.product,
-            square: sums.square + sign * 2.0 * cross + row.beside[row.number],
+            square: sums.square + sign * (2.0 * cross + row.beside[row.number]),
             along_shared: along.collect(),
         }
     }
