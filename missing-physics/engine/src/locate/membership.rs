@@ -242,10 +242,14 @@ mod tests {
         let wrong = count(&|run, row| members.acts[run][row]);
         assert!(as_measured > 12 && wrong <= 2, "{wrong} rows are wrong, {as_measured} as measured");
         assert!((members.from - 0.3).abs() < 0.03 && (members.to - 0.6).abs() < 0.03, "{members:?}");
-        let size = {
-            let sums = rows.sums(&members.acts.concat());
+        // The size is that of the rows at which it truly acts, to less than two rows make of fifty.
+        let [size, of_truth] = [&members.acts, &truth].map(|acts| {
+            let sums = rows.sums(&acts.concat());
             sums.product / sums.square
-        };
-        assert!((size - SIZE).abs() < 0.3, "{size}");
+        });
+        assert!(
+            (size / of_truth - 1.0).abs() < 0.04 && (of_truth / SIZE - 1.0).abs() < 0.1,
+            "{size} {of_truth}"
+        );
     }
 }
