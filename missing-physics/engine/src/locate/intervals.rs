@@ -140,7 +140,6 @@ impl Scan<'_> {
         let price = form.sizes() as f64 * self.rows.ln();
         let gains: Vec<f64> = effects.iter().map(Effect::gain).collect();
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
-            let price = price + form.part() * gain;
             // What takes away more than there is takes it by rounding.
             let sound = gain <= self.whole * (1.0 + EVEN);
             if best.as_ref().is_none_or(|b| gain - price > b.worth()) && sound {
@@ -237,18 +236,16 @@ impl Scan<'_> {
     /// there: each where it is as likely to be before as behind.
     pub(crate) fn finer(&self, found: Found) -> Found {
         let forms = if found.runs.contains(&false) { &Form::ALL[..1] } else { &Form::ALL[..] };
-        let before = found.price - found.form.part() * found.gain;
-        // Beside a part of the gain.
         let price = |form: Form| {
             let sizes = self.responses.len() as f64 * (form.sizes() as f64 - found.form.sizes() as f64);
-            before + sizes * self.rows.ln()
+            found.price + sizes * self.rows.ln()
         };
         let worth = |interval: (usize, usize), form: Form| {
             let of_component = |r: &Responses| {
                 let runs = r.by_run(self.bins, interval, form).into_iter().zip(&found.runs);
                 total(runs.filter(|(_, acts)| **acts).map(|(effect, _)| effect)).gain()
             };
-            self.responses.iter().map(of_component).sum::<f64>() * (1.0 - form.part()) - price(form)
+            self.responses.iter().map(of_component).sum::<f64>() - price(form)
         };
         let [from, to] = [found.interval.0, found.interval.1].map(|edge| found.bins.near(edge, self.bins));
         let intervals = from.flat_map(|from| to.clone().map(move |to| (from, to))).filter(|(f, t)| f < t);
@@ -267,9 +264,8 @@ impl Scan<'_> {
         let from = middle(&judged, |e| e.interval.0, -EVEN);
         let to = middle(&judged, |e| e.interval.1, EVEN);
         let middle = likeliest(judged.iter().filter(|e| e.interval == (from, to))).unwrap_or(best);
-        let (interval, form, worth) = (middle.interval, middle.form, average.max(found.worth()));
-        let gain = (worth + price(form)) / (1.0 - form.part());
-        let price = gain - worth;
+        let price = price(middle.form);
+        let (interval, form, gain) = (middle.interval, middle.form, average.max(found.worth()) + price);
         Found { bins: self.bins.clone(), interval, form, gain, price, ..found }
     }
 }

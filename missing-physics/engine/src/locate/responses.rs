@@ -44,17 +44,6 @@ impl Form {
         if matches!(self, Self::Bent(_)) { 2 } else { 1 }
     }
 
-    /// By what part of a gain it has to be better than an even size: a likelihood so sharp that the linearisation shows in it would take
-    /// what is not even for more than it is.
-    pub(crate) fn part(self) -> f64 {
-        const PART: f64 = 0.01;
-        PART * match self {
-            Self::Even => 0.0,
-            Self::Straight(_) => 1.0,
-            Self::Bent(_) => 2.0,
-        }
-    }
-
     /// How much each of its sizes has of each power.
     fn weights(self, bins: &Bins, (from, to): (usize, usize)) -> [[f64; POWERS]; 2] {
         let (Self::Straight(edge) | Self::Bent(edge)) = self else { return [[1.0, 0.0, 0.0], [0.0; POWERS]] };
