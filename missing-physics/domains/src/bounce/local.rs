@@ -156,3 +156,55 @@ impl LocalCauses for TimesModel {
         runs.iter().zip(nuisance).zip(amounts).map(of_run).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use missing_physics::model::{Model as _, Scope};
+
+    use super::super::chance::tests::drop;
+    use super::super::drop::Drop;
+    use super::super::setup::Setup;
+    use super::*;
+
+    /// At its row an impact that went unheard does what the mechanism does to the whole drop, which hides no other; elsewhere nothing.
+    #[test]
+    fn an_impact_that_went_unheard_acts_at_its_row() {
+        let setup = Setup {
+            gravity_m_s2: 9.81,
+            drag_unit: None,
+            placed: false,
+            dropped: false,
+            released: false,
+            listened: false,
+            unheard: [1, 1],
+            microphones: 0,
+        };
+        let model = TimesModel::new(setup, 0.8, None, true);
+        // In the flight after the third impact that was heard.
+        let hides = Drop { unheard: vec![0, 0, 0, 1, 0, 0], ..drop() };
+        let run = TimesModel::run("1", &hides, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let shared = |unheard: f64| -> Vec<f64> {
+            let shared = model.spec().parameters.iter().filter(|p| p.scope == Scope::Shared);
+            shared.map(|p| if p.name == "unheard" { unheard } else { p.start }).collect()
+        };
+        let nuisance = vec![model.nuisance(2.2)];
+        let times = |unheard: f64| {
+            let mut out = vec![0.0; run.len()];
+            model.predict(&run, &shared(unheard), &nuisance[0], &mut out).unwrap();
+            out
+        };
+        let whole: Vec<f64> = times(1.0).iter().zip(times(0.0)).map(|(apart, one)| apart - one).collect();
+        assert!(whole[..3].iter().all(|late| *late == 0.0) && whole[3..].iter().all(|late| *late > 0.1));
+        let unknown =
+            LocalCauses::unknowns(&model).iter().position(|unknown| unknown.at_single_rows).unwrap();
+        for row in 0..run.len() {
+            let mut amounts = vec![0.0; run.len()];
+            amounts[row] = 1.0;
+            let runs = std::slice::from_ref(&run);
+            let late = model.response((unknown, 0), runs, &shared(0.0), &nuisance, &[amounts]).unwrap();
+            let expected = if row == 2 { whole.clone() } else { vec![0.0; run.len()] };
+            approx::assert_relative_eq!(late[0][..], expected[..], epsilon = 1e-12);
+        }
+    }
+}
