@@ -10,7 +10,7 @@ use crate::locate::bins::{Along, Bins};
 use crate::locate::intervals::{Best, Found, Scan};
 use crate::locate::membership::{Members, Rows};
 use crate::locate::projection::{Projection, dot};
-use crate::locate::responses::{Asked, Column, Form, Responses};
+use crate::locate::responses::{Asked, Column, Responses};
 use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
 use crate::problem::Problem;
@@ -100,16 +100,14 @@ impl Scene<'_> {
 
     /// What a hypothesis is worth, less where it acts in an unlikely way.
     fn weighed(&self, along: usize, found: &Found) -> f64 {
-        let everywhere = found.form == Form::Even && found.interval == (0, found.bins.len());
-        let some_runs = found.runs.contains(&false);
-        if everywhere {
-            found.worth()
-        } else if some_runs {
-            if along > 0 { found.worth() / PLACE_GAIN } else { found.worth() }
-        } else if self.variables[along].counts() {
-            found.worth() - COUNT - COUNT_PART * found.worth().abs()
-        } else {
-            found.worth()
+        let worth = found.worth();
+        if found.all_along() {
+            return worth;
+        }
+        match found.runs.contains(&false) {
+            true if along > 0 => worth / PLACE_GAIN,
+            false if self.variables[along].counts() => worth - COUNT - COUNT_PART * worth.abs(),
+            _ => worth,
         }
     }
 
@@ -177,7 +175,7 @@ impl Scene<'_> {
 
     /// The same hypothesis with edges that may be anywhere near those it has: each where it is as likely to be before as behind.
     fn finer(&self, unknown: usize, along: usize, found: Found) -> Result<Found, PredictError> {
-        if found.members.is_some() || found.form == Form::Even && found.interval == (0, found.bins.len()) {
+        if found.members.is_some() || found.all_along() {
             return Ok(found);
         }
         let bins = found.bins.finer(self.problem, &self.variables[along], found.interval);
@@ -227,9 +225,8 @@ impl Scene<'_> {
             .collect();
         let gains = gains(self.problem, &self.projection.residual, &after);
         let worth = found.worth();
-        let Found { bins, interval, form, runs, price, members, .. } = found;
-        let everywhere =
-            members.is_none() && form == Form::Even && interval == (0, bins.len()) && !runs.contains(&false);
+        let everywhere = found.all_along() && !found.runs.contains(&false);
+        let Found { bins, interval, runs, price, members, .. } = found;
         Ok(Cause { unknown, along, bins, interval, runs, members, sizes, worth, price, everywhere, gains })
     }
 }

@@ -32,6 +32,11 @@ impl Found {
     pub(crate) fn worth(&self) -> f64 {
         self.gain - self.price
     }
+
+    /// Whether it acts alike all along the variable.
+    pub(crate) fn all_along(&self) -> bool {
+        self.members.is_none() && self.form == Form::Even && self.interval == (0, self.bins.len())
+    }
 }
 
 /// The best hypotheses along one variable: in all runs or neighbouring ones, and in a subset of them.

@@ -105,18 +105,14 @@ impl Rows {
         }
         let gain = self.sums(&acts).gain();
         let worth = gain + 2.0 * self.log_probability(&acts, edges);
-        let mut members: Vec<Vec<bool>> = Vec::new();
-        for (row, acts) in self.rows.iter().zip(&acts) {
-            members.resize(members.len().max(row.run + 1), Vec::new());
-            members[row.run].push(*acts);
-        }
-        members.resize(self.first.len(), Vec::new());
+        let ends = self.first.iter().skip(1).copied().chain([acts.len()]);
+        let by_run = self.first.iter().zip(ends).map(|(&first, end)| acts[first..end].to_vec()).collect();
         let [from, to] = edges;
-        (gain > 0.0 && worth.is_finite()).then_some((worth, Members { acts: members, from, to }))
+        (gain > 0.0 && worth.is_finite()).then_some((worth, Members { acts: by_run, from, to }))
     }
 
-    /// Whether a row acts, by the logarithm of its probability.
-    fn log_odds(&self, value: f64, [from, to]: [f64; 2], acts: bool) -> f64 {
+    /// The logarithm of the probability that a row acts, or does not.
+    fn log_side(&self, value: f64, [from, to]: [f64; 2], acts: bool) -> f64 {
         // The nearer edge says nearly all; a value that is far on the wrong side of it is next to impossible.
         let inside = (value - from).min(to - value) / self.sigma;
         let towards = if acts { inside } else { -inside };
@@ -124,7 +120,7 @@ impl Rows {
     }
 
     fn log_probability(&self, acts: &[bool], edges: [f64; 2]) -> f64 {
-        self.rows.iter().zip(acts).map(|(row, acts)| self.log_odds(row.value, edges, *acts)).sum()
+        self.rows.iter().zip(acts).map(|(row, acts)| self.log_side(row.value, edges, *acts)).sum()
     }
 
     fn sums(&self, acts: &[bool]) -> Sums {
@@ -162,7 +158,7 @@ impl Rows {
         for _ in 0..2 * candidates.len() {
             let worth = |at: &usize| {
                 let changed = self.changed(&sums, acts, *at);
-                let side = |acts| self.log_odds(self.rows[*at].value, edges, acts);
+                let side = |acts| self.log_side(self.rows[*at].value, edges, acts);
                 let gain = changed.gain() - sums.gain() + 2.0 * (side(!acts[*at]) - side(acts[*at]));
                 (gain, *at, changed)
             };

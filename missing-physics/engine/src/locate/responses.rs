@@ -176,9 +176,7 @@ impl Asked<'_> {
         };
         form.weights(self.bins, interval)[..form.sizes()].iter().map(of_size).collect()
     }
-}
 
-impl Asked<'_> {
     /// What a unit at some rows does, `acts[run][row]`.
     pub(crate) fn at_rows(&self, acts: &[Vec<bool>]) -> Result<Column, PredictError> {
         let amounts = acts.iter().map(|run| run.iter().map(|&acts| f64::from(u8::from(acts))).collect());
