@@ -403,8 +403,8 @@ fn shared_measured_sand_hardens() {
 /// A pendulum that swings by less than four degrees and stands still before the end: dry friction that gives before it slides. Stiffness
 /// times yield is what it rubs with, 0.16 rad/s^2 by plain least squares.
 #[test]
-#[ignore = "needs ../shared, long: .ci/run --long"]
-fn shared_long_measured_small_swing_gives_before_it_slides() {
+#[ignore = "needs ../shared"]
+fn shared_measured_small_swing_gives_before_it_slides() {
     let answer = answer(&shared("recordings/real/motion/pendulum-small-swing"), "0");
     assert_eq!(answer["verdict"], "partly");
     assert_eq!(named_sets(&answer), [["hysteresis"]]);

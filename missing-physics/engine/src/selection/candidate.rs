@@ -14,7 +14,7 @@ const OPEN: f64 = 3.0;
 /// Starts of one set, with the same whole numbers, that are fitted to the end.
 const FINALISTS: usize = 3;
 /// Steps after which those are chosen of more.
-const HEAT: usize = 6;
+pub(crate) const HEAT: usize = 6;
 
 /// A set of mechanisms, fitted.
 #[derive(Debug, Clone)]

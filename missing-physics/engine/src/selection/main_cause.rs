@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::adequacy::linearised::curves::Curves;
@@ -170,7 +170,12 @@ impl<'a> Judge<'a> {
                 .filter(|&i| self.all[i].set.len() == size && beyond(&self.all[i]))
                 .filter(|&i| self.leaves_at_most(i, limit) && self.each_helps(i))
                 .collect();
-            let needed = |i: usize| self.judged(i).filter(|j| self.needed(i, j) && self.beats_its_parts(j));
+            let needed = |i: usize| {
+                self.judged(i).filter(|j| {
+                    // Beyond a smaller set that takes away nearly all.
+                    (found.is_none() || self.each_acts(j)) && self.needed(i, j) && self.beats_its_parts(j)
+                })
+            };
             let mut judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
             judged.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
             match judged.into_iter().next() {
@@ -263,7 +268,11 @@ impl<'a> Judge<'a> {
         let (fit, process) = with_leftover(self.problem, &self.rule, &of.selection, plain).ok()?;
         let (mut worth, ruled_out) = evidence(self.problem, &of.set, &[], &of.selection, &fit);
         worth += process.log_prior(self.problem);
-        let sound = worth.is_finite() && ruled_out.is_none();
+        // At a bound a mechanism is the limit of another one, or of nothing.
+        let mut added =
+            of.selection.shared.iter().zip(&of.selection.added_shared).filter(|(_, added)| **added);
+        let bounded = added.any(|(slot, _)| plain.at_bound.contains(slot));
+        let sound = worth.is_finite() && ruled_out.is_none() && !bounded;
         let fit = self.widened(&of.selection, plain, fit);
         let candidate =
             Candidate { fit, alternative_modes: Vec::new(), evidence: worth, ruled_out, ..of.clone() };
@@ -312,6 +321,31 @@ impl<'a> Judge<'a> {
             };
             refitted().is_ok_and(|alone| with > alone + NEEDED)
         })
+    }
+
+    /// Whether each member of a set acts, with errors that allow for the leftover: its parameters differ from where it is off by as
+    /// much as is asked of a log Bayes factor (Wald's statistic, twice that).
+    fn each_acts(&self, judged: &Judged) -> bool {
+        let Candidate { set, selection, fit, .. } = &judged.candidate;
+        let covariance = covariance(&fit.information);
+        let acts = |m: &usize| {
+            let mechanism = &self.problem.spec().mechanisms[*m];
+            let strength = |i: &usize| {
+                let parameter = &self.problem.shared.index[selection.shared[*i]];
+                mechanism.parameters.contains(parameter) && !mechanism.shape_parameters.contains(parameter)
+            };
+            let known = |i: &usize| covariance[(*i, *i)].is_finite();
+            let at: Vec<usize> = (0..selection.shared.len()).filter(strength).filter(known).collect();
+            let off = |i: usize| self.problem.shared.start[selection.shared[i]];
+            let departure = DVector::from_iterator(
+                at.len(),
+                at.iter().map(|&i| fit.shared[selection.shared[i]] - off(i)),
+            );
+            let of_it = covariance.select_rows(&at).select_columns(&at);
+            at.is_empty()
+                || of_it.cholesky().is_none_or(|c| departure.dot(&c.solve(&departure)) > 2.0 * NEEDED)
+        };
+        set.iter().all(acts)
     }
 
     /// Whether a set of several is likelier than it is without any one member and with a leftover in that one's place.

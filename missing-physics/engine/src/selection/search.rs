@@ -4,12 +4,12 @@ use rayon::prelude::*;
 
 use crate::data::Run;
 use crate::estimate::profile::better_top;
-use crate::fit::optimum::Fit;
+use crate::fit::gauss_newton::{linearise, solve_within};
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
-use crate::selection::candidate::{Candidate, Guess, candidate, without_more};
+use crate::selection::candidate::{Candidate, Guess, HEAT, candidate, without_more};
 use crate::selection::screening::Screening;
 use crate::statistics::median;
 
@@ -202,10 +202,14 @@ fn from_larger(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
             .collect();
         let again = |&(part, whole): &(usize, usize)| -> Option<(usize, Candidate)> {
             let (part_of, whole) = (&known[part], &known[whole]);
+            (whole.evidence > part_of.evidence).then_some(())?;
+            let (selection, noise) = (&part_of.selection, &whole.fit.noise);
             let begins = without_more(problem, &part_of.set, &whole.fit);
-            let left = |fit| squares(problem, fit, &whole.fit.noise.sigma);
-            (left(&begins)? < left(&part_of.fit)?).then_some(())?;
-            let found = candidate(problem, rule, &part_of.set, &[], &whole.fit, &[vec![]]).ok()?;
+            let some =
+                solve_within(HEAT, problem, selection, noise, (&begins.shared, &begins.nuisance)).ok()?;
+            let stuck = linearise(problem, selection, noise, &part_of.fit.shared, &part_of.fit.nuisance);
+            stuck.is_ok_and(|stuck| some.chi2 < stuck.chi2).then_some(())?;
+            let found = candidate(problem, rule, &part_of.set, &[], &some, &[vec![]]).ok()?;
             (found.evidence > part_of.evidence).then_some((part, found))
         };
         let found: Vec<(usize, Candidate)> = parts.par_iter().filter_map(again).collect();
@@ -215,14 +219,6 @@ fn from_larger(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
             }
         }
     }
-}
-
-/// Sum of squares of what a fit leaves, in sigmas of each channel; `None` where nothing can be predicted.
-fn squares(problem: &Problem<'_>, fit: &Fit, sigma: &[f64]) -> Option<f64> {
-    let left = residuals(problem, fit).ok()?;
-    let of_channel =
-        |(column, sigma): (&Vec<f64>, &f64)| column.iter().map(|v| (v / sigma).powi(2)).sum::<f64>();
-    Some(left.iter().map(|run| run.iter().zip(sigma).map(of_channel).sum::<f64>()).sum())
 }
 
 /// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
