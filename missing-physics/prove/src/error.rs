@@ -25,6 +25,16 @@ pub enum ProveError {
         /// The kind that was asked for.
         kind: String,
     },
+    /// A kind of worlds that the domain has not.
+    #[error("no worlds of the kind {kind} in the domain {domain}, expected one of the domains: {}", .known.join(", "))]
+    NoneOfKind {
+        /// The domain that was asked for.
+        domain: String,
+        /// The kind that was asked for.
+        kind: String,
+        /// The domains that have such worlds.
+        known: Vec<&'static str>,
+    },
     /// A world that is none of the proof's.
     #[error("no world {}, expected a domain and a number as trajectory/0003", quoted(.name))]
     UnknownWorld {

@@ -113,7 +113,7 @@ pub fn prove_world(arguments: &ProveArguments, name: &str) -> Result<(), ProveEr
 
 /// What makes the worlds that were asked for, and what they hide.
 fn asked(arguments: &ProveArguments) -> Result<(Vec<&'static dyn Maker>, Option<Hidden>), ProveError> {
-    let chosen: Vec<&'static dyn Maker> =
+    let mut chosen: Vec<&'static dyn Maker> =
         known().filter(|m| arguments.domain.as_deref().is_none_or(|d| d == m.name())).collect();
     if chosen.is_empty() {
         let domain = arguments.domain.clone().unwrap_or_default();
@@ -124,7 +124,17 @@ fn asked(arguments: &ProveArguments) -> Result<(Vec<&'static dyn Maker>, Option<
     }
     let unknown = |kind: &String| ProveError::UnknownKind { kind: kind.clone() };
     let hidden = |wanted: &String| key::hidden(wanted).ok_or_else(|| unknown(wanted));
-    Ok((chosen, arguments.kind.as_ref().map(hidden).transpose()?))
+    let kind = arguments.kind.as_ref().map(hidden).transpose()?;
+    // Worlds of another kind would stand in, which nobody asked for.
+    let has = |maker: &&dyn Maker| kind.is_none_or(|kind| maker.kind(kind) == kind);
+    chosen.retain(|maker| has(maker));
+    if chosen.is_empty() {
+        let [domain, kind] =
+            [&arguments.domain, &arguments.kind].map(|asked| asked.clone().unwrap_or_default());
+        let known = known().filter(|maker| has(maker)).map(Maker::name).collect();
+        return Err(ProveError::NoneOfKind { domain, kind, known });
+    }
+    Ok((chosen, kind))
 }
 
 /// A proof that has begun: its worlds are drawn, their answers sealed, and the plan lies in its folder.

@@ -5,6 +5,7 @@ mod bounce_audio;
 mod custom;
 mod dough_roll;
 mod draw;
+mod flights;
 mod indentation;
 mod key;
 mod liquid_tilt;

@@ -3,10 +3,12 @@
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::draw::{between, choose, log_between, noise, sign, whole};
+use super::draw::{between, choose, log_between, sign, whole};
+use super::flights::{Flights, HEADER, filmed};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
-use crate::physics::flight::{Effects, FlightWorld, Gust, Knock, Mast, Measured, Push};
+use super::rig::RigMaker;
+use crate::physics::flight::{Effects, FlightWorld, Gust, Knock, Mast, Push};
 
 /// Makes worlds of the domain `trajectory`.
 #[derive(Debug, Clone, Copy)]
@@ -20,18 +22,17 @@ impl Maker for Trajectory {
         "trajectory"
     }
 
+    fn kind(&self, hidden: Hidden) -> Hidden {
+        hidden
+    }
+
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        let hidden = self.kind(hidden);
+        if matches!(hidden, Hidden::Leftover | Hidden::Imitated) {
+            return RigMaker::<Flights>::NEW.conceal(hidden, seed);
+        }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut key = Key::new(hidden);
-        let rows = whole(&mut rng, 35, 60);
-        let sigma = log_between(&mut rng, 5e-4, 3e-3);
-        let mut world = FlightWorld {
-            runs: whole(&mut rng, 4, 8),
-            rows: [rows, rows + 15],
-            noise: noise(&mut rng, sigma),
-            ..FlightWorld::thrown(Measured::Position)
-        };
+        let mut world = filmed(&mut rng);
         let effects = &mut world.effects;
         for which in choose(&mut rng, LISTED, hidden.listed()) {
             listed(effects, which, &mut key, &mut rng);
@@ -41,9 +42,8 @@ impl Maker for Trajectory {
         } else if hidden.unlisted() {
             unlisted(effects, &mut key, &mut rng);
         }
-        let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n";
         let data = world.draw(seed ^ 0x5eed).csv(6);
-        Concealed::table(header.into(), data, key)
+        Concealed::table(HEADER.into(), data, key)
     }
 }
 

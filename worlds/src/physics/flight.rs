@@ -125,6 +125,17 @@ pub struct FlightWorld {
     pub noise: Noise,
 }
 
+/// How a run begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Launch {
+    /// Place, m, and velocity, m/s.
+    pub(crate) state: [f64; 6],
+    /// Number of frames.
+    pub(crate) rows: usize,
+    /// Phase of the mast, and of an accelerometer's offset, rad.
+    pub(crate) phase_rad: f64,
+}
+
 /// One recorded run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnRun {
@@ -178,43 +189,48 @@ impl FlightWorld {
     /// Draws a recording; the same seed gives the same bits.
     pub fn draw(&self, seed: u64) -> Drawn {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut between = |[low, high]: [f64; 2]| {
-            Uniform::new_inclusive(low, high.max(low)).map_or(low, |u| u.sample(&mut rng))
-        };
-        let plans: Vec<([f64; 6], usize, f64)> = (0..self.runs)
-            .map(|_| {
-                let speed = between(self.speed_m_s);
-                let (sin, cos) = between(self.elevation_rad).sin_cos();
-                let (east, north) = between([-0.6, 0.6]).sin_cos();
-                let place = [between([-0.1, 0.1]), between([-0.1, 0.1]), between([1.0, 1.6])];
-                let velocity = [speed * cos * north, speed * cos * east, speed * sin];
-                let rows = between([self.rows[0] as f64, self.rows[1] as f64]).round() as usize;
-                let [x, y, z] = place;
-                let [u, v, w] = velocity;
-                ([x, y, z, u, v, w], rows, between([0.0, std::f64::consts::TAU]))
-            })
-            .collect();
+        let launches = self.launches(&mut rng);
         let names: &[&str] = match self.measured {
             Measured::Height => &["z_m"],
             Measured::Position => &["x_m", "y_m", "z_m"],
             Measured::SpecificForce => &["accel_z_m_s2"],
         };
-        let runs = plans
-            .into_iter()
-            .enumerate()
-            .map(|(r, (start, rows, phase))| {
-                let mut world = *self;
-                if r < world.effects.push.from_run {
-                    world.effects.push = Push::default();
-                }
-                let (t_s, mut channels) = world.fly(start, rows, phase, STEPS);
-                for column in &mut channels {
-                    self.noise.apply(column, &mut rng);
-                }
-                DrawnRun { label: format!("{}", r + 1), t_s, channels }
-            })
-            .collect();
+        let of_run = |(r, (t_s, mut channels)): (usize, (Vec<f64>, Vec<Vec<f64>>))| {
+            for column in &mut channels {
+                self.noise.apply(column, &mut rng);
+            }
+            DrawnRun { label: format!("{}", r + 1), t_s, channels }
+        };
+        let runs = self.flights(&launches).into_iter().enumerate().map(of_run).collect();
         Drawn { names, runs }
+    }
+
+    /// How each run begins.
+    pub(crate) fn launches(&self, rng: &mut ChaCha8Rng) -> Vec<Launch> {
+        let mut between =
+            |[low, high]: [f64; 2]| Uniform::new_inclusive(low, high.max(low)).map_or(low, |u| u.sample(rng));
+        let of_run = |_| {
+            let speed = between(self.speed_m_s);
+            let (sin, cos) = between(self.elevation_rad).sin_cos();
+            let (east, north) = between([-0.6, 0.6]).sin_cos();
+            let [x, y, z] = [between([-0.1, 0.1]), between([-0.1, 0.1]), between([1.0, 1.6])];
+            let [u, v, w] = [speed * cos * north, speed * cos * east, speed * sin];
+            let rows = between([self.rows[0] as f64, self.rows[1] as f64]).round() as usize;
+            Launch { state: [x, y, z, u, v, w], rows, phase_rad: between([0.0, std::f64::consts::TAU]) }
+        };
+        (0..self.runs).map(of_run).collect()
+    }
+
+    /// Times and readings without noise of each run.
+    pub(crate) fn flights(&self, launches: &[Launch]) -> Vec<(Vec<f64>, Vec<Vec<f64>>)> {
+        let of_run = |(r, launch): (usize, &Launch)| {
+            let mut world = *self;
+            if r < world.effects.push.from_run {
+                world.effects.push = Push::default();
+            }
+            world.fly(launch.state, launch.rows, launch.phase_rad, STEPS)
+        };
+        launches.iter().enumerate().map(of_run).collect()
     }
 
     /// One flight as the camera would see it without noise, integrated in `steps` steps a frame.

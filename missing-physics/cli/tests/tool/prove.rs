@@ -48,6 +48,21 @@ fn a_proof_that_was_killed_goes_on_to_the_same_score() {
     assert!(String::from_utf8(other.stderr).unwrap().contains("another proof"));
 }
 
+/// Worlds of another kind do not stand in for those that were asked for.
+#[test]
+fn a_kind_that_a_domain_has_not_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = ["prove", "--domain", "bounce", "--kind", "leftover", "--worlds", "1", "--out"];
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output = Command::new(tool).args(asked).arg(folder.path().join("proof")).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8(output.stderr).unwrap();
+    let expected =
+        "no worlds of the kind leftover in the domain bounce, expected one of the domains: trajectory, slosh";
+    assert!(said.contains(expected), "{said}");
+    assert!(!folder.path().join("proof").exists());
+}
+
 #[test]
 fn a_domain_without_worlds_is_refused() {
     let folder = tempfile::tempdir().unwrap();
