@@ -1,0 +1,90 @@
+//! What a product of posteriors says of grains that are poured several times from 12 cm: from the first picture, from two, and so on.
+//!
+//! Each posterior is the shipped one's, learned from single pictures: what it does not know of grains is the same in every picture of them, and a
+//! product takes it for chance. Intervals get too narrow, which is why the crate has no such function.
+//!
+//! ```text
+//! cargo run --release -p granular-infer --example several -- 100 8     grains, pours of each
+//! ```
+#![allow(clippy::print_stdout, reason = "prints what it measures")]
+
+use std::error::Error;
+
+use bayes_sim::posterior::Posterior;
+use granular_infer::posterior::{GrainPosterior, Inferred};
+use granular_infer::scene::{Grain, Scene, prior};
+use granular_infer::summary::COUNT;
+use granular_infer::view::View;
+use rand::{RngExt as _, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+const HEIGHT_M: f64 = 0.12;
+/// Draws from which intervals are read.
+const DRAWS: usize = 2000;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<usize> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let [grains, pours] = arguments[..] else { return Err("expected GRAINS POURS".into()) };
+    let (posterior, prior) = (GrainPosterior::shipped()?, prior()?);
+    let mut rng = ChaCha8Rng::seed_from_u64(2026);
+    let drawn: Vec<(Vec<f64>, u64)> = (0..grains).map(|_| (prior.sample(&mut rng), rng.random())).collect();
+    let seen: Vec<(Vec<f64>, Vec<[f64; COUNT]>)> = drawn
+        .into_par_iter()
+        .map(|(theta, seed)| (pictures(&theta, pours, seed), theta))
+        .map(|(p, t)| (t, p))
+        .collect();
+    let whole: Vec<&(Vec<f64>, Vec<[f64; COUNT]>)> = seen.iter().filter(|(_, p)| p.len() == pours).collect();
+    println!("{} grains, {} of which left the picture once", grains, grains - whole.len());
+    let counts = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n <= pours);
+    for count in counts {
+        let all: Vec<[(f64, bool); 3]> = whole
+            .par_iter()
+            .map(|(theta, pictures)| Ok(errors(&product(&posterior, &pictures[..count])?, theta)))
+            .collect::<Result<_, bayes_sim::error::Error>>()?;
+        let n = all.len() as f64;
+        let of = |j: usize, name: &str| {
+            let mean = all.iter().map(|e| e[j].0).sum::<f64>() / n;
+            let spread = (all.iter().map(|e| (e[j].0 - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            let within = all.iter().filter(|e| e[j].1).count();
+            format!("{name} {mean:+.3} ± {spread:.3} (± {:.3}), {within} within", 1.96 * spread / n.sqrt())
+        };
+        println!("{count} pictures: {}   {}   {}", of(0, "mu_s"), of(1, "ln mu_r"), of(2, "e"));
+    }
+    Ok(())
+}
+
+/// The product of the posteriors of some pictures.
+fn product(
+    posterior: &GrainPosterior,
+    pictures: &[[f64; COUNT]],
+) -> Result<Inferred, bayes_sim::error::Error> {
+    let each = pictures.iter().map(|p| posterior.infer(p)).collect::<Result<Vec<_>, _>>()?;
+    let posteriors: Vec<Posterior> = each.iter().map(|i| i.posterior.clone()).collect();
+    let resemblance = posterior.infer(&pictures[0])?.resemblance;
+    Ok(Inferred { posterior: Posterior::product(&posteriors)?, resemblance })
+}
+
+/// The statistics of the pours of one kind of grains that stay in the picture.
+fn pictures(theta: &[f64], pours: usize, seed: u64) -> Vec<[f64; COUNT]> {
+    let (scene, view) = (Scene::default(), View::default());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let of_pour = |_| {
+        let heap = scene.grains(&Grain::from_theta(theta)?, HEIGHT_M, rng.random()).ok()?;
+        view.features(&heap, &scene.rig, &mut rng).ok()
+    };
+    (0..pours).filter_map(of_pour).collect()
+}
+
+/// Errors of `mu_s`, `ln mu_r` and e, and whether their 95 % intervals hold the truth.
+fn errors(inferred: &Inferred, theta: &[f64]) -> [(f64, bool); 3] {
+    let prior = inferred.posterior.prior();
+    let (truth, found) = (prior.coordinates(theta), prior.coordinates(&inferred.estimate().theta()));
+    let draws = inferred.posterior.sample(DRAWS, &mut ChaCha8Rng::seed_from_u64(7)).theta;
+    std::array::from_fn(|j| {
+        let mut column: Vec<f64> = draws.rows().map(|row| prior.coordinates(row)[j]).collect();
+        column.sort_by(f64::total_cmp);
+        let [low, high] = [column[DRAWS / 40], column[DRAWS - 1 - DRAWS / 40]];
+        (found[j] - truth[j], (low..=high).contains(&truth[j]))
+    })
+}
