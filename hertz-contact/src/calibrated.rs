@@ -31,6 +31,16 @@ impl Calibrated {
         Self { what, low, high, slack: slack * (high - low) }
     }
 
+    /// Least calibrated value.
+    pub fn low(&self) -> f64 {
+        self.low
+    }
+
+    /// Greatest calibrated value.
+    pub fn high(&self) -> f64 {
+        self.high
+    }
+
     /// Whether a value may be asked for; a number that is none may not.
     ///
     /// # Errors
@@ -56,6 +66,7 @@ mod tests {
     #[test]
     fn ends_slack_and_numbers_that_are_none() {
         let range = Calibrated::over("the pressure", [3.0, 1.0, 2.0], 0.05);
+        assert_eq!((range.low(), range.high()), (1.0, 3.0));
         assert!(range.check(1.0).is_ok() && range.check(3.09).is_ok() && range.check(0.91).is_ok());
         let beyond = Beyond { what: "the pressure", got: 3.2, low: 1.0, high: 3.0 };
         assert_eq!(range.check(3.2), Err(beyond));

@@ -13,3 +13,4 @@ pub mod modulus;
 mod regression;
 pub mod shear;
 pub mod slip;
+pub mod stiffness;

@@ -5,12 +5,16 @@
 
 mod air;
 mod bench;
+mod contact;
 mod dome;
+mod palpation;
 mod render;
 mod touch;
 
 pub use air::Air;
 pub use bench::{Bench, FakeError};
+pub use contact::{Contact, Object, Rings, SoftTip};
 pub use dome::Dome;
+pub use palpation::{Errors, Palpator};
 pub use render::Eye;
 pub use touch::Touch;
