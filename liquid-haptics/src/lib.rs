@@ -4,6 +4,7 @@ pub mod classify;
 pub mod container;
 #[cfg(feature = "fake")]
 pub mod fake;
+pub mod fusion;
 pub mod pour;
 mod root;
 pub mod signal;

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::cavity::Cavity;
 use super::film::Film;
 use super::joint::{Joint, LIMITS_RAD};
+use super::modes::{Modes, Surface, Swinging};
 use super::sensor::{Noise, Sensor, tared};
 use super::slosh::Slosh;
 
@@ -68,7 +69,8 @@ pub struct FakeWrist {
     table: Vec<[f64; 2]>,
     /// Where the liquid lies at the angle that was asked last.
     last: Option<(f64, [f64; 2])>,
-    slosh: Slosh,
+    surface: Option<Surface>,
+    slosh: Swinging,
     film: Option<Film>,
 }
 
@@ -94,7 +96,7 @@ impl FakeWrist {
         if !fine {
             return Err(ErrorKind::OutOfRange);
         }
-        let (slosh, table) = (slosh(&load), table(&load));
+        let (slosh, table) = (slosh(&load, None), table(&load));
         Ok(Self {
             load,
             sensor,
@@ -105,9 +107,18 @@ impl FakeWrist {
             offset: Wrench::default(),
             table,
             last: None,
+            surface: None,
             slosh,
             film: None,
         })
+    }
+
+    /// The same wrist where a thin liquid sloshes in three modes with a real surface, from rest.
+    #[must_use]
+    pub fn with_surface(mut self, surface: Surface) -> Self {
+        self.surface = Some(surface);
+        self.slosh = slosh(&self.load, self.surface.as_ref());
+        self
     }
 
     /// The container slides in the grip: from now on it is held `by_m` further from its bottom.
@@ -124,7 +135,7 @@ impl FakeWrist {
         let load = &mut self.load;
         load.liquid_mass_kg *= share;
         load.volume_m3 *= share;
-        (self.table, self.slosh) = (table(load), slosh(load));
+        (self.table, self.slosh) = (table(load), slosh(load, self.surface.as_ref()));
         (self.last, self.film) = (None, None);
     }
 
@@ -191,12 +202,10 @@ impl FakeWrist {
         };
         let (sin, cos) = tilt.sin_cos();
         let shell = (load.shell_center_m - load.grasp_height_m) * sin;
-        let [swing, push] = if self.thick() { [0.0; 2] } else { self.slosh.felt() };
+        let [swung, push] = if self.thick() { [0.0; 2] } else { self.slosh.felt() };
         // The swinging mass pushes at the height of the liquid's centre.
         let height = (place[1] - load.grasp_height_m) * cos - place[0] * sin;
-        let moment = load.container_mass_kg * shell
-            + load.liquid_mass_kg * self.across(place, tilt)
-            + if self.thick() { 0.0 } else { self.slosh.mass_kg * swing };
+        let moment = load.container_mass_kg * shell + load.liquid_mass_kg * self.across(place, tilt) + swung;
         let weight =
             (load.container_mass_kg + load.gripper_mass_kg + load.liquid_mass_kg) * load.gravity_m_s2;
         let gain = 1.0 + load.force_gain;
@@ -216,9 +225,16 @@ fn table(load: &Load) -> Vec<[f64; 2]> {
     (0..=TABLE).map(|k| lies(load, PI * k as f64 / TABLE as f64)).collect()
 }
 
-fn slosh(load: &Load) -> Slosh {
+fn slosh(load: &Load, surface: Option<&Surface>) -> Swinging {
     let level = load.volume_m3 / (PI * load.radius_m * load.radius_m);
-    Slosh::new(load.radius_m, level, load.liquid_mass_kg, load.viscosity_m2_s, load.gravity_m_s2)
+    let (mass, viscosity, gravity) = (load.liquid_mass_kg, load.viscosity_m2_s, load.gravity_m_s2);
+    match surface {
+        None => Swinging::One(Slosh::new(load.radius_m, level, mass, viscosity, gravity)),
+        Some(surface) => {
+            let density = if load.volume_m3 > 0.0 { mass / load.volume_m3 } else { 0.0 };
+            Swinging::Three(Modes::new([load.radius_m, level], [mass, density], viscosity, gravity, surface))
+        }
+    }
 }
 
 impl ErrorType for FakeWrist {

@@ -105,6 +105,13 @@ impl Drain {
         }
     }
 
+    /// Plans of one cylinder times factors, summed: a plan between volumes.
+    pub(crate) fn mixed(plans: [&Self; 4], factors: [f64; 4]) -> Self {
+        let sum = |of: &dyn Fn(&Self) -> f64| plans.iter().zip(factors).map(|(p, f)| f * of(p)).sum();
+        let moments = (0..plans[0].moments.len()).map(|k| sum(&|p: &Self| p.moments[k])).collect();
+        Self { moments, first: sum(&|p: &Self| p.first), ..*plans[0] }
+    }
+
     /// Moment of the film's volume about the cylinder's axis (m^4) a time (s) after gravity began to pull along the wall.
     pub fn moment_m4(&self, kinematic_viscosity_m2_s: f64, t_s: f64) -> f64 {
         let unit = self.radius_m.powi(4);
