@@ -11,6 +11,7 @@ pub mod hear;
 pub mod impact;
 pub mod listen;
 pub mod localise;
+pub mod material;
 pub mod missed;
 pub mod onset;
 pub mod playback;

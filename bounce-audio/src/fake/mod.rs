@@ -8,6 +8,7 @@ mod arm;
 mod ball;
 mod court;
 mod error;
+pub mod knock;
 mod panel;
 mod room;
 

@@ -147,6 +147,13 @@ impl Room {
         }
     }
 
+    /// Calls `add` with the delay (s) and the gain of every way from a place (m) to a microphone by its number, down to -60 dB.
+    pub(super) fn ways(&self, place_m: [f64; 3], microphone: usize, add: impl FnMut(f64, f64)) {
+        if let Some(m) = self.microphones_m.get(microphone) {
+            self.images(place_m, *m, add);
+        }
+    }
+
     /// Calls `add` with the delay (s) and the gain of every way from a place to a microphone, down to -60 dB.
     fn images(&self, place_m: [f64; 3], microphone_m: [f64; 3], mut add: impl FnMut(f64, f64)) {
         for panel in &self.panels {

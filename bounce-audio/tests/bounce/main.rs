@@ -9,6 +9,7 @@ mod hear;
 mod integrator;
 mod listen;
 mod localise;
+mod material;
 mod place;
 mod posterior;
 mod practice;
