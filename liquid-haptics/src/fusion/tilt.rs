@@ -15,7 +15,11 @@ const NARROW: f64 = 0.2;
 /// Rounds in which mass and covariance settle.
 const ROUNDS: usize = 3;
 /// How often the maximum is then looked for with the covariance that it has.
-const CORRECTIONS: usize = 2;
+const CORRECTIONS: usize = 3;
+/// Bends of the likelihood over a standard deviation (one of a normal shape) below this are none of a maximum; the longest step towards one, in
+/// standard deviations.
+const LEAST_BEND: f64 = 0.25;
+const LONGEST: f64 = 3.0;
 /// Widest normal shape over the logarithm of the density.
 const WIDEST: f64 = 30.0;
 
@@ -166,15 +170,22 @@ impl<'a> Poses<'a> {
             }
             best = found;
         }
-        let Some([peak, _, _, error]) = self.weigh(&levers, best) else { return Ok(None) };
-        let mut shape = Shape { peak, mean: (best / volume_m3).ln(), sd: error / best };
+        let Some([_, _, _, error]) = self.weigh(&levers, best) else { return Ok(None) };
+        let mut shape = Shape { peak: 0.0, mean: (best / volume_m3).ln(), sd: error / best };
+        let at = |shape: &Shape, z: f64| {
+            self.weigh(&levers, mass(shape.mean + z * shape.sd)).map_or(f64::NAN, |w| w[0])
+        };
         // The covariance grows with the mass: where the misfit is large that shifts the maximum.
         for _ in 0..CORRECTIONS {
-            let at = |z: f64| self.weigh(&levers, mass(shape.mean + z * shape.sd)).map(|w| w[0]);
-            let (Some(a), Some(b), Some(c)) = (at(-1.0), at(0.0), at(1.0)) else { return Ok(None) };
-            shape = parabola([a, b, c], shape.mean, shape.sd);
+            let [before, here, after] = [-1.0, 0.0, 1.0].map(|z| at(&shape, z));
+            let bend = 2.0 * here - before - after;
+            // What bends upwards, or hardly down, is far from its maximum: a step with the bend as it was.
+            let bend = if bend > LEAST_BEND { bend } else { 1.0 };
+            shape.mean += shape.sd * (0.5 * (after - before) / bend).clamp(-LONGEST, LONGEST);
+            shape.sd /= bend.sqrt();
         }
-        Ok(Some(shape))
+        shape.peak = at(&shape, 0.0);
+        Ok(shape.peak.is_finite().then_some(shape))
     }
 
     /// The parabola through three densities: where the mass is known to be next to nothing, or not known.
