@@ -349,3 +349,10 @@ pub(crate) struct Selection {
     /// Which of `nuisance` a mechanism or term added to the baseline.
     pub(crate) added_nuisance: Vec<bool>,
 }
+
+impl Selection {
+    /// Slots among the shared parameters that a mechanism or term added to the baseline.
+    pub(crate) fn added(&self) -> impl Iterator<Item = usize> {
+        self.shared.iter().zip(&self.added_shared).filter(|(_, added)| **added).map(|(&slot, _)| slot)
+    }
+}

@@ -95,10 +95,9 @@ fn starts(
     }
     if guesses.is_empty() {
         let table = &problem.shared;
-        let added = || selection.shared.iter().zip(&selection.added_shared).filter(|(_, added)| **added);
         for side in [0.0, 0.3, -0.3] {
             let mut start = near.shared.clone();
-            for (&slot, _) in added() {
+            for slot in selection.added() {
                 start[slot] = (table.start[slot] + side * table.scale[slot])
                     .clamp(table.lower[slot], table.upper[slot]);
             }

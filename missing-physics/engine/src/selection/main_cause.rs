@@ -269,9 +269,7 @@ impl<'a> Judge<'a> {
         let (mut worth, ruled_out) = evidence(self.problem, &of.set, &[], &of.selection, &fit);
         worth += process.log_prior(self.problem);
         // At a bound a mechanism is the limit of another one, or of nothing.
-        let mut added =
-            of.selection.shared.iter().zip(&of.selection.added_shared).filter(|(_, added)| **added);
-        let bounded = added.any(|(slot, _)| plain.at_bound.contains(slot));
+        let bounded = of.selection.added().any(|slot| plain.at_bound.contains(&slot));
         let sound = worth.is_finite() && ruled_out.is_none() && !bounded;
         let fit = self.widened(&of.selection, plain, fit);
         let candidate =

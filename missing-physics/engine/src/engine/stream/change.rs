@@ -52,8 +52,7 @@ pub(super) fn directions(problem: &Problem<'_>, wide: &Selection, shared: &[f64]
         if with.added_nuisance.contains(&true) {
             continue;
         }
-        let added = with.shared.iter().zip(&with.added_shared).filter(|(_, added)| **added);
-        let columns: Vec<usize> = added.filter_map(|(slot, _)| place(*slot)).collect();
+        let columns: Vec<usize> = with.added().filter_map(place).collect();
         let what = What::Mechanism { id: mechanism.id.clone(), name: mechanism.name.clone() };
         all.push((what, Direction { columns }));
     }
