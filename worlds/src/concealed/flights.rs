@@ -29,6 +29,25 @@ pub(super) fn filmed(rng: &mut ChaCha8Rng) -> FlightWorld {
     }
 }
 
+/// Writes a listed effect but wind into the key, by its number among [`LISTED`].
+pub(super) fn describe(e: &Effects, listed: usize, key: &mut Key) {
+    match listed {
+        0 => key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]),
+        1 => key.add("linear-drag", &[("rate_per_s", e.linear_per_s)]),
+        2 => key.add("buoyancy", &[("acceleration_m_s2", e.lift_m_s2)]),
+        3 => {
+            let [x, y, z] = e.magnus_per_s;
+            key.add("magnus-lift", &[("lift_x_per_s", x), ("lift_y_per_s", y), ("lift_z_per_s", z)]);
+        }
+        4 => key.add("camera-scale", &[("scale", e.camera_scale)]),
+        5 => {
+            let [x, y] = e.camera_tilt_rad;
+            key.add("camera-tilt", &[("about_x_rad", x), ("about_y_rad", y)]);
+        }
+        _ => key.add("clock-rate", &[("rate", e.clock_rate)]),
+    }
+}
+
 /// Filmed throws, with what their effects look like before their sizes are known.
 pub(super) struct Flights {
     world: FlightWorld,
@@ -99,8 +118,7 @@ impl Rig for Flights {
     fn size_bounds(&self, listed: usize) -> [f64; 2] {
         match listed {
             0 => [5e-4, 0.1],
-            1 => [2e-3, 0.4],
-            2 | 3 => [2e-3, 0.4],
+            1..=3 => [2e-3, 0.4],
             4 | 5 => [5e-4, 0.06],
             _ => [2e-4, 0.03],
         }
@@ -119,22 +137,8 @@ impl Rig for Flights {
         }
     }
 
-    fn describe(&self, e: &Effects, listed: usize, key: &mut Key) {
-        match listed {
-            0 => key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]),
-            1 => key.add("linear-drag", &[("rate_per_s", e.linear_per_s)]),
-            2 => key.add("buoyancy", &[("acceleration_m_s2", e.lift_m_s2)]),
-            3 => {
-                let [x, y, z] = e.magnus_per_s;
-                key.add("magnus-lift", &[("lift_x_per_s", x), ("lift_y_per_s", y), ("lift_z_per_s", z)]);
-            }
-            4 => key.add("camera-scale", &[("scale", e.camera_scale)]),
-            5 => {
-                let [x, y] = e.camera_tilt_rad;
-                key.add("camera-tilt", &[("about_x_rad", x), ("about_y_rad", y)]);
-            }
-            _ => key.add("clock-rate", &[("rate", e.clock_rate)]),
-        }
+    fn describe(&self, effects: &Effects, listed: usize, key: &mut Key) {
+        describe(effects, listed, key);
     }
 
     fn unlisted_size_bounds(&self, which: usize) -> [f64; 2] {

@@ -4,7 +4,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::draw::{between, choose, log_between, sign, whole};
-use super::flights::{Flights, HEADER, filmed};
+use super::flights::{Flights, HEADER, describe, filmed};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
 use super::rig::RigMaker;
@@ -48,55 +48,59 @@ impl Maker for Trajectory {
 }
 
 fn listed(e: &mut Effects, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
-    match which {
+    let described = match which {
         0 => {
             e.quadratic_per_m = log_between(rng, 0.002, 0.1);
-            key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]);
+            0
         }
         1 => {
             e.linear_per_s = log_between(rng, 0.01, 0.4);
-            key.add("linear-drag", &[("rate_per_s", e.linear_per_s)]);
+            1
         }
         2 => {
             e.lift_m_s2 = sign(rng) * log_between(rng, 0.01, 0.4);
-            key.add("buoyancy", &[("acceleration_m_s2", e.lift_m_s2)]);
+            2
         }
         3 => {
             let size = log_between(rng, 0.01, 0.3);
             e.magnus_per_s = [0.6 * sign(rng) * size, 0.7 * sign(rng) * size, 0.4 * sign(rng) * size];
-            let [x, y, z] = e.magnus_per_s;
-            key.add("magnus-lift", &[("lift_x_per_s", x), ("lift_y_per_s", y), ("lift_z_per_s", z)]);
+            3
         }
         4 => {
-            // Moving air acts through drag, which then is at work as well: it comes with the wind, unless a linear drag is there that
-            // would pass for the whole of it.
-            e.quadratic_per_m = e.quadratic_per_m.max(log_between(rng, 0.02, 0.1));
-            key.remove("quadratic-drag");
-            if key.mechanisms.iter().any(|m| m == "linear-drag") {
-                key.add("quadratic-drag", &[("k_per_m", e.quadratic_per_m)]);
-            } else {
-                key.beside = vec!["quadratic-drag".into()];
-            }
-            let size = log_between(rng, 0.3, 4.0);
-            let angle = between(rng, 0.0, std::f64::consts::TAU);
-            e.wind_m_s = [size * angle.cos(), size * angle.sin()];
-            key.add("wind", &[("wind_x_m_s", e.wind_m_s[0]), ("wind_y_m_s", e.wind_m_s[1])]);
+            wind(e, key, rng);
+            return;
         }
         5 => {
             e.camera_scale = sign(rng) * log_between(rng, 0.002, 0.06);
-            key.add("camera-scale", &[("scale", e.camera_scale)]);
+            4
         }
         6 => {
             let size = log_between(rng, 0.002, 0.06);
             e.camera_tilt_rad = [0.8 * sign(rng) * size, 0.6 * sign(rng) * size];
-            let [x, y] = e.camera_tilt_rad;
-            key.add("camera-tilt", &[("about_x_rad", x), ("about_y_rad", y)]);
+            5
         }
         _ => {
             e.clock_rate = sign(rng) * log_between(rng, 0.001, 0.03);
-            key.add("clock-rate", &[("rate", e.clock_rate)]);
+            6
         }
+    };
+    describe(e, described, key);
+}
+
+/// Moving air acts through drag, which then is at work as well: it comes with the wind, unless a linear drag is there that would pass for the whole
+/// of it.
+fn wind(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
+    e.quadratic_per_m = e.quadratic_per_m.max(log_between(rng, 0.02, 0.1));
+    key.remove("quadratic-drag");
+    if key.mechanisms.iter().any(|m| m == "linear-drag") {
+        describe(e, 0, key);
+    } else {
+        key.beside = vec!["quadratic-drag".into()];
     }
+    let size = log_between(rng, 0.3, 4.0);
+    let angle = between(rng, 0.0, std::f64::consts::TAU);
+    e.wind_m_s = [size * angle.cos(), size * angle.sin()];
+    key.add("wind", &[("wind_x_m_s", e.wind_m_s[0]), ("wind_y_m_s", e.wind_m_s[1])]);
 }
 
 fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
