@@ -6,21 +6,24 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
+#[path = "common/wrist.rs"]
+mod wrist;
+
 use std::f64::consts::PI;
 
 use hw_traits::ErrorKind;
 use hw_traits::clock::Clock;
 use hw_traits::force_torque::ForceTorque;
-use hw_traits::programme::{FeltPose, TiltProgramme, run};
+use hw_traits::programme::run;
 use hw_traits::replay::{self, Replay};
 use hw_traits::rotary::Rotary;
 use liquid_haptics::container::{Container, Cylinder};
-use liquid_haptics::fake::{AXIA80, FakeWrist, Load, Round};
+use liquid_haptics::fake::{AXIA80, FakeWrist, Load};
 use liquid_haptics::viscosity::{Bottle, Regime, Verdict, ViscosityFit};
-use liquid_haptics::volume::{
-    ErrorCorrelation, ForceGain, Liquid, MassFit, SettledPose, VolumeFit, fit_mass,
-};
-use liquid_haptics::wrench::{Departures, Grasp, PlanarWrench, world_from_body};
+use liquid_haptics::volume::{ErrorCorrelation, ForceGain, Liquid, MassFit, VolumeFit, fit_mass};
+use liquid_haptics::wrench::{Departures, Grasp, world_from_body};
+
+use self::wrist::{poses, programme};
 
 const GRASP: Grasp = Grasp {
     container_mass_kg: 0.08,
@@ -31,38 +34,7 @@ const GRASP: Grasp = Grasp {
 };
 
 fn load(mass: f64, density: f64, viscosity: f64) -> Load {
-    Load {
-        cavity: Box::new(Round::new(0.034, 0.170, 0.001, 600)),
-        radius_m: 0.034,
-        length_m: 0.170,
-        liquid_mass_kg: mass,
-        volume_m3: mass / density,
-        viscosity_m2_s: viscosity,
-        container_mass_kg: GRASP.container_mass_kg,
-        gripper_mass_kg: GRASP.gripper_mass_kg,
-        grasp_height_m: GRASP.grasp_height_m,
-        shell_center_m: GRASP.shell_center_m,
-        force_gain: 0.0,
-        gravity_m_s2: GRASP.gravity_m_s2,
-    }
-}
-
-fn programme(readings: usize) -> TiltProgramme {
-    TiltProgramme {
-        angles_rad: (0..19).map(|k| f64::from(10 * k).to_radians()).collect(),
-        rate_rad_s: 0.3,
-        settle_s: 20.0,
-        patience_s: 10.0,
-        readings,
-    }
-}
-
-fn poses(felt: &[FeltPose]) -> Vec<SettledPose> {
-    let pose = |p: &FeltPose| SettledPose {
-        tilt_rad: p.angle_rad,
-        wrench: PlanarWrench::from(&world_from_body(&p.wrench, p.angle_rad)),
-    };
-    felt.iter().map(pose).collect()
+    wrist::load(&GRASP, [mass, mass / density, viscosity], 600)
 }
 
 #[test]

@@ -5,19 +5,24 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
+#[path = "common/wrist.rs"]
+mod wrist;
+
 use std::f64::consts::PI;
 
 use hw_traits::clock::Clock;
 use hw_traits::force_torque::ForceTorque;
-use hw_traits::programme::{FeltPose, TiltProgramme, run};
+use hw_traits::programme::run;
 use hw_traits::rotary::Rotary;
 use liquid_haptics::container::{Container, Cylinder};
-use liquid_haptics::fake::{AXIA80, FakeWrist, Load, Round, Surface};
+use liquid_haptics::fake::{AXIA80, FakeWrist, Surface};
 use liquid_haptics::fusion::{
     ForceErrors, FusionError, FusionFit, Marginal, PoseErrors, Prior, Quantity, Swing, SwingErrors,
 };
 use liquid_haptics::volume::SettledPose;
-use liquid_haptics::wrench::{Grasp, PlanarWrench, world_from_body};
+use liquid_haptics::wrench::Grasp;
+
+use self::wrist::{poses, programme};
 
 const GRASP: Grasp = Grasp {
     container_mass_kg: 0.085,
@@ -78,34 +83,9 @@ fn turn(wrist: &mut FakeWrist, angle_rad: f64, rate_rad_s: f64) -> f64 {
 
 fn feel(fill: f64, density: f64, viscosity: f64, seed: u64) -> Felt {
     let volume = fill * bottle().capacity_m3();
-    let load = Load {
-        cavity: Box::new(Round::new(0.034, 0.170, 0.001, 500)),
-        radius_m: 0.034,
-        length_m: 0.170,
-        liquid_mass_kg: density * volume,
-        volume_m3: volume,
-        viscosity_m2_s: viscosity,
-        container_mass_kg: GRASP.container_mass_kg,
-        gripper_mass_kg: GRASP.gripper_mass_kg,
-        grasp_height_m: GRASP.grasp_height_m,
-        shell_center_m: GRASP.shell_center_m,
-        force_gain: 0.0,
-        gravity_m_s2: GRASP.gravity_m_s2,
-    };
+    let load = wrist::load(&GRASP, [density * volume, volume, viscosity], 500);
     let mut wrist = FakeWrist::new(load, AXIA80, seed).unwrap().with_surface(SURFACE);
-    let programme = TiltProgramme {
-        angles_rad: (0..19).map(|k| f64::from(10 * k).to_radians()).collect(),
-        rate_rad_s: 0.3,
-        settle_s: 20.0,
-        patience_s: 10.0,
-        readings: 4000,
-    };
-    let felt = run(&mut wrist, &programme).unwrap();
-    let pose = |p: &FeltPose| SettledPose {
-        tilt_rad: p.angle_rad,
-        wrench: PlanarWrench::from(&world_from_body(&p.wrench, p.angle_rad)),
-    };
-    let poses = felt.iter().map(pose).collect();
+    let poses = poses(&run(&mut wrist, &programme(4000)).unwrap());
     turn(&mut wrist, 0.5 * PI, 1.0);
     wrist.sleep_s(20.0).unwrap();
     let head_start_s = 2.0 / PI * turn(&mut wrist, 0.0, PI);
