@@ -4,8 +4,10 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::draw::{between, choose, log_between, sign, whole};
+use super::drops::Drops;
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
+use super::rig::RigMaker;
 use crate::physics::bounce::{BounceWorld, Effects, Recorded, Softer};
 
 /// Makes worlds of the domain `bounce` from times and places of impacts.
@@ -19,21 +21,17 @@ impl Maker for Bounce {
         "bounce"
     }
 
+    fn kind(&self, hidden: Hidden) -> Hidden {
+        hidden
+    }
+
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        let hidden = self.kind(hidden);
+        if matches!(hidden, Hidden::Leftover | Hidden::Imitated) {
+            return RigMaker::<Drops>::NEW.conceal(hidden, seed);
+        }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut key = Key::new(hidden);
-        let mut world = BounceWorld {
-            runs: whole(&mut rng, 15, 40),
-            impacts: whole(&mut rng, 5, 8),
-            height_m: between(&mut rng, 0.2, 0.6),
-            height_known: whole(&mut rng, 0, 1) == 1,
-            restitution: between(&mut rng, 0.65, 0.9),
-            kappa: log_between(&mut rng, 1e3, 3e4),
-            noise: [log_between(&mut rng, 1e-5, 1e-4), log_between(&mut rng, 2e-3, 1e-2)],
-            noise_known: whole(&mut rng, 0, 3) > 0,
-            ..BounceWorld::drops()
-        };
+        let mut world = dropped(&mut rng);
         for which in choose(&mut rng, LISTED, hidden.listed()) {
             listed(&mut world, which, &mut key, &mut rng);
         }
@@ -59,6 +57,21 @@ impl Maker for Bounce {
             key.events = unheard.iter().map(|[run, impact]| (run.to_string(), *impact as f64)).collect();
         }
         Concealed::table(header, data, key)
+    }
+}
+
+/// Fifteen to forty drops of a ball, five to eight impacts each.
+pub(super) fn dropped(rng: &mut ChaCha8Rng) -> BounceWorld {
+    BounceWorld {
+        runs: whole(rng, 15, 40),
+        impacts: whole(rng, 5, 8),
+        height_m: between(rng, 0.2, 0.6),
+        height_known: whole(rng, 0, 1) == 1,
+        restitution: between(rng, 0.65, 0.9),
+        kappa: log_between(rng, 1e3, 3e4),
+        noise: [log_between(rng, 1e-5, 1e-4), log_between(rng, 2e-3, 1e-2)],
+        noise_known: whole(rng, 0, 3) > 0,
+        ..BounceWorld::drops()
     }
 }
 
@@ -102,38 +115,37 @@ pub(crate) fn local(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &
     key.place = place;
 }
 
+/// Puts a listed effect to work, by its number among [`LISTED`], and writes it into the key.
 pub(crate) fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {
     let e: &mut Effects = &mut world.effects;
     match which {
-        0 => {
-            e.drag_per_m = log_between(rng, 0.01, 0.4);
-            key.add("air-drag", &[("k_per_m", e.drag_per_m)]);
-        }
-        1 => {
-            e.slope_s_m = log_between(rng, 0.003, 0.05);
-            let at_one = world.restitution;
-            key.add("velocity-dependent-restitution", &[("slope_s_m", e.slope_s_m), ("e_at_1_m_s", at_one)]);
-        }
+        0 => e.drag_per_m = log_between(rng, 0.01, 0.4),
+        1 => e.slope_s_m = log_between(rng, 0.003, 0.05),
         2 => {
             let size = log_between(rng, 0.002, 0.06);
             e.table_slope = [0.8 * sign(rng) * size, 0.6 * sign(rng) * size];
-            key.add("table-tilt", &[("slope_x", e.table_slope[0]), ("slope_y", e.table_slope[1])]);
         }
-        3 => {
-            e.friction = log_between(rng, 0.03, 0.4);
-            key.add("tangential-friction", &[("fraction", e.friction)]);
+        3 => e.friction = log_between(rng, 0.03, 0.4),
+        4 => e.clock_rate = sign(rng) * log_between(rng, 0.003, 0.04),
+        5 => e.position_scale = sign(rng) * log_between(rng, 0.01, 0.1),
+        _ => e.unheard = between(rng, 0.1, 0.4),
+    }
+    describe(world, which, key);
+}
+
+/// Writes a listed effect into the key, by its number among [`LISTED`].
+pub(super) fn describe(world: &BounceWorld, which: usize, key: &mut Key) {
+    let e = &world.effects;
+    match which {
+        0 => key.add("air-drag", &[("k_per_m", e.drag_per_m)]),
+        1 => {
+            let at_one = ("e_at_1_m_s", world.restitution);
+            key.add("velocity-dependent-restitution", &[("slope_s_m", e.slope_s_m), at_one]);
         }
-        4 => {
-            e.clock_rate = sign(rng) * log_between(rng, 0.003, 0.04);
-            key.add("clock-rate", &[("rate", e.clock_rate)]);
-        }
-        5 => {
-            e.position_scale = sign(rng) * log_between(rng, 0.01, 0.1);
-            key.add("position-scale", &[("scale", e.position_scale)]);
-        }
-        _ => {
-            e.unheard = between(rng, 0.1, 0.4);
-            key.add("missed-impact", &[("fraction", e.unheard)]);
-        }
+        2 => key.add("table-tilt", &[("slope_x", e.table_slope[0]), ("slope_y", e.table_slope[1])]),
+        3 => key.add("tangential-friction", &[("fraction", e.friction)]),
+        4 => key.add("clock-rate", &[("rate", e.clock_rate)]),
+        5 => key.add("position-scale", &[("scale", e.position_scale)]),
+        _ => key.add("missed-impact", &[("fraction", e.unheard)]),
     }
 }

@@ -5,6 +5,7 @@ mod bounce_audio;
 mod custom;
 mod dough_roll;
 mod draw;
+mod drops;
 mod flights;
 mod indentation;
 mod key;

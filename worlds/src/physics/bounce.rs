@@ -33,6 +33,10 @@ pub struct Effects {
     pub unheard: f64,
     /// Unlisted: fall of the restitution where x is above [`BounceWorld::soft_from_m`].
     pub softer_side: f64,
+    /// Unlisted: change of the restitution from the first run to the last.
+    pub warming: f64,
+    /// Unlisted: fall of the restitution with the square of the speed beyond 1 m/s, in s^2/m^2.
+    pub curvature_s2_m2: f64,
     /// Unlisted: fall of the restitution at some impacts only.
     pub softer: Softer,
 }
@@ -112,6 +116,15 @@ pub(crate) fn shows_softer(heard: &[Impact], height_known: bool) -> bool {
     heard.get(inner).is_some_and(|inner| inner.iter().any(|impact| impact.softer))
 }
 
+/// A drop as it is heard.
+#[derive(Debug, Clone)]
+pub(crate) struct Drop {
+    /// The impact that goes unheard, counted from 0, if one does.
+    unheard: Option<usize>,
+    /// All impacts.
+    pub(crate) impacts: Vec<Impact>,
+}
+
 /// What is recorded of drops.
 #[derive(Debug, Clone)]
 pub(crate) struct Recorded {
@@ -154,7 +167,22 @@ impl BounceWorld {
         if run < world.effects.softer.from_run {
             world.effects.softer = Softer::default();
         }
+        let part = run as f64 / (world.runs.max(2) - 1) as f64;
+        world.restitution += world.effects.warming * (part - 0.5);
         world
+    }
+
+    /// All drops.
+    pub(crate) fn heard(&self, seed: u64) -> Vec<Drop> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut of_run = |run: usize| {
+            let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
+            let unheard = self.unheard(&mut rng);
+            let count = self.impacts + usize::from(unheard.is_some());
+            let height_m = self.height_m * spread;
+            Drop { unheard, impacts: self.in_run(run).drop([0.0; 2], height_m, 0.0..1.0, count, &mut rng) }
+        };
+        (0..self.runs).map(&mut of_run).collect()
     }
 
     /// The recording, with what is known of its making.
@@ -171,16 +199,10 @@ impl BounceWorld {
         if self.height_known {
             let _ = write!(header, "\n[rig]\ndrop_height_m = {}\n", self.height_m);
         }
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut data =
             String::from(if self.placed { "run,bounce,t_s,x_m,y_m\n" } else { "run,bounce,t_s\n" });
-        for run in 1..=self.runs {
-            let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
-            let unheard = self.unheard(&mut rng);
+        for (run, Drop { unheard, impacts: heard }) in (1..).zip(self.heard(seed)) {
             all_unheard.extend(unheard.map(|impact| [run, impact]));
-            let impacts = self.impacts + usize::from(unheard.is_some());
-            let heard =
-                self.in_run(run - 1).drop([0.0; 2], self.height_m * spread, 0.0..1.0, impacts, &mut rng);
             softer.extend(shows_softer(&heard, self.height_known).then_some(run));
             let kept = heard.iter().enumerate().filter(|(i, _)| Some(*i) != unheard);
             for (number, (_, Impact { heard: [t, x, y], .. })) in kept.enumerate() {
@@ -264,7 +286,8 @@ impl BounceWorld {
     fn rebound(&self, place: &Vec3, v: &Vec3, rng: &mut ChaCha8Rng) -> Vec3 {
         let e = &self.effects;
         let speed = norm(v);
-        let mut restitution = self.restitution - e.slope_s_m * (speed - 1.0);
+        let mut restitution =
+            self.restitution - e.slope_s_m * (speed - 1.0) - e.curvature_s2_m2 * (speed - 1.0).powi(2);
         if place[0] > self.soft_from_m {
             restitution -= e.softer_side;
         }

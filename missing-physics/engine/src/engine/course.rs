@@ -80,7 +80,10 @@ impl Course<'_> {
         }
         let (mut ranking, unfitted) = self.compare(&problem.spec().asked())?;
         let mut best = self.best(&mut ranking)?;
-        let white = rough_sigmas(problem, rule, &baseline.fit);
+        // Runs too short to show their noise have that of the likeliest fit: that of the baseline would be its misfit.
+        let sound = ranking.all().iter().filter(|c| c.ruled_out.is_none());
+        let likeliest = sound.max_by(|a, b| a.evidence.total_cmp(&b.evidence)).unwrap_or(baseline);
+        let white = rough_sigmas(problem, rule, &likeliest.fit);
         if self.explains(&ranking, best.as_ref()).is_none()
             && let Some((other, clear)) = self.unasked(&white)?
         {
