@@ -10,9 +10,10 @@ use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
 use crate::physics::bounce::{BounceWorld, Effects};
 
-/// Listed effects that may have something beside them: all but impacts that go unheard, which have no size.
-const LISTED: usize = 6;
-/// The number of a clock that is wrong; that of the places' scale follows.
+/// Listed effects that may have something beside them: all but the scale of the places, which the speed of each release imitates, and impacts that
+/// go unheard, which have no size.
+const LISTED: usize = 5;
+/// The number of a clock that is wrong.
 const CLOCK: usize = 4;
 /// Effects that are not on the list.
 const UNLISTED: usize = 3;
@@ -94,8 +95,8 @@ impl Rig for Drops {
     }
 
     fn candidates(&self) -> Vec<usize> {
-        // A clock or a scale that is wrong is another height of each drop, unless the height is known.
-        (0..LISTED).filter(|listed| *listed < CLOCK || self.world.height_known).collect()
+        // A clock that is wrong is another height of each drop, unless the height is known.
+        (0..LISTED).filter(|listed| *listed != CLOCK || self.world.height_known).collect()
     }
 
     fn size_bounds(&self, listed: usize) -> [f64; 2] {
@@ -104,8 +105,7 @@ impl Rig for Drops {
             1 => [1e-3, 0.08],
             2 => [5e-4, 0.1],
             3 => [0.01, 0.5],
-            CLOCK => [1e-3, 0.06],
-            _ => [3e-3, 0.2],
+            _ => [1e-3, 0.06],
         }
     }
 
@@ -116,8 +116,7 @@ impl Rig for Drops {
             1 => e.slope_s_m = size,
             2 => e.table_slope = [0.8 * a, 0.6 * b],
             3 => e.friction = size,
-            CLOCK => e.clock_rate = a,
-            _ => e.position_scale = a,
+            _ => e.clock_rate = a,
         }
     }
 
