@@ -4,12 +4,13 @@ use std::sync::OnceLock;
 
 use rand::{Rng, RngExt};
 
+use crate::component::Component;
 use crate::error::Error;
 use crate::mixture::{Mixture, cumulative, draw, pick};
 use crate::normal::ln_sum_exp;
 use crate::points::{Points, check_length};
 use crate::prior::Prior;
-use crate::truncation::{BoxMass, Boxed};
+use crate::truncation::{BoxMass, Boxed, CLOSE};
 
 /// A density q(theta | x) learned from simulations; parameters in their own units, zero outside the prior.
 pub trait ConditionalDensity: Sync {
@@ -95,9 +96,13 @@ impl Posterior {
     pub fn mass(&self) -> BoxMass {
         *self.mass.get_or_init(|| {
             let bounds = self.prior.bounds();
+            let boxed = |c: &Component| (c.ln_weight.exp(), Boxed::new(c, &bounds));
+            let mut parts: Vec<(f64, Boxed)> = self.mixture.components.iter().map(boxed).collect();
+            // Those that may have most inside come first: the others need no digits that do not count.
+            parts.sort_by(|a, b| (b.0 * b.1.most()).total_cmp(&(a.0 * a.1.most())));
             let mut out = BoxMass { value: 0.0, error: 0.0 };
-            for component in &self.mixture.components {
-                let (weight, mass) = (component.ln_weight.exp(), Boxed::new(component, &bounds).mass());
+            for (weight, part) in &parts {
+                let mass = part.mass(0.1 * CLOSE * out.value / weight.max(f64::MIN_POSITIVE));
                 out.value += weight * mass.value;
                 out.error += weight * mass.error;
             }

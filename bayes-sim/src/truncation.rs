@@ -1,7 +1,8 @@
 //! How much of a Gaussian lies in a box, and draws from what does.
 //!
-//! One dimension is exact; two by quadrature to about 1e-12; more by separation of variables on a shifted lattice (Genz 1992,
-//! doi:10.1080/10618600.1992.10477010; Genz and Bretz 2009), with a stated error.
+//! One dimension is exact; two by quadrature to about 1e-12; more by separation of variables (Genz 1992,
+//! doi:10.1080/10618600.1992.10477010): three by Gauss and Legendre's rule where that has converged, else, and more than three, on a
+//! shifted lattice (Genz and Bretz 2009), with a stated error.
 
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt};
@@ -18,6 +19,9 @@ pub struct BoxMass {
     pub error: f64,
 }
 
+/// Relative error at which an integral is taken to have converged.
+pub(crate) const CLOSE: f64 = 1e-4;
+
 /// A Gaussian in a box, its variables ordered so that the tightest comes first.
 #[derive(Debug, Clone)]
 pub(crate) struct Boxed {
@@ -29,6 +33,8 @@ pub(crate) struct Boxed {
     bounds: Vec<[f64; 2]>,
     /// Share of each dimension alone that is outside, added up.
     tails: f64,
+    /// Share of the dimension of which least is inside.
+    most: f64,
 }
 
 impl Boxed {
@@ -44,15 +50,24 @@ impl Boxed {
             (0..component.dim()).filter(|&i| bounds[i].iter().any(|b| b.is_finite())).collect();
         order.sort_by(|&i, &j| alone(i).0.total_cmp(&alone(j).0));
         let tails = order.iter().map(|&i| alone(i).1).sum();
+        let most = order.first().map_or(1.0, |&i| alone(i).0);
         let part = covariance.select_rows(&order).select_columns(&order);
         let n = order.len();
         let root = part.cholesky().map_or_else(|| DMatrix::zeros(n, n), |c| c.unpack());
         let bounds = order.iter().map(|&i| away(i)).collect();
-        Self { order, root, bounds, tails }
+        Self { order, root, bounds, tails, most }
     }
 
-    /// Mass within the box.
-    pub(crate) fn mass(&self) -> BoxMass {
+    /// No more than this lies within the box: the least mass that one dimension alone has there.
+    pub(crate) fn most(&self) -> f64 {
+        self.most
+    }
+
+    /// Mass within the box, to [`CLOSE`] of it or to an absolute error, whichever is larger.
+    pub(crate) fn mass(&self, absolute: f64) -> BoxMass {
+        if self.most < absolute {
+            return BoxMass { value: 0.5 * self.most, error: 0.5 * self.most };
+        }
         if self.tails < 1e-12 {
             return BoxMass { value: 1.0 - 0.5 * self.tails, error: 0.5 * self.tails };
         }
@@ -63,7 +78,8 @@ impl Boxed {
                 BoxMass { value: mass(low, high), error: 1e-15 }
             }
             2 => BoxMass { value: self.two(), error: 1e-12 },
-            n => self.lattice(n),
+            3 => self.three(absolute).unwrap_or_else(|| self.lattice(3, absolute)),
+            n => self.lattice(n, absolute),
         }
     }
 
@@ -98,7 +114,43 @@ impl Boxed {
             .clamp(0.0, 1.0)
     }
 
-    fn lattice(&self, n: usize) -> BoxMass {
+    /// The two variables that are left after the separation, integrated by Gauss and Legendre's rule on more and more pieces; none where it does
+    /// not converge.
+    fn three(&self, absolute: f64) -> Option<BoxMass> {
+        let mut coarse = self.by_pieces(1);
+        for pieces in [2, 4, 8] {
+            let value = self.by_pieces(pieces);
+            let error = (value - coarse).abs();
+            if error < (CLOSE * value).max(absolute) {
+                return Some(BoxMass { value, error });
+            }
+            coarse = value;
+        }
+        None
+    }
+
+    /// The mass of three variables, with the unit interval of each uniform number cut into so many pieces.
+    fn by_pieces(&self, pieces: usize) -> f64 {
+        let width = 1.0 / pieces as f64;
+        let nodes: Vec<(f64, f64)> = (0..pieces)
+            .flat_map(|piece| {
+                let middle = (piece as f64 + 0.5) * width;
+                GAUSS.iter().flat_map(move |(x, weight)| {
+                    [-x, *x].map(|x| (middle + 0.5 * width * x, 0.5 * width * weight))
+                })
+            })
+            .collect();
+        let mut y = [0.0; 3];
+        let mut sum = 0.0;
+        for (first, outer) in &nodes {
+            for (second, inner) in &nodes {
+                sum += outer * inner * self.separate(&mut y, |j| if j == 0 { *first } else { *second });
+            }
+        }
+        sum
+    }
+
+    fn lattice(&self, n: usize, absolute: f64) -> BoxMass {
         const SHIFTS: usize = 12;
         const MOST: usize = 1 << 13;
         let generators = richtmyer(n + 1);
@@ -121,21 +173,28 @@ impl Boxed {
             let value = sums.iter().sum::<f64>() / SHIFTS as f64;
             let variance = sums.iter().map(|s| (s - value).powi(2)).sum::<f64>() / (SHIFTS - 1) as f64;
             let error = 3.0 * (variance / SHIFTS as f64).sqrt();
-            if error < 1e-4 * value || points >= MOST {
+            if error < (CLOSE * value).max(absolute) || points >= MOST {
                 return BoxMass { value, error };
             }
             points *= 4;
         }
     }
 
-    /// One path through the conditional intervals: writes standard normals, returns the product of the intervals' masses.
+    /// Bounds of a standard normal, given those before it.
+    fn interval(&self, i: usize, y: &[f64]) -> [f64; 2] {
+        let mean: f64 = (0..i).map(|j| self.root[(i, j)] * y[j]).sum();
+        self.bounds[i].map(|b| (b - mean) / self.root[(i, i)])
+    }
+
+    /// One path through the conditional intervals: writes all standard normals but the last, returns the product of the intervals' masses.
     fn separate(&self, y: &mut [f64], mut uniform: impl FnMut(usize) -> f64) -> f64 {
         let mut weight = 1.0;
         for i in 0..y.len() {
-            let mean: f64 = (0..i).map(|j| self.root[(i, j)] * y[j]).sum();
-            let [a, b] = self.bounds[i].map(|b| (b - mean) / self.root[(i, i)]);
+            let [a, b] = self.interval(i, y);
             weight *= mass(a, b);
-            y[i] = truncated_quantile(a, b, uniform(i));
+            if i + 1 < y.len() {
+                y[i] = truncated_quantile(a, b, uniform(i));
+            }
         }
         weight
     }
@@ -150,6 +209,10 @@ impl Boxed {
         let n = self.order.len();
         let mut y = vec![0.0; n];
         let weight = self.separate(&mut y, |_| rng.random::<f64>());
+        if let Some(last) = n.checked_sub(1) {
+            let [a, b] = self.interval(last, &y);
+            y[last] = truncated_quantile(a, b, rng.random());
+        }
         let known: Vec<f64> = (0..n).map(|i| (0..=i).map(|j| self.root[(i, j)] * y[j]).sum()).collect();
         let mut free = vec![0.0; component.dim()];
         for (&i, k) in self.order.iter().zip(&known) {

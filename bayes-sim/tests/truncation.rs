@@ -46,6 +46,18 @@ fn two_dimensions_are_exact_far_out() {
     );
 }
 
+/// Correlation rho everywhere: 1/8 + 3 asin(rho) / 4 pi of the mass is in the positive octant; where the rule of few points does not do, the
+/// lattice does.
+#[test]
+fn three_dimensions_are_within_their_stated_error() {
+    for rho in [-0.49, -0.3, 0.0, 0.3, 0.7, 0.9, 0.99, 0.9999_f64] {
+        let mass = gaussian(&[0.0; 3], equicorrelated(3, rho), &[[0.0, 60.0]; 3]).mass();
+        let exact = 0.125 + 3.0 * rho.asin() / (4.0 * PI);
+        assert!((mass.value - exact).abs() <= 1.5 * mass.error + 1e-12, "{rho}: {mass:?} {exact}");
+        assert!(mass.error < 2e-4 * exact, "{rho}: {mass:?}");
+    }
+}
+
 /// Correlation 1/2 everywhere: 1 / (d + 1) of the mass is in the positive orthant.
 #[test]
 fn more_dimensions_are_within_their_stated_error() {

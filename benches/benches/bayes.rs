@@ -1,5 +1,5 @@
 //! Training on 6,000 simulations of 4 features and 2 parameters, and a posterior from what was trained; the held-out loss is printed
-//! beside the time.
+//! beside the time. The mass of a mixture of three parameters within its prior.
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
 #![allow(clippy::print_stdout, reason = "quality stands beside time")]
 
@@ -8,7 +8,9 @@ use std::hint::black_box;
 
 use bayes_sim::mdn::{Mdn, MdnSettings, MixtureDensity};
 use bayes_sim::mdrff::{Mdrff, MdrffSettings};
+use bayes_sim::mixture::Mixture;
 use bayes_sim::points::Points;
+use bayes_sim::posterior::Posterior;
 use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
@@ -66,6 +68,14 @@ fn measured(c: &mut Criterion) -> Result<(), Box<dyn Error>> {
             b.iter(|| density.posterior(black_box(&[0.1, 0.2, 0.3, 0.4])));
         });
     }
+    // Three parameters, a component in the box and one far outside: what every density of a cut mixture divides by.
+    let means = Points::from_rows(3, [&[0.3, -0.2, 0.8], &[4.0, 2.0, 3.0]] as [&[f64]; 2])?;
+    let wide = vec![0.3, 0.1, 0.05, 0.1, 0.4, 0.1, 0.05, 0.1, 0.2];
+    let mixture = Mixture::new(&[0.9, 0.1], &means, &[wide.clone(), wide])?;
+    let prior = Prior::uniform(&[[-1.0, 1.0]; 3])?;
+    group.bench_function(BenchmarkId::new("mass", 3), |b| {
+        b.iter(|| Posterior::new(prior.clone(), black_box(&mixture).clone()).map(|p| p.mass()));
+    });
     group.finish();
     Ok(())
 }

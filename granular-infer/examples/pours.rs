@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p granular-infer --example pours -- grains 2000 SHARD OF FILE    prior over the grains, from 12 cm
+//! cargo run --release -p granular-infer --example pours -- series 1684 SHARD OF FILE    the same, from three heights each
 //! cargo run --release -p granular-infer --example pours -- heights 800 SHARD OF FILE     couscous from 1 to 13 cm
 //! ```
 //! Run again with the same arguments it goes on where it was stopped. SHARD counts from 0.
@@ -13,21 +14,22 @@ use std::sync::atomic::AtomicBool;
 
 use bayes_sim::campaign::{Campaign, Shard, Simulator};
 use bayes_sim::prior::Prior;
-use granular_infer::scene::{COUSCOUS, FromHeight, OfGrain, Scene, check_prior, prior};
+use granular_infer::scene::{COUSCOUS, FromHeights, OfGrain, SERIES_M, Scene, check_prior, prior};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [kind, count, index, of, file] = arguments.as_slice() else {
-        return Err("expected grains|heights COUNT SHARD OF FILE".into());
+        return Err("expected grains|series|heights COUNT SHARD OF FILE".into());
     };
     let scene = Scene::default();
     let (simulator, prior, seed): (Box<dyn Simulator>, Prior, u64) = match kind.as_str() {
-        "grains" => (Box::new(FromHeight { scene, height_m: 0.12 }), prior()?, 1),
+        "grains" => (Box::new(FromHeights { scene, heights_m: vec![0.12] }), prior()?, 1),
+        "series" => (Box::new(FromHeights { scene, heights_m: SERIES_M.to_vec() }), prior()?, 3),
         "heights" => (Box::new(OfGrain { scene, grain: COUSCOUS }), Prior::uniform(&[[0.01, 0.13]])?, 2),
-        other => return Err(format!("{other}: expected grains or heights").into()),
+        other => return Err(format!("{other}: expected grains, series or heights").into()),
     };
     let campaign = Campaign { prior, x_dim: simulator.x_dim(), count: count.parse()?, seed };
-    if kind == "grains" {
+    if kind != "heights" {
         check_prior(&campaign.prior)?;
     }
     let shard = Shard { index: index.parse()?, count: of.parse()? };

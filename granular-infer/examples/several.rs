@@ -1,7 +1,8 @@
 //! What a product of posteriors says of grains that are poured several times from 12 cm: from the first picture, from two, and so on.
 //!
 //! Each posterior is the shipped one's, learned from single pictures: what it does not know of grains is the same in every picture of them, and a
-//! product takes it for chance. Intervals get too narrow, which is why the crate has no such function.
+//! product takes it for chance. Intervals get too narrow, which is why the crate has no such function; it has a posterior of series of three heights,
+//! which is measured on the same grains.
 //!
 //! ```text
 //! cargo run --release -p granular-infer --example several -- 100 8     grains, pours of each
@@ -12,7 +13,7 @@ use std::error::Error;
 
 use bayes_sim::posterior::Posterior;
 use granular_infer::posterior::{GrainPosterior, Inferred};
-use granular_infer::scene::{Grain, Scene, prior};
+use granular_infer::scene::{Grain, SERIES_M, Scene, prior};
 use granular_infer::summary::COUNT;
 use granular_infer::view::View;
 use rand::{RngExt as _, SeedableRng};
@@ -29,29 +30,51 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (posterior, prior) = (GrainPosterior::shipped()?, prior()?);
     let mut rng = ChaCha8Rng::seed_from_u64(2026);
     let drawn: Vec<(Vec<f64>, u64)> = (0..grains).map(|_| (prior.sample(&mut rng), rng.random())).collect();
-    let seen: Vec<(Vec<f64>, Vec<[f64; COUNT]>)> = drawn
-        .into_par_iter()
-        .map(|(theta, seed)| (pictures(&theta, pours, seed), theta))
-        .map(|(p, t)| (t, p))
-        .collect();
-    let whole: Vec<&(Vec<f64>, Vec<[f64; COUNT]>)> = seen.iter().filter(|(_, p)| p.len() == pours).collect();
+    let whole = poured(&drawn, &vec![HEIGHT_M; pours]);
     println!("{} grains, {} of which left the picture once", grains, grains - whole.len());
     let counts = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n <= pours);
     for count in counts {
-        let all: Vec<[(f64, bool); 3]> = whole
-            .par_iter()
-            .map(|(theta, pictures)| Ok(errors(&product(&posterior, &pictures[..count])?, theta)))
-            .collect::<Result<_, bayes_sim::error::Error>>()?;
-        let n = all.len() as f64;
-        let of = |j: usize, name: &str| {
-            let mean = all.iter().map(|e| e[j].0).sum::<f64>() / n;
-            let spread = (all.iter().map(|e| (e[j].0 - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-            let within = all.iter().filter(|e| e[j].1).count();
-            format!("{name} {mean:+.3} ± {spread:.3} (± {:.3}), {within} within", 1.96 * spread / n.sqrt())
-        };
-        println!("{count} pictures: {}   {}   {}", of(0, "mu_s"), of(1, "ln mu_r"), of(2, "e"));
+        let infer = |pictures: &[[f64; COUNT]]| product(&posterior, &pictures[..count]);
+        println!("{count} pictures: {}", measured(&whole, infer)?);
     }
+    let (series, whole) = (GrainPosterior::shipped_series()?, poured(&drawn, &SERIES_M));
+    println!("{} of them left the picture of a series", grains - whole.len());
+    println!(
+        "one from each of {SERIES_M:?} m: {}",
+        measured(&whole, |pictures| series.infer_series(pictures))?
+    );
     Ok(())
+}
+
+/// Parameters of grains, and the statistics of each of their pours.
+type Poured = (Vec<f64>, Vec<[f64; COUNT]>);
+
+/// The grains all of whose pours stay in the picture.
+fn poured(drawn: &[(Vec<f64>, u64)], heights_m: &[f64]) -> Vec<Poured> {
+    let of = |(theta, seed): &(Vec<f64>, u64)| {
+        let pictures = pictures(theta, heights_m, *seed);
+        (pictures.len() == heights_m.len()).then(|| (theta.clone(), pictures))
+    };
+    drawn.par_iter().filter_map(of).collect()
+}
+
+/// Mean and spread of the errors over all grains, and how many 95 % intervals hold.
+fn measured(
+    poured: &[Poured],
+    infer: impl Fn(&[[f64; COUNT]]) -> Result<Inferred, bayes_sim::error::Error> + Sync,
+) -> Result<String, bayes_sim::error::Error> {
+    let all: Vec<[(f64, bool); 3]> = poured
+        .par_iter()
+        .map(|(theta, pictures)| Ok(errors(&infer(pictures)?, theta)))
+        .collect::<Result<_, bayes_sim::error::Error>>()?;
+    let n = all.len() as f64;
+    let of = |j: usize, name: &str| {
+        let mean = all.iter().map(|e| e[j].0).sum::<f64>() / n;
+        let spread = (all.iter().map(|e| (e[j].0 - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let within = all.iter().filter(|e| e[j].1).count();
+        format!("{name} {mean:+.3} ± {spread:.3} (± {:.3}), {within} within", 1.96 * spread / n.sqrt())
+    };
+    Ok([of(0, "mu_s"), of(1, "ln mu_r"), of(2, "e")].join("   "))
 }
 
 /// The product of the posteriors of some pictures.
@@ -66,14 +89,14 @@ fn product(
 }
 
 /// The statistics of the pours of one kind of grains that stay in the picture.
-fn pictures(theta: &[f64], pours: usize, seed: u64) -> Vec<[f64; COUNT]> {
+fn pictures(theta: &[f64], heights_m: &[f64], seed: u64) -> Vec<[f64; COUNT]> {
     let (scene, view) = (Scene::default(), View::default());
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let of_pour = |_| {
-        let heap = scene.grains(&Grain::from_theta(theta)?, HEIGHT_M, rng.random()).ok()?;
+    let of_pour = |height_m: &f64| {
+        let heap = scene.grains(&Grain::from_theta(theta)?, *height_m, rng.random()).ok()?;
         view.features(&heap, &scene.rig, &mut rng).ok()
     };
-    (0..pours).filter_map(of_pour).collect()
+    heights_m.iter().filter_map(of_pour).collect()
 }
 
 /// Errors of `mu_s`, `ln mu_r` and e, and whether their 95 % intervals hold the truth.

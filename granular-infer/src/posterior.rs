@@ -1,4 +1,4 @@
-//! From the 16 statistics of one picture to a posterior over `mu_s`, `ln mu_r` and e (section 3.4).
+//! From the 16 statistics of a picture, or of several, to a posterior over `mu_s`, `ln mu_r` and e (section 3.4).
 
 use bayes_sim::error::Error;
 use bayes_sim::mdn::MixtureDensity;
@@ -20,6 +20,8 @@ use crate::summary::COUNT;
 
 /// The shipped posterior, as `granular-infer/examples/study.rs` writes it.
 const SHIPPED: &[u8] = include_bytes!("../posterior.json.gz");
+/// The shipped posterior of a series, as `granular-infer/examples/series.rs` writes it.
+const SHIPPED_SERIES: &[u8] = include_bytes!("../series.json.gz");
 /// Draws of which an estimate is the mean.
 const DRAWS: usize = 4000;
 /// Factors on variances that are tried.
@@ -108,6 +110,15 @@ impl GrainPosterior {
         Self::from_bytes(SHIPPED)
     }
 
+    /// The posterior of a series that is shipped: the same grains poured once from each of [`crate::scene::SERIES_M`], else as
+    /// [`GrainPosterior::shipped`]. [`GrainPosterior::infer_series`] takes the three pictures.
+    ///
+    /// # Errors
+    /// [`ShippedError`], if the crate's file is damaged.
+    pub fn shipped_series() -> Result<Self, ShippedError> {
+        Self::from_bytes(SHIPPED_SERIES)
+    }
+
     /// Reads what [`GrainPosterior::to_bytes`] wrote.
     ///
     /// # Errors
@@ -134,11 +145,26 @@ impl GrainPosterior {
         self.simulations
     }
 
+    /// How many pictures an inference takes: one, or those of a series of pours from different heights.
+    pub fn pictures(&self) -> usize {
+        self.density.x_dim() / COUNT
+    }
+
     /// The posterior at the statistics of a picture.
     ///
     /// # Errors
-    /// [`Error::NotFinite`].
+    /// [`Error::NotFinite`]; [`Error::Length`] where a series was learned.
     pub fn infer(&self, statistics: &[f64; COUNT]) -> Result<Inferred, Error> {
+        self.infer_series(&[*statistics])
+    }
+
+    /// The posterior at the statistics of a series of pours of the same grains, in the order of the heights that were learned
+    /// ([`crate::scene::SERIES_M`]).
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`]; [`Error::Length`] for another number of pictures than [`Self::pictures`].
+    pub fn infer_series(&self, pictures: &[[f64; COUNT]]) -> Result<Inferred, Error> {
+        let statistics = pictures.as_flattened();
         Ok(Inferred {
             posterior: self.posterior(statistics)?,
             resemblance: self.novelty.compare(statistics)?,
@@ -169,7 +195,7 @@ impl ConditionalDensity for GrainPosterior {
     }
 
     fn x_dim(&self) -> usize {
-        COUNT
+        self.density.x_dim()
     }
 
     fn ln_density(&self, theta: &[f64], x: &[f64]) -> Result<f64, Error> {

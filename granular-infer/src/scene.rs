@@ -26,6 +26,9 @@ pub struct Grain {
     pub restitution: f64,
 }
 
+/// Heights in m of the outlet from which a series of pours is made: low enough that grains hardly bounce, and three times as high as one pour.
+pub const SERIES_M: [f64; 3] = [0.04, 0.12, 0.24];
+
 /// Grains that pour as couscous does. [Matl 2021] has `mu_s = 0.67` and e = 0.77; its `mu_r = 8e-7` means something in its solver alone.
 pub const COUSCOUS: Grain = Grain { sliding_friction: 0.6687, rolling_friction: 0.05, restitution: 0.5 };
 
@@ -180,25 +183,29 @@ impl Scene {
     }
 }
 
-/// Pours from one height of grains of any kind: theta is `[mu_s, mu_r, e]`, x the centres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FromHeight {
+/// Pours of grains of any kind, once from each of some heights: theta is `[mu_s, mu_r, e]`, x the centres, pour after pour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FromHeights {
     /// Rig and cloth.
     pub scene: Scene,
-    /// Height of the outlet in m.
-    pub height_m: f64,
+    /// Heights of the outlet in m.
+    pub heights_m: Vec<f64>,
 }
 
-impl Simulator for FromHeight {
+impl Simulator for FromHeights {
     fn x_dim(&self) -> usize {
-        3 * self.scene.rig.count
+        3 * self.scene.rig.count * self.heights_m.len()
     }
 
     fn simulate(&self, theta: &[f64], rng: &mut ChaCha8Rng) -> Result<Vec<f64>, SimulationFailure> {
         let grain = Grain::from_theta(theta).ok_or_else(|| SimulationFailure {
             reason: format!("{} parameters instead of 3", theta.len()),
         })?;
-        self.scene.features(&grain, self.height_m, rng)
+        let mut x = Vec::with_capacity(self.x_dim());
+        for &height_m in &self.heights_m {
+            x.extend(self.scene.features(&grain, height_m, rng)?);
+        }
+        Ok(x)
     }
 }
 

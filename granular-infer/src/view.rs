@@ -127,35 +127,42 @@ impl View {
 /// A campaign as a camera saw it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
-    /// Parameters and statistics.
+    /// Parameters and statistics, 16 a picture.
     pub simulations: Simulations,
     /// Pours that gave none, by number: their grains had left the picture.
     pub left_out: Vec<(usize, LookError)>,
 }
 
-/// The statistics of all pours of a campaign; each picture's flaws come from the seed and the pour's number.
+/// The statistics of all pours of a campaign, those of a series one pour after the other; each picture's flaws come from the seed and the
+/// pour's number.
 ///
 /// # Errors
 /// [`Error::Length`] for a campaign of another number of grains, [`Error::TooFew`] below 50 pictures.
 pub fn seen(results: &Results, scene: &Scene, view: &View, seed: u64) -> Result<Seen, Error> {
     use rayon::prelude::*;
-    let of = |(index, x): (usize, &[f64])| -> Result<Result<[f64; COUNT], LookError>, Error> {
-        let grains = scene.from_features(x).ok_or(Error::Length {
-            what: "coordinates of grains",
-            expected: 3 * scene.rig.count,
-            got: x.len(),
-        })?;
+    let of_pour = 3 * scene.rig.count;
+    let length = |got| Error::Length { what: "coordinates of grains", expected: of_pour, got };
+    let of = |(index, x): (usize, &[f64])| -> Result<Result<Vec<f64>, LookError>, Error> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(index as u64);
-        Ok(view.features(&grains, &scene.rig, &mut rng))
+        let mut all = Vec::new();
+        for pour in x.chunks(of_pour) {
+            let grains = scene.from_features(pour).ok_or_else(|| length(pour.len()))?;
+            match view.features(&grains, &scene.rig, &mut rng) {
+                Ok(of_picture) => all.extend(of_picture),
+                Err(error) => return Ok(Err(error)),
+            }
+        }
+        Ok(Ok(all))
     };
+    let pictures = results.campaign.x_dim.div_ceil(of_pour);
     let poured: Vec<(usize, &[f64], &[f64])> = results
         .records
         .values()
         .filter_map(|r| r.outcome.as_ref().ok().map(|x| (r.index, r.theta.as_slice(), x.as_slice())))
         .collect();
     let looked: Vec<_> = poured.par_iter().map(|p| of((p.0, p.2))).collect::<Result<_, Error>>()?;
-    let (mut theta, mut x) = (Points::new(results.campaign.prior.dim()), Points::new(COUNT));
+    let (mut theta, mut x) = (Points::new(results.campaign.prior.dim()), Points::new(pictures * COUNT));
     let mut left_out = Vec::new();
     for ((index, parameters, _), look) in poured.iter().zip(looked) {
         match look {

@@ -1,9 +1,10 @@
 //! The shipped posterior on pours it has not seen, and what it refuses.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+use bayes_sim::error::Error;
 use bayes_sim::prior::{Marginal, Prior};
 use granular_infer::posterior::GrainPosterior;
-use granular_infer::scene::{Grain, PriorError, Scene, check_prior, prior};
+use granular_infer::scene::{Grain, PriorError, SERIES_M, Scene, check_prior, prior};
 use granular_infer::tasks::{Ring, RingHeights};
 use granular_infer::view::View;
 use rand::SeedableRng;
@@ -23,6 +24,41 @@ fn soft_grains_are_told_from_hard_ones() {
         inferred.estimate().restitution
     });
     assert!(soft < 0.4 && hard > 0.5, "{soft} and {hard}");
+}
+
+/// A posterior of one picture takes no series, and nothing is inferred from nothing.
+#[test]
+fn a_posterior_of_one_picture_takes_one() {
+    let posterior = GrainPosterior::shipped().unwrap();
+    assert_eq!(posterior.pictures(), 1);
+    for got in [0, 2] {
+        let refused = posterior.infer_series(&vec![[0.02; 16]; got]).unwrap_err();
+        assert!(matches!(refused, Error::Length { expected: 16, got: n, .. } if n == 16 * got), "{refused}");
+    }
+}
+
+/// From three heights the restitution of grains that were not learned from shows to a few hundredths, within what the posterior says.
+#[test]
+fn a_series_from_three_heights_tells_the_restitution() {
+    let (posterior, scene, view) =
+        (GrainPosterior::shipped_series().unwrap(), Scene::default(), View::default());
+    assert_eq!(posterior.pictures(), SERIES_M.len());
+    for restitution in [0.2, 0.45, 0.7] {
+        let grain = Grain { sliding_friction: 0.6, rolling_friction: 0.05, restitution };
+        let of = |height_m: f64| {
+            let heap = scene.grains(&grain, height_m, 11).unwrap();
+            view.features(&heap, &scene.rig, &mut ChaCha8Rng::seed_from_u64(11)).unwrap()
+        };
+        let inferred = posterior.infer_series(&SERIES_M.map(of)).unwrap();
+        assert!(!inferred.resemblance.is_doubtful());
+        let draws = inferred.posterior.sample(2000, &mut ChaCha8Rng::seed_from_u64(1)).theta;
+        let mut e = draws.column(2);
+        e.sort_by(f64::total_cmp);
+        assert!((e[10]..e[1989]).contains(&restitution), "{restitution}: {} to {}", e[10], e[1989]);
+        let found = inferred.estimate().restitution;
+        assert!((found - restitution).abs() < 0.15, "{found} for {restitution}");
+    }
+    assert!(posterior.infer(&[0.02; 16]).is_err());
 }
 
 #[test]

@@ -1,0 +1,132 @@
+//! Learns a posterior from series of pours, the same grains from three heights each, and measures what each height and all of them say of
+//! pours that it has not seen.
+//!
+//! ```text
+//! cargo run --release -p granular-infer --example pours -- series 1684 0 1 s.txt
+//! cargo run --release -p granular-infer --example series -- granular-infer s.txt
+//! ```
+//! Every fifth series is held out; `series.json.gz` is written into the folder. A campaign of single pours (`grains`) is taken for series of one.
+#![allow(clippy::print_stdout, reason = "prints what it measures")]
+
+use std::error::Error;
+use std::path::Path;
+
+use bayes_sim::calibration::expected_coverage;
+use bayes_sim::campaign::Results;
+use bayes_sim::points::Points;
+use bayes_sim::prior::Prior;
+use bayes_sim::simulations::Simulations;
+use granular_infer::posterior::{GrainPosterior, Inferred, settings};
+use granular_infer::scene::{SERIES_M, Scene};
+use granular_infer::summary::COUNT;
+use granular_infer::view::{View, seen};
+use rayon::prelude::*;
+
+/// One series in so many is held out.
+const HELD_OUT: usize = 5;
+/// Draws behind a posterior's coverage.
+const DRAWS: usize = 500;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [out, files @ ..] = arguments.as_slice() else {
+        return Err("expected FOLDER FILE...".into());
+    };
+    let shards = files.iter().map(|f| Results::read(Path::new(f))).collect::<Result<Vec<_>, _>>()?;
+    let results = Results::merge(shards)?;
+    let all = seen(&results, &Scene::default(), &View::default(), 1)?;
+    let (simulations, prior) = (&all.simulations, &results.campaign.prior);
+    let pours = simulations.x().dim() / COUNT;
+    println!(
+        "{} series of {pours} pours, {} failed, {} left the picture",
+        results.records.len(),
+        results.failures().count(),
+        all.left_out.len()
+    );
+    let part = |held_out: bool, half: usize| -> Result<Simulations, bayes_sim::error::Error> {
+        let mine =
+            |i: &usize| i.is_multiple_of(HELD_OUT) == held_out && (!held_out || i / HELD_OUT % 2 == half);
+        let rows: Vec<usize> = (0..simulations.len()).filter(mine).collect();
+        Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))
+    };
+    // One half of what is held out says how wide intervals have to be, the other whether they are.
+    let (training, calibrating, tests) = (part(false, 0)?, part(true, 1)?, part(true, 0)?);
+    println!(
+        "learned from {}, widened by {}, measured on {}",
+        training.len(),
+        calibrating.len(),
+        tests.len()
+    );
+
+    let sets = [vec![0], vec![1], vec![2], vec![0, 2], vec![0, 1, 2]];
+    for heights in sets.iter().filter(|set| set.iter().all(|height| *height < pours)) {
+        let learned = learn(prior, [&training, &calibrating], heights)?;
+        let of_tests = pictures(&tests, heights)?;
+        let coverage = expected_coverage(&learned, &of_tests, DRAWS, 3)?.mean_error();
+        let infer = |i: usize| learned.infer_series(&statistics(&of_tests, i));
+        let of =
+            |h: &usize| if pours == 1 { "one".into() } else { format!("{:.0} cm", 100.0 * SERIES_M[*h]) };
+        print(&heights.iter().map(of).collect::<Vec<_>>().join(", "), &errors(&tests, infer)?, tests.len());
+        println!("{:24} widened by {}, coverage less level {coverage:+.3}", "", learned.widening());
+        if heights.len() == pours {
+            let bytes = learned.to_bytes()?;
+            std::fs::write(Path::new(out).join("series.json.gz"), &bytes)?;
+            println!("{:24} {} kB", "", bytes.len() / 1000);
+        }
+    }
+    Ok(())
+}
+
+/// A posterior of the pictures from some of the heights.
+fn learn(
+    prior: &Prior,
+    [training, calibrating]: [&Simulations; 2],
+    heights: &[usize],
+) -> Result<GrainPosterior, Box<dyn Error>> {
+    let learned = GrainPosterior::train(prior, &pictures(training, heights)?, &settings(), 1)?;
+    Ok(learned.widened(&pictures(calibrating, heights)?)?)
+}
+
+/// The same pours with the pictures from some of the heights alone.
+fn pictures(all: &Simulations, heights: &[usize]) -> Result<Simulations, bayes_sim::error::Error> {
+    let mut x = Points::new(COUNT * heights.len());
+    for row in all.x().rows() {
+        let of_row: Vec<f64> =
+            heights.iter().flat_map(|h| &row[h * COUNT..(h + 1) * COUNT]).copied().collect();
+        x.push(&of_row)?;
+    }
+    Simulations::new(all.theta().clone(), x)
+}
+
+fn statistics(tests: &Simulations, i: usize) -> Vec<[f64; COUNT]> {
+    tests.x().row(i).chunks_exact(COUNT).map(|x| std::array::from_fn(|j| x[j])).collect()
+}
+
+/// Errors of `mu_s`, `ln mu_r` and e: mean and spread.
+fn errors(
+    tests: &Simulations,
+    infer: impl Fn(usize) -> Result<Inferred, bayes_sim::error::Error> + Sync,
+) -> Result<[(f64, f64); 3], Box<dyn Error>> {
+    let one = |i: usize| -> Result<[f64; 3], bayes_sim::error::Error> {
+        let (inferred, truth) = (infer(i)?.estimate(), tests.theta().row(i));
+        Ok([
+            inferred.sliding_friction - truth[0],
+            (inferred.rolling_friction / truth[1]).ln(),
+            inferred.restitution - truth[2],
+        ])
+    };
+    let all = (0..tests.len()).into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let n = all.len() as f64;
+    Ok(std::array::from_fn(|j| {
+        let mean = all.iter().map(|e| e[j]).sum::<f64>() / n;
+        (mean, (all.iter().map(|e| (e[j] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+    }))
+}
+
+fn print(name: &str, errors: &[(f64, f64); 3], count: usize) {
+    let of = |(name, (mean, sd)): (&str, &(f64, f64))| {
+        format!("{name} {mean:+.3} ± {sd:.3} (± {:.3})", 1.96 * sd / (count as f64).sqrt())
+    };
+    let text: Vec<String> = ["mu_s", "ln mu_r", "e"].into_iter().zip(errors).map(of).collect();
+    println!("{name:24} {}", text.join("   "));
+}
