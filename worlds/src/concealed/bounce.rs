@@ -4,7 +4,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::draw::{between, choose, log_between, sign, whole};
-use super::drops::Drops;
+use super::drops::{Drops, describe, dropped};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
 use super::rig::RigMaker;
@@ -57,21 +57,6 @@ impl Maker for Bounce {
             key.events = unheard.iter().map(|[run, impact]| (run.to_string(), *impact as f64)).collect();
         }
         Concealed::table(header, data, key)
-    }
-}
-
-/// Fifteen to forty drops of a ball, five to eight impacts each.
-pub(super) fn dropped(rng: &mut ChaCha8Rng) -> BounceWorld {
-    BounceWorld {
-        runs: whole(rng, 15, 40),
-        impacts: whole(rng, 5, 8),
-        height_m: between(rng, 0.2, 0.6),
-        height_known: whole(rng, 0, 1) == 1,
-        restitution: between(rng, 0.65, 0.9),
-        kappa: log_between(rng, 1e3, 3e4),
-        noise: [log_between(rng, 1e-5, 1e-4), log_between(rng, 2e-3, 1e-2)],
-        noise_known: whole(rng, 0, 3) > 0,
-        ..BounceWorld::drops()
     }
 }
 
@@ -131,21 +116,4 @@ pub(crate) fn listed(world: &mut BounceWorld, which: usize, key: &mut Key, rng: 
         _ => e.unheard = between(rng, 0.1, 0.4),
     }
     describe(world, which, key);
-}
-
-/// Writes a listed effect into the key, by its number among [`LISTED`].
-pub(super) fn describe(world: &BounceWorld, which: usize, key: &mut Key) {
-    let e = &world.effects;
-    match which {
-        0 => key.add("air-drag", &[("k_per_m", e.drag_per_m)]),
-        1 => {
-            let at_one = ("e_at_1_m_s", world.restitution);
-            key.add("velocity-dependent-restitution", &[("slope_s_m", e.slope_s_m), at_one]);
-        }
-        2 => key.add("table-tilt", &[("slope_x", e.table_slope[0]), ("slope_y", e.table_slope[1])]),
-        3 => key.add("tangential-friction", &[("fraction", e.friction)]),
-        4 => key.add("clock-rate", &[("rate", e.clock_rate)]),
-        5 => key.add("position-scale", &[("scale", e.position_scale)]),
-        _ => key.add("missed-impact", &[("fraction", e.unheard)]),
-    }
 }

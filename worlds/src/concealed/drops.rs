@@ -3,8 +3,7 @@
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::bounce::{describe, dropped};
-use super::draw::{sign, whole};
+use super::draw::{between, log_between, sign, whole};
 use super::key::{Hidden, Key};
 use super::nuisances::{Nuisances, difference};
 use super::rig::{Choice, Rig};
@@ -19,6 +18,38 @@ const CLOCK: usize = 4;
 const UNLISTED: usize = 3;
 /// A small step of what a baseline has to fit.
 const STEP: f64 = 1e-3;
+
+/// Fifteen to forty drops of a ball, five to eight impacts each.
+pub(super) fn dropped(rng: &mut ChaCha8Rng) -> BounceWorld {
+    BounceWorld {
+        runs: whole(rng, 15, 40),
+        impacts: whole(rng, 5, 8),
+        height_m: between(rng, 0.2, 0.6),
+        height_known: whole(rng, 0, 1) == 1,
+        restitution: between(rng, 0.65, 0.9),
+        kappa: log_between(rng, 1e3, 3e4),
+        noise: [log_between(rng, 1e-5, 1e-4), log_between(rng, 2e-3, 1e-2)],
+        noise_known: whole(rng, 0, 3) > 0,
+        ..BounceWorld::drops()
+    }
+}
+
+/// Writes a listed effect into the key, by its number.
+pub(super) fn describe(world: &BounceWorld, which: usize, key: &mut Key) {
+    let e = &world.effects;
+    match which {
+        0 => key.add("air-drag", &[("k_per_m", e.drag_per_m)]),
+        1 => {
+            let at_one = ("e_at_1_m_s", world.restitution);
+            key.add("velocity-dependent-restitution", &[("slope_s_m", e.slope_s_m), at_one]);
+        }
+        2 => key.add("table-tilt", &[("slope_x", e.table_slope[0]), ("slope_y", e.table_slope[1])]),
+        3 => key.add("tangential-friction", &[("fraction", e.friction)]),
+        4 => key.add("clock-rate", &[("rate", e.clock_rate)]),
+        5 => key.add("position-scale", &[("scale", e.position_scale)]),
+        _ => key.add("missed-impact", &[("fraction", e.unheard)]),
+    }
+}
 
 /// Drops that are heard and seen, with what their effects look like before their sizes are known.
 pub(super) struct Drops {
