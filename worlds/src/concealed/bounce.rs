@@ -21,12 +21,14 @@ impl Maker for Bounce {
         "bounce"
     }
 
+    /// What the list imitates by a half is seldom found among drops: most of a softer side or of a changing ball is left.
     fn kind(&self, hidden: Hidden) -> Hidden {
-        hidden
+        if hidden == Hidden::Imitated { hidden.without_leftovers() } else { hidden }
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        if matches!(hidden, Hidden::Leftover | Hidden::Imitated) {
+        let hidden = self.kind(hidden);
+        if hidden == Hidden::Leftover {
             return RigMaker::<Drops>::NEW.conceal(hidden, seed);
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

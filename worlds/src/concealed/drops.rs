@@ -1,4 +1,4 @@
-//! Drops whose hidden effects are sized by their strength: one of the list with something smaller beside it, or something that the list imitates.
+//! Drops whose hidden effects are sized by their strength: one of the list with something smaller beside it.
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
