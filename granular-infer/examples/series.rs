@@ -6,6 +6,7 @@
 //! cargo run --release -p granular-infer --example series -- granular-infer s.txt
 //! ```
 //! Every fifth series is held out; `series.json.gz` is written into the folder. A campaign of single pours (`grains`) is taken for series of one.
+//! From fewer than 500 series nothing is held out: a trial of the command.
 #![allow(clippy::print_stdout, reason = "prints what it measures")]
 
 use std::error::Error;
@@ -24,6 +25,8 @@ use rayon::prelude::*;
 
 /// One series in so many is held out.
 const HELD_OUT: usize = 5;
+/// Series from which some are held out.
+const LEAST: usize = 500;
 /// Draws behind a posterior's coverage.
 const DRAWS: usize = 500;
 
@@ -43,14 +46,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         results.failures().count(),
         all.left_out.len()
     );
+    let enough = simulations.len() >= LEAST;
     let part = |held_out: bool, half: usize| -> Result<Simulations, bayes_sim::error::Error> {
-        let mine =
-            |i: &usize| i.is_multiple_of(HELD_OUT) == held_out && (!held_out || i / HELD_OUT % 2 == half);
+        let of_half = |i: &usize| !held_out || i / HELD_OUT % 2 == half;
+        let mine = |i: &usize| !enough || i.is_multiple_of(HELD_OUT) == held_out && of_half(i);
         let rows: Vec<usize> = (0..simulations.len()).filter(mine).collect();
         Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))
     };
     // One half of what is held out says how wide intervals have to be, the other whether they are.
     let (training, calibrating, tests) = (part(false, 0)?, part(true, 1)?, part(true, 0)?);
+    if !enough {
+        println!("too few to hold any out");
+    }
     println!(
         "learned from {}, widened by {}, measured on {}",
         training.len(),
