@@ -52,13 +52,13 @@ fn a_proof_that_was_killed_goes_on_to_the_same_score() {
 #[test]
 fn a_kind_that_a_domain_has_not_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let asked = ["prove", "--domain", "bounce", "--kind", "leftover", "--worlds", "1", "--out"];
+    let asked = ["prove", "--domain", "bounce", "--kind", "imitated", "--worlds", "1", "--out"];
     let tool = env!("CARGO_BIN_EXE_missing-physics");
     let output = Command::new(tool).args(asked).arg(folder.path().join("proof")).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8(output.stderr).unwrap();
     let expected =
-        "no worlds of the kind leftover in the domain bounce, expected one of the domains: trajectory, slosh";
+        "no worlds of the kind imitated in the domain bounce, expected one of the domains: trajectory, slosh";
     assert!(said.contains(expected), "{said}");
     assert!(!folder.path().join("proof").exists());
 }
