@@ -175,14 +175,14 @@ impl BounceWorld {
     /// All drops.
     pub(crate) fn heard(&self, seed: u64) -> Vec<Drop> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut of_run = |run: usize| {
+        let of_run = |run: usize| {
             let spread = if self.height_known { 1.0 } else { rng.random_range(0.6..1.4) };
             let unheard = self.unheard(&mut rng);
             let count = self.impacts + usize::from(unheard.is_some());
             let height_m = self.height_m * spread;
             Drop { unheard, impacts: self.in_run(run).drop([0.0; 2], height_m, 0.0..1.0, count, &mut rng) }
         };
-        (0..self.runs).map(&mut of_run).collect()
+        (0..self.runs).map(of_run).collect()
     }
 
     /// The recording, with what is known of its making.

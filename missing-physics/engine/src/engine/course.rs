@@ -59,6 +59,14 @@ impl Course<'_> {
         test::test(problem, &candidate.selection, &candidate.fit, &rivals, rule, replicates, seed)
     }
 
+    /// Sigmas of the white noise. Runs too short to show theirs have that of the likeliest fit: that of the baseline would be its misfit.
+    fn white_noise(&self, ranking: &Ranking) -> Vec<f64> {
+        let Begun { problem, rule, baseline, .. } = self.begun;
+        let sound = ranking.all().iter().filter(|c| c.ruled_out.is_none());
+        let likeliest = sound.max_by(|a, b| a.evidence.total_cmp(&b.evidence)).unwrap_or(baseline);
+        rough_sigmas(problem, rule, &likeliest.fit)
+    }
+
     /// The whole way.
     pub(super) fn run(&self) -> Result<Outcome, DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
@@ -80,10 +88,7 @@ impl Course<'_> {
         }
         let (mut ranking, unfitted) = self.compare(&problem.spec().asked())?;
         let mut best = self.best(&mut ranking)?;
-        // Runs too short to show their noise have that of the likeliest fit: that of the baseline would be its misfit.
-        let sound = ranking.all().iter().filter(|c| c.ruled_out.is_none());
-        let likeliest = sound.max_by(|a, b| a.evidence.total_cmp(&b.evidence)).unwrap_or(baseline);
-        let white = rough_sigmas(problem, rule, &likeliest.fit);
+        let white = self.white_noise(&ranking);
         if self.explains(&ranking, best.as_ref()).is_none()
             && let Some((other, clear)) = self.unasked(&white)?
         {

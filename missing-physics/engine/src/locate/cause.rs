@@ -70,7 +70,7 @@ pub(crate) struct Scene<'a> {
 impl Scene<'_> {
     /// The hypothesis that is worth most; `None` where none can be had.
     pub(crate) fn best(&self) -> Result<Option<Cause>, PredictError> {
-        let within = |unknown: &usize| !self.unknowns[*unknown].told.at_single_rows;
+        let within = |unknown: &usize| !self.unknowns[*unknown].described.at_single_rows;
         let pairs: Vec<(usize, usize)> = (0..self.unknowns.len())
             .filter(within)
             .flat_map(|unknown| (0..self.variables.len()).map(move |along| (unknown, along)))
@@ -128,7 +128,7 @@ impl Scene<'_> {
         let Some(bins) = Bins::new(self.problem, 0..self.problem.channels(), &self.variables[along]) else {
             return Ok(Best::default());
         };
-        let components = 0..self.unknowns[unknown].told.components.len();
+        let components = 0..self.unknowns[unknown].described.components.len();
         let responses = components
             .map(|c| Responses::new(&self.asked(unknown, along, c, &bins), self.projection))
             .collect::<Result<Vec<_>, _>>()?;

@@ -96,7 +96,7 @@ pub(crate) fn locate(
         (cause, Some(events))
             if {
                 // What acts at single rows only says more than an amount, so that it need not be worth quite as much.
-                let only = unknowns[events.unknown].told.at_single_rows;
+                let only = unknowns[events.unknown].described.at_single_rows;
                 let simpler = if only { SIMPLER.recip() } else { SIMPLER };
                 events.worth > simpler * cause.as_ref().map_or(worth / SIMPLER, |cause| cause.worth)
             } =>
@@ -305,7 +305,7 @@ impl Places<'_> {
         let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
         let runs: Vec<bool> = cause.runs.iter().enumerate().map(|(r, acts)| *acts && touched(r)).collect();
         let as_if = unknown.is_model_s().then(|| AsIf {
-            what: unknown.told.name.clone(),
+            what: unknown.described.name.clone(),
             sizes: cause.sizes.iter().map(|(c, size)| estimate(unknown, *c, *size)).collect(),
         });
         let gaining = cause.gains.iter().enumerate().filter(|(_, gain)| **gain > 0.0);
@@ -346,7 +346,7 @@ impl Places<'_> {
                 sigma: self.sigma[best],
                 z: gain.max(0.0).sqrt(),
                 as_if: Some(AsIf {
-                    what: unknown.told.name.clone(),
+                    what: unknown.described.name.clone(),
                     sizes: vec![estimate(unknown, event.component, event.size)],
                 }),
             };
@@ -359,6 +359,6 @@ impl Places<'_> {
 /// A size with its interval, from white noise.
 fn estimate(unknown: &Unknown<'_>, component: usize, [value, error]: [f64; 2]) -> Estimate {
     const CI95: f64 = 1.96;
-    let Quantity { name, unit } = unknown.told.components[component].clone();
+    let Quantity { name, unit } = unknown.described.components[component].clone();
     Estimate { name, unit, value, ci95: [value - CI95 * error, value + CI95 * error] }
 }

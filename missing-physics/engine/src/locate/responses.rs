@@ -82,7 +82,7 @@ impl Effect {
 
     /// The first size's square beside all parameters; zero where hardly anything is left beside them.
     fn first(&self) -> f64 {
-        told(self.beside(self.square[0], (0, 0)), self.square[0])
+        determined(self.beside(self.square[0], (0, 0)), self.square[0])
     }
 
     /// By how much the sum of squares falls.
@@ -94,21 +94,21 @@ impl Effect {
         let gain = self.product[0] * self.product[0] / first;
         let part = self.beside(self.cross, (0, 1)) / first;
         let second = self.beside(self.square[1], (1, 1)) - part * part * first;
-        let second = told(second, self.square[1]);
+        let second = determined(second, self.square[1]);
         if second <= 0.0 {
             return gain;
         }
         gain + (self.product[1] - part * self.product[0]).powi(2) / second
     }
 
-    /// The first size that fits best; not a number where it is not told.
+    /// The first size that fits best; not a number where it is not determined.
     pub(crate) fn size(&self) -> f64 {
         self.product[0] / self.first()
     }
 }
 
 /// A square beside others that hardly anything is left of is zero.
-fn told(beside: f64, square: f64) -> f64 {
+fn determined(beside: f64, square: f64) -> f64 {
     if beside > 1e-6 * square { beside } else { 0.0 }
 }
 

@@ -101,7 +101,7 @@ impl Scan {
             gain: missed - dropped,
             bins,
         };
-        let gain = self.whole - self.departing(bins);
+        let gain = self.whole - self.with_departure(bins);
         let smooth =
             Interval { worth: gain - SMOOTH as f64 * price - scanned, gain: gain - SMOOTH as f64, bins };
         Some(if smooth.worth > freed.worth { smooth } else { freed })
@@ -119,7 +119,7 @@ impl Scan {
     }
 
     /// Fits the linearised baseline and a smooth departure inside the bins to all rows: sum of squares.
-    fn departing(&self, (from, to): (usize, usize)) -> f64 {
+    fn with_departure(&self, (from, to): (usize, usize)) -> f64 {
         let first = self.n_nuisance + self.n_shared;
         let last = first + SMOOTH;
         let gram = |run: &Normals| {

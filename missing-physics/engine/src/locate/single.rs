@@ -41,13 +41,13 @@ pub(crate) fn events(
     }
     // What acts at single rows only says more than an amount by which rows differ.
     let weight = |events: &Events| {
-        let only = unknowns[events.unknown].told.at_single_rows;
+        let only = unknowns[events.unknown].described.at_single_rows;
         if only { SIMPLER * events.worth } else { events.worth }
     };
     let mut best: Option<Events> = None;
     for (number, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_model_s() && u.runs_are_alone())
     {
-        for component in 0..unknown.told.components.len() {
+        for component in 0..unknown.described.components.len() {
             let columns = unknown.at_each_row(problem, fit, sigma, component)?;
             let found = greedy(problem, projection.clone(), &columns, number, component);
             if !found.rows.is_empty() && best.as_ref().is_none_or(|b| weight(&found) > weight(b)) {
@@ -80,8 +80,8 @@ fn greedy(
                 let whole = dot(column, column);
                 let square = dot(&beside, &beside) - dot(&shared, &shared);
                 let product = dot(&beside, &projection.residual[run]);
-                let told = square > 1e-6 * whole && square > 0.0;
-                let gain = if told { product * product / square } else { 0.0 };
+                let determined = square > 1e-6 * whole && square > 0.0;
+                let gain = if determined { product * product / square } else { 0.0 };
                 (gain, run, row, [product / square, square.sqrt().recip()])
             })
         });

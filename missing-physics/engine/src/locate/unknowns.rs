@@ -11,7 +11,7 @@ const ROWS: usize = 6000;
 
 /// An unknown, and how to ask for its effect.
 pub(crate) struct Unknown<'a> {
-    pub(crate) told: LocalUnknown,
+    pub(crate) described: LocalUnknown,
     /// The model's number of it; an offset of the readings where there is none.
     model: Option<(&'a dyn LocalCauses, usize)>,
 }
@@ -25,11 +25,11 @@ pub(crate) fn are_events(problem: &Problem<'_>) -> bool {
 /// The model's unknowns, and an offset of the readings.
 pub(crate) fn unknowns<'a>(problem: &Problem<'a>) -> Vec<Unknown<'a>> {
     let of_model = problem.model.extensions().local_causes.into_iter().flat_map(|causes| {
-        let told = causes.unknowns().into_iter().enumerate();
-        told.map(move |(k, told)| Unknown { told, model: Some((causes, k)) })
+        let described = causes.unknowns().into_iter().enumerate();
+        described.map(move |(k, described)| Unknown { described, model: Some((causes, k)) })
     });
     let offset = LocalUnknown::new("an offset", problem.recording.channels.clone());
-    of_model.chain([Unknown { told: offset, model: None }]).collect()
+    of_model.chain([Unknown { described: offset, model: None }]).collect()
 }
 
 impl Unknown<'_> {
