@@ -58,8 +58,8 @@ struct Size {
 }
 
 impl Size {
-    fn told() -> Outcome<Self> {
-        let first = 100 * told("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
+    fn from_arguments() -> Outcome<Self> {
+        let first = 100 * argument("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
         Ok(if examples::small() {
             let (trained, recorded) = ([8, 16], [4, 12]);
             Self { trained, recorded, days: 1, first, goals: vec![4.0], rollouts: 2, replicates: 19 }
@@ -87,13 +87,13 @@ struct Day {
     bars: Vec<Done>,
 }
 
-/// What was told after a word on the command line.
-fn told(word: &str) -> Option<String> {
+/// What follows a word on the command line.
+fn argument(word: &str) -> Option<String> {
     std::env::args().skip_while(|a| a != word).nth(1)
 }
 
 fn main() -> Outcome<()> {
-    let size = Size::told()?;
+    let size = Size::from_arguments()?;
     let band = band()?;
     let [trained, recorded] = [size.trained, size.recorded];
     println!(
@@ -114,7 +114,7 @@ fn main() -> Outcome<()> {
     let fewer = |bars: &[Done]| 100.0 * (1.0 - bars[2].mean() / bars[0].mean());
     let each: Vec<String> = days.iter().map(|d| format!("{:.0} %", fewer(&d.bars))).collect();
     println!("repaired: {:.0} % fewer rolls than as learned (day by day: {})", fewer(&all), each.join(", "));
-    if let Some(file) = told("--picture") {
+    if let Some(file) = argument("--picture") {
         let day = &days[0];
         let parts = answered(&day.recorded, &day.model, &band);
         let rows: Vec<Bars> = all.iter().map(Done::bars).collect();

@@ -42,9 +42,15 @@ impl Model for Finger {
         &self.0
     }
 
-    fn predict(&self, run: &Run, shared: &[f64], own: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+    fn predict(
+        &self,
+        run: &Run,
+        shared: &[f64],
+        nuisance: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), PredictError> {
         for (out, d) in out.iter_mut().zip(&run.inputs[0]) {
-            *out = own[0] + shared[0] * d.powf(1.5) + shared[1] * d.powi(3);
+            *out = nuisance[0] + shared[0] * d.powf(1.5) + shared[1] * d.powi(3);
         }
         Ok(())
     }

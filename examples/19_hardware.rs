@@ -11,7 +11,7 @@ use std::io::{BufReader, BufWriter, Write as _};
 use std::path::PathBuf;
 
 use examples::rig::{
-    Addresses, Devices, Diagnosed, Loopback, Outcome, Plan, Told, Truth, World, recording, story,
+    Addresses, Devices, Diagnosed, Loopback, Outcome, Plan, Story, Truth, World, recording, story,
 };
 use hw_traits::clock::Clock;
 use hw_traits::force_torque::ForceTorque;
@@ -39,24 +39,24 @@ fn main() -> Outcome<()> {
             tape.events.len(),
             if tape.cut { ", whose end is cut" } else { "" }
         );
-        let told = story(&mut Playback::new(tape.events, SAME), &plan)?;
-        return say(&told, &recording(&told, &out)?, None);
+        let outcome = story(&mut Playback::new(tape.events, SAME), &plan)?;
+        return say(&outcome, &recording(&outcome, &out)?, None);
     }
     if given("--fake") {
         println!("rig: a simulated one, in simulated time");
         let mut world = World::new(seed).map_err(|e| e.to_string())?;
-        let told = taped(&mut world, &plan, &out)?;
-        return say(&told, &recording(&told, &out)?, Some(world.truth()));
+        let outcome = taped(&mut world, &plan, &out)?;
+        return say(&outcome, &recording(&outcome, &out)?, Some(world.truth()));
     }
     if let Some(words) = value("--device") {
         println!("rig: {words}");
         let mut devices = Devices::connect(&Addresses::parse(words)?, given("--send-program"))?;
-        let told = taped(&mut devices, &plan, &out)?;
+        let outcome = taped(&mut devices, &plan, &out)?;
         println!(
             "{} records of the sensor came while the programme waited and were not kept",
             devices.lost()
         );
-        return say(&told, &recording(&told, &out)?, None);
+        return say(&outcome, &recording(&outcome, &out)?, None);
     }
     if given("--emulate") {
         let loopback = Loopback::start(seed)?;
@@ -68,15 +68,15 @@ fn main() -> Outcome<()> {
     println!("rig: an ATI Net F/T by RDT and a Universal Robots arm by RTDE, emulated on 127.0.0.1");
     let loopback = Loopback::start(seed)?;
     let mut devices = Devices::connect(&loopback.addresses(), false)?;
-    let told = taped(&mut devices, &plan, &out)?;
-    say(&told, &recording(&told, &out)?, Some(loopback.truth()))
+    let outcome = taped(&mut devices, &plan, &out)?;
+    say(&outcome, &recording(&outcome, &out)?, Some(loopback.truth()))
 }
 
 /// Runs with a tape that keeps all that passes.
-fn taped<R: Rotary + ForceTorque + Clock>(rig: &mut R, plan: &Plan, out: &std::path::Path) -> Outcome<Told> {
+fn taped<R: Rotary + ForceTorque + Clock>(rig: &mut R, plan: &Plan, out: &std::path::Path) -> Outcome<Story> {
     let mut file = BufWriter::new(File::create(out.join(TAPE))?);
     let mut failed: Option<TapeError> = None;
-    let told = story(
+    let outcome = story(
         &mut Recorder::new(rig, |event: Event| {
             failed = write_event(&event, &mut file).err().or(failed.take())
         }),
@@ -84,20 +84,20 @@ fn taped<R: Rotary + ForceTorque + Clock>(rig: &mut R, plan: &Plan, out: &std::p
     );
     file.flush()?;
     failed.map_or(Ok(()), Err)?;
-    told
+    outcome
 }
 
-fn say(told: &Told, found: &Diagnosed, truth: Option<Truth>) -> Outcome<()> {
+fn say(outcome: &Story, found: &Diagnosed, truth: Option<Truth>) -> Outcome<()> {
     let [before, after] =
-        told.volumes_m3.map(|[value, error]| format!("{:.1} +- {:.1} mL", 1e6 * value, 1.96e6 * error));
+        outcome.volumes_m3.map(|[value, error]| format!("{:.1} +- {:.1} mL", 1e6 * value, 1.96e6 * error));
     println!("in the bottle before: {before}");
-    println!("poured at {:.1} degrees", told.pour_rad.to_degrees());
+    println!("poured at {:.1} degrees", outcome.pour_rad.to_degrees());
     println!("in the bottle after:  {after}");
     let answer = &found.answer;
     println!("diagnosis: {} {:?}, p = {:.4}", answer.verdict.word(), answer.chosen, answer.p_value);
     let slip = found.slip();
     if let Some((by_m, [low, high], pose)) = slip {
-        let tilt = told.sweeps[1].get(pose).map_or(f64::NAN, |p| p.angle_rad.to_degrees());
+        let tilt = outcome.sweeps[1].get(pose).map_or(f64::NAN, |p| p.angle_rad.to_degrees());
         println!(
             "the grip slips by {:.2} mm [{:.2}, {:.2}] at pose {pose} after the pour, {tilt:.1} degrees",
             1e3 * by_m,

@@ -1,6 +1,8 @@
-/// The value below which lies a share (0 to below 1) of the values, one of them: of an even number the upper of the middle two for a half.
-/// `None` of none. The order of the values changes; nothing is allocated.
+//! Quantiles, `None` of nothing.
+
+use statrs::statistics::{Data, OrderStatistics as _};
+
+/// The quantile of a share in [0, 1] of some values, which are put in another order; nothing is allocated.
 pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    let at = (share * values.len() as f64) as usize;
-    (at < values.len()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
+    (!values.is_empty()).then(|| Data::new(values).quantile(share))
 }

@@ -130,7 +130,7 @@ impl Learning<'_> {
             let steps = follow(dough, &initial, &self.noise, Relaxation::NONE, next);
             let terms = |i: usize| self.surface.slopes(&steps[i].state, &dough[i].action);
             let all = sensitivity(&steps, terms, |_| 1.0, n / 3);
-            let (off, shared, own) = (whitened(&steps), all.columns(0, n), all.columns(n, NUISANCES));
+            let (off, shared, nuisance) = (whitened(&steps), all.columns(0, n), all.columns(n, NUISANCES));
             sums.square += shared.tr_mul(&shared);
             sums.pull += shared.tr_mul(&off);
             let trends = trends(dough.len()).len();
@@ -138,9 +138,9 @@ impl Learning<'_> {
                 sums.doughs.push(NuisanceSums {
                     dough: at,
                     trends,
-                    cross: shared.tr_mul(&own),
-                    square: own.tr_mul(&own),
-                    pull: own.tr_mul(&off),
+                    cross: shared.tr_mul(&nuisance),
+                    square: nuisance.tr_mul(&nuisance),
+                    pull: nuisance.tr_mul(&off),
                 });
             }
         }

@@ -55,8 +55,8 @@ struct Learned {
 }
 
 fn main() -> Result<(), Failure> {
-    let told = |what: &str| std::env::args().skip_while(|a| a != what).nth(1);
-    let seed = 1000 * told("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
+    let argument = |what: &str| std::env::args().skip_while(|a| a != what).nth(1);
+    let seed = 1000 * argument("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
     let size = if examples::small() {
         let goals = vec![2.0, 4.0];
         Size { explored: 120, each: [60, 40], seed, most: 100, goals, six: 2, twenty: 2, ten: 1, fifteen: 1 }
@@ -81,7 +81,7 @@ fn main() -> Result<(), Failure> {
     let bars = policies::figure_7_4(&size, &a)?;
     let stiffness = stiffness::table_7_1()?;
     let lines = matching::figure_7_5(&size, &a, &c, &stiffness)?;
-    if let Some(file) = told("--picture") {
+    if let Some(file) = argument("--picture") {
         let goals: Vec<String> = size.goals.iter().map(|g| format!("{g} in")).collect();
         std::fs::write(&file, picture::draw(&bars, &goals, &lines))?;
         println!("\ndrawn: {file}");

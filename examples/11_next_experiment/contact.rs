@@ -142,10 +142,10 @@ fn curve<R>(rig: &mut R, press: Press) -> Outcome<Vec<Reading>>
 where
     R: Arm + ForceTorque + Clock,
 {
-    let told = |e: R::Error| format!("{e:?}");
+    let as_text = |e: R::Error| format!("{e:?}");
     let mut readings = Vec::new();
-    let zero = rig.now_s().map_err(told)?;
-    rig.move_to(at(press.from_m), 1.0).map_err(told)?;
+    let zero = rig.now_s().map_err(as_text)?;
+    rig.move_to(at(press.from_m), 1.0).map_err(as_text)?;
     let holds = if press.hold_s > 0.0 { ROWS } else { 0 };
     for row in 0..ROWS + holds {
         if row > 0 {
@@ -153,11 +153,11 @@ where
             let lasts =
                 if row < ROWS { press.duration_s / (ROWS - 1) as f64 } else { press.hold_s / ROWS as f64 };
             let depth_m = press.from_m + share * (press.depth_m - press.from_m);
-            rig.move_to(at(depth_m), lasts).map_err(told)?;
-            rig.sleep_s(lasts).map_err(told)?;
+            rig.move_to(at(depth_m), lasts).map_err(as_text)?;
+            rig.sleep_s(lasts).map_err(as_text)?;
         }
-        let pose = rig.pose().map_err(told)?;
-        let wrench = rig.read().map_err(told)?;
+        let pose = rig.pose().map_err(as_text)?;
+        let wrench = rig.read().map_err(as_text)?;
         readings.push(Reading {
             delta_m: -pose.value.position_m[2],
             force_n: wrench.value.force_n[2],

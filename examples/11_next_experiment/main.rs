@@ -125,12 +125,12 @@ impl<R: Rig> World<R> {
     }
 
     /// Experiments until the tool is sure of the truth ([`patience`] where it never was).
-    fn until_sure(mut self, policy: Policy, told: bool) -> Outcome<usize> {
+    fn until_sure(mut self, policy: Policy, printed: bool) -> Outcome<usize> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0xdead);
         let grid = R::grid();
         while self.done < patience() {
             let sure = self.belief() >= SURE;
-            if told {
+            if printed {
                 self.tell();
             }
             if sure {

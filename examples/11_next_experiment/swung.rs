@@ -119,16 +119,16 @@ fn ring_down<R>(rig: &mut R, swing: Swing) -> Outcome<Vec<(f64, f64)>>
 where
     R: Rotary + ForceTorque + Clock,
 {
-    let told = |e: R::Error| format!("{e:?}");
-    rig.turn_to(FRAC_PI_2 * (swing.wave_nm / HIGHEST_NM).min(1.0), 0.3).map_err(told)?;
-    rig.sleep_s(20.0).map_err(told)?;
-    rig.turn_to(0.0, 3.0).map_err(told)?;
-    let zero = rig.now_s().map_err(told)?;
+    let as_text = |e: R::Error| format!("{e:?}");
+    rig.turn_to(FRAC_PI_2 * (swing.wave_nm / HIGHEST_NM).min(1.0), 0.3).map_err(as_text)?;
+    rig.sleep_s(20.0).map_err(as_text)?;
+    rig.turn_to(0.0, 3.0).map_err(as_text)?;
+    let zero = rig.now_s().map_err(as_text)?;
     let mut readings = Vec::new();
     for _ in 0..rows(swing) {
-        let wrench = rig.read().map_err(told)?;
+        let wrench = rig.read().map_err(as_text)?;
         readings.push((wrench.t_s - zero, wrench.value.torque_nm[2]));
-        rig.sleep_s(1.0 / RATE_HZ).map_err(told)?;
+        rig.sleep_s(1.0 / RATE_HZ).map_err(as_text)?;
     }
     Ok(readings)
 }

@@ -51,12 +51,12 @@ impl Tracker for Still {
 }
 
 /// The filter, told which impacts are misheard: it hears nothing of them.
-struct Told<'a> {
+struct Warned<'a> {
     filter: ParticleFilter,
     court: &'a Court,
 }
 
-impl Tracker for Told<'_> {
+impl Tracker for Warned<'_> {
     fn begin(&mut self) {
         self.filter.begin();
     }
@@ -111,7 +111,7 @@ pub(crate) fn throw(
         go(&mut chance(0.0))?,
         go(&mut chance(TOUCH_M))?,
         go(&mut filter.clone())?,
-        go(&mut Told { filter, court: &court })?,
+        go(&mut Warned { filter, court: &court })?,
     ])
 }
 

@@ -75,19 +75,19 @@ pub(super) fn fast() -> Commands {
 
 /// Drives a joint from rest by commands; rows of the recording.
 pub(super) fn record<J: Motor + Clock>(joint: &mut J, label: usize, commands: &[f64]) -> Outcome<String> {
-    let told = |e: J::Error| format!("{e:?}");
-    joint.drive(0.0).map_err(told)?;
-    joint.sleep_s(REST_S).map_err(told)?;
+    let as_text = |e: J::Error| format!("{e:?}");
+    joint.drive(0.0).map_err(as_text)?;
+    joint.sleep_s(REST_S).map_err(as_text)?;
     let mut rows = String::new();
-    let mut said = joint.read().map_err(told)?;
+    let mut said = joint.read().map_err(as_text)?;
     let begun_s = said.t_s;
     for command_nm in commands {
         let (t_s, reading) = (said.t_s - begun_s, said.value);
         writeln!(rows, "{label},{t_s:.4},{:.6},{:.5},{command_nm:.6}", reading.angle_rad, reading.torque_nm)?;
-        joint.drive(*command_nm).map_err(told)?;
-        said = joint.read().map_err(told)?;
+        joint.drive(*command_nm).map_err(as_text)?;
+        said = joint.read().map_err(as_text)?;
     }
-    joint.drive(0.0).map_err(told)?;
+    joint.drive(0.0).map_err(as_text)?;
     Ok(rows)
 }
 

@@ -36,7 +36,7 @@ pub(super) struct Plant {
 
 impl Plant {
     /// The simulation as it was, fitted.
-    pub(super) fn plain(diagnosis: &Diagnosis) -> Option<Self> {
+    pub(super) fn baseline(diagnosis: &Diagnosis) -> Option<Self> {
         let find = |name: &str| diagnosis.baseline_parameters.iter().find(|p| p.name == name);
         Self::of(|name| find(name).map(|p| p.value))
     }
@@ -44,11 +44,11 @@ impl Plant {
     /// The repaired one, as far as it has been repaired.
     pub(super) fn repaired(diagnosis: &Diagnosis) -> Option<Self> {
         let find = |name: &str| diagnosis.repaired.parameters.iter().find(|p| p.name == name);
-        let plain = Self::of(|name| find(name).map(|p| p.value))?;
+        let baseline = Self::of(|name| find(name).map(|p| p.value))?;
         let value = |id: &str, name: &str| parameter(diagnosis, id, name).map(|p| p.value);
         let friction = value("stribeck-friction", "level").zip(value("stribeck-friction", "speed"));
         let delay_s = value("input-delay", "delay_s").unwrap_or(0.0);
-        Some(Self { friction: friction.map(<[f64; 2]>::from), delay_s, ..plain })
+        Some(Self { friction: friction.map(<[f64; 2]>::from), delay_s, ..baseline })
     }
 
     fn of(find: impl Fn(&str) -> Option<f64>) -> Option<Self> {
@@ -110,14 +110,14 @@ pub(super) fn follow<J: Motor + Clock>(
     plant: &Plant,
     place: impl Fn(&J) -> f64,
 ) -> Outcome<Followed> {
-    let told = |e: J::Error| format!("{e:?}");
-    joint.drive(0.0).map_err(told)?;
-    joint.sleep_s(REST_S).map_err(told)?;
+    let as_text = |e: J::Error| format!("{e:?}");
+    joint.drive(0.0).map_err(as_text)?;
+    joint.sleep_s(REST_S).map_err(as_text)?;
     let limit_nm = joint.limit_nm();
     let (stiff, damps) = (STIFF_RAD_S.powi(2) / plant.gain, 1.4 * STIFF_RAD_S / plant.gain);
     // What is commanded now acts half a cycle later on average, and then through the current's control and the delay.
     let late_s = plant.delay_s + CURRENT_S + 0.5 * CYCLE_S;
-    let mut before = joint.read().map_err(told)?;
+    let mut before = joint.read().map_err(as_text)?;
     let (begun_s, mut rate) = (before.t_s, 0.0);
     let mut commands: VecDeque<f64> = VecDeque::new();
     let mut errors = Vec::new();
@@ -134,15 +134,15 @@ pub(super) fn follow<J: Motor + Clock>(
         let aim = wanted(t_s + late_s);
         let torque_nm = plant.torque_nm(aim) + stiff * (aim[0] - then[0]) + damps * (aim[1] - then[1]);
         let torque_nm = torque_nm.clamp(-limit_nm, limit_nm);
-        joint.drive(torque_nm).map_err(told)?;
+        joint.drive(torque_nm).map_err(as_text)?;
         commands.push_back(torque_nm);
-        let now = joint.read().map_err(told)?;
+        let now = joint.read().map_err(as_text)?;
         let slope = (now.value.angle_rad - before.value.angle_rad) / (now.t_s - before.t_s);
         rate += (slope - rate) * CYCLE_S / (FILTER_S + CYCLE_S);
         before = now;
         errors.push([now.t_s - begun_s, place(joint) - wanted(now.t_s - begun_s)[0]]);
     }
-    joint.drive(0.0).map_err(told)?;
+    joint.drive(0.0).map_err(as_text)?;
     let counts: Vec<f64> = errors.iter().filter(|e| e[0] > BEFORE / SWINGS_HZ).map(|e| e[1] * e[1]).collect();
     let rms_rad = (counts.iter().sum::<f64>() / counts.len() as f64).sqrt();
     Ok(Followed { errors, rms_rad })

@@ -52,10 +52,10 @@ impl Story {
             rows += &record(&mut joint, 1 + done.len(), &commands)?;
             (loaded, last) = ask(&rows, seed)?;
         }
-        let plain = Plant::plain(&first).ok_or("no parameters")?;
+        let baseline = Plant::baseline(&first).ok_or("no parameters")?;
         let repaired = Plant::repaired(&last).ok_or("no parameters")?;
         let mut by = |plant: Plant| follow(&mut joint, &plant, Joint::place_rad);
-        let followed = [by(plain)?, by(repaired.prompt())?, by(repaired)?];
+        let followed = [by(baseline)?, by(repaired.prompt())?, by(repaired)?];
         Ok(Self { truth, first, done, last, repaired, followed })
     }
 
@@ -100,9 +100,9 @@ impl Story {
                 );
             }
         }
-        let [plain, prompt, repaired] = [0, 1, 2].map(|k| 1e3 * self.followed[k].rms_rad);
+        let [baseline, prompt, repaired] = [0, 1, 2].map(|k| 1e3 * self.followed[k].rms_rad);
         println!(
-            "  tracking error, rms: {plain:.2} mrad by the simulation as it was, {prompt:.2} by its repair without the delay, {repaired:.2} by \
+            "  tracking error, rms: {baseline:.2} mrad by the simulation as it was, {prompt:.2} by its repair without the delay, {repaired:.2} by \
              its repair: smaller by a factor of {:.1}",
             self.better()
         );

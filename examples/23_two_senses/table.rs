@@ -1,6 +1,7 @@
 //! What is printed: errors, widths, how often intervals hold, twins, contradictions.
 
 use liquid_haptics::fusion::{Marginal, Quantity};
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use crate::rig::{FILLS, LIQUIDS, SENSORS};
 use crate::{SENSES, Said, Tried};
@@ -8,7 +9,7 @@ use crate::{SENSES, Said, Tried};
 /// Quantities, and what each is printed in.
 const QUANTITIES: [&str; 3] = ["volume, mL", "density, %", "viscosity, factor"];
 /// A posterior that puts this much on one side has told twins apart.
-const TOLD: f64 = 0.95;
+const SURE: f64 = 0.95;
 
 fn truths(tried: &Tried) -> [f64; 3] {
     [tried.case.volume_m3(), tried.case.kind().density, tried.case.kind().viscosity]
@@ -30,11 +31,6 @@ fn judged(marginal: &Marginal, truth: f64, quantity: usize) -> ([f64; 2], bool) 
         }
     };
     (numbers, holds)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn number(value: f64) -> String {
@@ -71,8 +67,9 @@ pub(crate) fn print(tried: &[Tried]) {
                                     .0
                             })
                             .collect();
-                        let [error, width] =
-                            [0, 1].map(|i| number(median(each.iter().map(|e| e[i]).collect())));
+                        let [error, width] = [0, 1].map(|i| {
+                            number(Data::new(each.iter().map(|e| e[i]).collect::<Vec<_>>()).median())
+                        });
                         format!("{error} ({width})")
                     };
                     print!(" {:>43}", [cell(0), cell(1), cell(2)].join(" | "));
@@ -84,7 +81,10 @@ pub(crate) fn print(tried: &[Tried]) {
         held(tried, of);
         twins(tried, of);
         let times: Vec<f64> = tried.iter().map(|t| t.said[of].took_s).collect();
-        println!("a posterior by both takes {:.2} s (median, other work beside it)\n", median(times));
+        println!(
+            "a posterior by both takes {:.2} s (median, other work beside it)\n",
+            Data::new(times).median()
+        );
     }
 }
 
@@ -126,9 +126,9 @@ fn twins(tried: &[Tried], of: usize) {
                 let below = t.said[of].marginals[sense][0].between(0.0, half);
                 if t.case.fill < 0.5 { below } else { 1.0 - below }
             };
-            let told = rows.iter().filter(|t| right(t) > TOLD).count();
-            let wrong = rows.iter().filter(|t| right(t) < 1.0 - TOLD).count();
-            format!("{} {told} right, {wrong} wrong", SENSES[sense])
+            let right_ones = rows.iter().filter(|t| right(t) > SURE).count();
+            let wrong = rows.iter().filter(|t| right(t) < 1.0 - SURE).count();
+            format!("{} {right_ones} right, {wrong} wrong", SENSES[sense])
         };
         println!(
             "{} and {} told apart, of {}: {}",

@@ -6,14 +6,14 @@ use bounce_audio::wav::Sound;
 
 use crate::{CONFIDENT, FLAT, LEVEL, Outcome};
 
-fn told(option: &str) -> Option<String> {
-    std::env::args().skip_while(|a| a != option).nth(1)
+fn option(name: &str) -> Option<String> {
+    std::env::args().skip_while(|a| a != name).nth(1)
 }
 
 /// Answers for the file of `--wav`, by each sense that it and `--mass-kg`, `--diameter-m` allow.
 pub(crate) fn print(classifier: &Classifier) -> Outcome<()> {
-    let Some(file) = told("--wav") else { return Ok(()) };
-    let number = |option: &str| -> Outcome<Option<f64>> { Ok(told(option).map(|v| v.parse()).transpose()?) };
+    let Some(file) = option("--wav") else { return Ok(()) };
+    let number = |name: &str| -> Outcome<Option<f64>> { Ok(option(name).map(|v| v.parse()).transpose()?) };
     let given = Given {
         mass_kg: number("--mass-kg")?,
         diameter_m: number("--diameter-m")?,

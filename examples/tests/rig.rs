@@ -15,25 +15,26 @@ fn a_concealed_slip_is_found_and_a_tape_of_the_rig_tells_the_same() {
     let plan = Plan::new(true);
     let mut world = World::new(3).unwrap();
     let mut tape = Vec::new();
-    let told = story(&mut Recorder::new(&mut world, |event| write_event(&event, &mut tape).unwrap()), &plan)
-        .unwrap();
+    let outcome =
+        story(&mut Recorder::new(&mut world, |event| write_event(&event, &mut tape).unwrap()), &plan)
+            .unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let (by_m, [low, high], pose) = recording(&told, folder.path()).unwrap().slip().unwrap();
+    let (by_m, [low, high], pose) = recording(&outcome, folder.path()).unwrap().slip().unwrap();
     let truth = world.truth();
     assert!(
         (by_m - truth.slip_m).abs() < 5e-4 && low < truth.slip_m && truth.slip_m < high,
         "{by_m} {truth:?}"
     );
     // The first pose beyond the tilt at which it slid.
-    let sweep = &told.sweeps[1];
+    let sweep = &outcome.sweeps[1];
     assert!(sweep[pose].angle_rad > truth.slip_tilt_rad && sweep[pose - 1].angle_rad < truth.slip_tilt_rad);
-    let poured = told.volumes_m3[0][0] - told.volumes_m3[1][0];
+    let poured = outcome.volumes_m3[0][0] - outcome.volumes_m3[1][0];
     assert!(
         (poured - (truth.before_m3 - truth.now_m3)).abs() < 1e-6 && (poured - 50e-6).abs() < 3e-6,
         "{poured}"
     );
     let events = read_tape(&tape[..]).unwrap().events;
-    assert_eq!(story(&mut Playback::new(events, 1e-9), &plan).unwrap(), told);
+    assert_eq!(story(&mut Playback::new(events, 1e-9), &plan).unwrap(), outcome);
 }
 
 #[test]

@@ -1,14 +1,5 @@
 //! Order statistics.
 
-/// The median, the upper one of an even number of values; NaN of nothing. The values are put in another order.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// The quantile of a share `q` in [0, 1], interpolated linearly between the values about rank `q (n - 1)` (numpy's default); NaN of
 /// nothing. The values are put in another order.
 pub(crate) fn quantile(values: &mut [f64], q: f64) -> f64 {

@@ -1,7 +1,8 @@
 //! From a depth picture to heights above the ground.
 
+use statrs::statistics::{Data, OrderStatistics as _};
+
 use crate::camera::Camera;
-use crate::order::median;
 
 /// A depth picture as heights above a plane that was fitted to its ground.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,7 +133,7 @@ impl HeightMap {
             return Err(SeeError::Missing { missing, most: MOST_MISSING });
         }
         let some = depths.iter().step_by(one_in(depths.len())).copied().filter(|d| d.is_finite());
-        let middle = median(&mut some.collect::<Vec<_>>());
+        let middle = Data::new(some.collect::<Vec<_>>()).median();
         if !(middle < UNIT_FACTOR * camera.height_m && middle > camera.height_m / UNIT_FACTOR) {
             let (height_m, unit_m) = (camera.height_m, camera.depth_unit_m);
             return Err(SeeError::Unit { depth_m: middle, height_m, unit_m });
@@ -207,8 +208,9 @@ impl Plane {
                 deeper[count] = *r;
                 count += usize::from(*r > 0.0 && *r < MOST_NOISE);
             }
-            self.noise =
-                (1.4826 * median(&mut deeper[..count])).max(0.3 * camera.depth_unit_m).min(MOST_NOISE);
+            self.noise = (1.4826 * Data::new(&mut deeper[..count]).median())
+                .max(0.3 * camera.depth_unit_m)
+                .min(MOST_NOISE);
             let band = 2.5 * self.noise * if guess && round == 0 { 2.0 } else { 1.0 };
             let mut sums = [[0.0; 9]; 2];
             within = 0;
@@ -287,5 +289,5 @@ fn commonest(camera: &Camera, depths: impl Iterator<Item = f64> + Clone) -> f64 
     let middle = (most as f64 + 0.5) * bin;
     // A little wider than the bin: a ground without noise may lie on its very edge.
     let near = depths.filter(|d| (d - middle).abs() <= 0.6 * bin);
-    median(&mut near.collect::<Vec<_>>())
+    Data::new(near.collect::<Vec<_>>()).median()
 }

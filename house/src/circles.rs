@@ -11,7 +11,7 @@ use crate::names::Names;
 
 /// The items for which a file needs another.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Tie<'a> {
+pub struct Edge<'a> {
     /// The file whose code names them.
     pub from: &'a Path,
     /// The file that defines them.
@@ -20,13 +20,13 @@ pub struct Tie<'a> {
     pub items: BTreeSet<String>,
 }
 
-/// Files each of which needs the others, and what ties them.
+/// Files each of which needs the others, and what edges them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Circle<'a> {
     /// The files, sorted.
     pub files: Vec<&'a Path>,
-    /// What ties them, sorted.
-    pub ties: Vec<Tie<'a>>,
+    /// What edges them, sorted.
+    pub edges: Vec<Edge<'a>>,
 }
 
 /// All circles of a target.
@@ -43,9 +43,9 @@ pub fn circles(modules: &[Module]) -> Vec<Circle<'_>> {
         .map(|mut files| {
             files.sort_unstable();
             let within = |(from, to): &(&Path, &Path)| files.contains(from) && files.contains(to);
-            let ties = arrows.iter().filter(|(ends, _)| within(ends));
-            let ties = ties.map(|(&(from, to), items)| Tie { from, to, items: items.clone() }).collect();
-            Circle { files, ties }
+            let edges = arrows.iter().filter(|(ends, _)| within(ends));
+            let edges = edges.map(|(&(from, to), items)| Edge { from, to, items: items.clone() }).collect();
+            Circle { files, edges }
         })
         .collect();
     circles.sort_by(|a, b| a.files.cmp(&b.files));
@@ -74,9 +74,9 @@ impl std::fmt::Display for Circle<'_> {
         let root = crate::root();
         let short = |path: &Path| path.strip_prefix(&root).unwrap_or(path).display().to_string();
         writeln!(f, "{} files import each other:", self.files.len())?;
-        for tie in &self.ties {
-            let items: Vec<&str> = tie.items.iter().map(String::as_str).collect();
-            writeln!(f, "  {} -> {}: {}", short(tie.from), short(tie.to), items.join(", "))?;
+        for edge in &self.edges {
+            let items: Vec<&str> = edge.items.iter().map(String::as_str).collect();
+            writeln!(f, "  {} -> {}: {}", short(edge.from), short(edge.to), items.join(", "))?;
         }
         Ok(())
     }

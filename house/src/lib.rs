@@ -8,7 +8,7 @@ mod names;
 mod sizes;
 mod workspace;
 
-pub use circles::{Circle, Tie, circles};
+pub use circles::{Circle, Edge, circles};
 pub use modules::{Module, modules};
 pub use sizes::{Size, sizes};
 pub use workspace::{Package, metadata, packages, root, sources};

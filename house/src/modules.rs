@@ -90,7 +90,7 @@ impl Reader {
             let module = self.begin(self.modules[parent].file.clone(), Some(parent));
             self.inside(module, below, items);
             module
-        } else if let Some(path) = elsewhere(&item.attrs) {
+        } else if let Some(path) = path_attribute(&item.attrs) {
             let file = self.modules[parent].file.with_file_name(path);
             let beside = file.parent().unwrap_or(&file).to_owned();
             self.file(&file, beside, Some(parent))?
@@ -241,7 +241,7 @@ pub(crate) fn of_tests(attributes: &[syn::Attribute]) -> bool {
 }
 
 /// The file that `#[path = "..."]` names.
-fn elsewhere(attributes: &[syn::Attribute]) -> Option<String> {
+fn path_attribute(attributes: &[syn::Attribute]) -> Option<String> {
     attributes.iter().filter(|a| a.path().is_ident("path")).find_map(|a| match &a.meta {
         syn::Meta::NameValue(syn::MetaNameValue {
             value: syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(path), .. }),

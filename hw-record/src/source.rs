@@ -272,9 +272,9 @@ fn sound_card() -> Result<(Kind, Next), SourceError> {
             Err(error) => return drop(opened.send(Err(error))),
         };
         let (channels, rate_hz) = (card.channels(), card.rate_hz());
-        let told = opened.send(Ok(Kind::Sound { channels: channels as u16, rate_hz: rate_hz as u32 }));
+        let heard = opened.send(Ok(Kind::Sound { channels: channels as u16, rate_hz: rate_hz as u32 }));
         let (mut card, instants) = (card, (BLOCK_S * rate_hz).ceil().max(1.0) as usize);
-        while told.is_ok() {
+        while heard.is_ok() {
             let mut samples = vec![0.0; instants * channels];
             let reading = card.read(&mut samples);
             let passed = reading.map(|t_s| Reading { t_s, contents: Contents::Sound(samples) });

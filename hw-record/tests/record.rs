@@ -69,9 +69,9 @@ fn messages(path: &std::path::Path) -> (BTreeMap<String, usize>, BTreeMap<String
             mcap::records::Record::Channel(channel) => drop(topics.insert(channel.id, channel.topic)),
             mcap::records::Record::Message { header, data } => {
                 let topic: &String = &topics[&header.channel_id];
-                let told: serde_json::Value = serde_json::from_slice(&data).unwrap();
+                let message: serde_json::Value = serde_json::from_slice(&data).unwrap();
                 *counts.entry(topic.clone()).or_insert(0) += 1;
-                last.insert(topic.clone(), told["t_s"].as_f64().unwrap());
+                last.insert(topic.clone(), message["t_s"].as_f64().unwrap());
             }
             _ => {}
         }

@@ -17,15 +17,15 @@ const EVERY: Duration = Duration::from_millis(50);
 
 /// Hands progress on, and stops where it is told to.
 struct Relay<'a> {
-    told: Mutex<Sender<(String, f64)>>,
+    stages: Mutex<Sender<(String, f64)>>,
     stop: &'a AtomicBool,
 }
 
 impl Observer for Relay<'_> {
     fn progress(&self, progress: Progress<'_>) -> bool {
-        let told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         // Nobody listens any more where the work was stopped.
-        let _ = told.send((progress.stage.to_owned(), progress.done));
+        let _ = stages.send((progress.stage.to_owned(), progress.done));
         !self.stop.load(Ordering::Relaxed)
     }
 }
@@ -47,8 +47,8 @@ pub(crate) fn watched<T: Send>(
         .build()
         .map_err(|error| Failed::new("DiagnosisError", format!("no pool of {threads} threads: {error}")))?;
     let stop = &AtomicBool::new(false);
-    let (told, heard) = channel();
-    let relay = Relay { told: Mutex::new(told), stop };
+    let (stages, heard) = channel();
+    let relay = Relay { stages: Mutex::new(stages), stop };
     let (done, raised) = py.detach(move || {
         std::thread::scope(move |scope| {
             let worker = scope.spawn(move || pool.install(|| work(&relay)));
@@ -61,13 +61,13 @@ pub(crate) fn watched<T: Send>(
                 if raised.is_some() {
                     continue;
                 }
-                let told = Python::attach(|py| {
+                let listened = Python::attach(|py| {
                     if let (Ok((stage, done)), Some(progress)) = (&news, progress) {
                         progress.call1(py, (stage, done))?;
                     }
                     py.check_signals()
                 });
-                if let Err(error) = told {
+                if let Err(error) = listened {
                     raised = Some(error);
                     stop.store(true, Ordering::Relaxed);
                     if let Some(simulator) = simulator {

@@ -8,7 +8,6 @@ pub mod grasp;
 pub mod image;
 pub mod load;
 pub mod markers;
-mod median;
 pub mod modulus;
 mod regression;
 pub mod shear;

@@ -7,9 +7,9 @@
 
 use hw_traits::picture::Picture;
 use nalgebra::{Matrix2, SymmetricEigen};
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use crate::image::{ImageError, ImageSettings, Regions, regions};
-use crate::median::median;
 
 /// Why there are no markers.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -68,13 +68,14 @@ pub fn find(picture: &Picture<u8>, settings: &MarkerSettings) -> Result<Vec<Mark
     let members = members(&regions);
     let (least, most) = (settings.least_area_px, settings.most_area_px);
     let sized: Vec<&Vec<usize>> = members.iter().filter(|m| (least..=most).contains(&m.len())).collect();
-    let mut areas: Vec<usize> = sized.iter().map(|m| m.len()).collect();
-    let Some(typical) = median(&mut areas, usize::cmp) else {
+    if sized.is_empty() {
         return Err(MarkerError::NoMarkers { regions: regions.count, least, most });
-    };
+    }
+    let areas: Vec<f64> = sized.iter().map(|m| m.len() as f64).collect();
+    let typical = Data::new(areas).median();
     let mut found = Vec::with_capacity(sized.len());
     for pixels in sized {
-        let parts = parts(pixels, regions.width, typical as f64, settings.merged);
+        let parts = parts(pixels, regions.width, typical, settings.merged);
         if parts > 1 {
             found.extend(take_apart(pixels, regions.width, parts));
         } else {

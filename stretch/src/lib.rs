@@ -8,7 +8,6 @@ pub mod curvature;
 pub mod fake;
 pub mod force;
 pub mod measured;
-mod median;
 pub mod membrane;
 pub mod modulus;
 pub mod palpate;

@@ -10,7 +10,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::cloud::Cloud;
 use crate::curvature::Curvature;
-use crate::median::median;
 
 /// State of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -157,8 +156,11 @@ impl Segmenter {
         let at = |k: usize| settings.rule.signal(self.curvature.i[k], self.curvature.j[k]);
         self.signals.clear();
         self.signals.extend((0..self.states.len()).filter(|k| self.states[*k] == State::Contact).map(at));
-        let Some(middle) = median(&mut self.signals, f32::total_cmp) else { return };
-        let half = 0.5 * middle;
+        if self.signals.is_empty() {
+            return;
+        }
+        let middle = self.signals.len() / 2;
+        let half = 0.5 * *self.signals.select_nth_unstable_by(middle, f32::total_cmp).1;
         for (state, (i, j)) in self.states.iter_mut().zip(self.curvature.i.iter().zip(&self.curvature.j)) {
             if *state == State::Contact && settings.rule.signal(*i, *j) < half {
                 *state = State::Deformed;

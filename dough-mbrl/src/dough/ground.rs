@@ -1,6 +1,7 @@
 //! The ground: the level plane on which most points lie.
 
 use nalgebra::{Matrix3, Vector3};
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use super::error::DoughError;
 
@@ -33,11 +34,6 @@ impl Plane {
     pub fn above(&self, p: &[f64; 3]) -> f64 {
         p[2] - self.level([p[0], p[1]])
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { f64::NAN } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// Finds the ground in a cloud: the densest level, then a plane by least squares on ever fewer, closer points.
@@ -78,7 +74,7 @@ pub(super) fn find(cloud: &[[f64; 3]]) -> Result<Plane, DoughError> {
         }
         off.clear();
         off.extend(sample.iter().map(|p| plane.above(p).abs()).filter(|v| *v <= band));
-        plane.scatter_m = 1.4826 * median(&mut off);
+        plane.scatter_m = 1.4826 * Data::new(&mut off[..]).median();
         band = (4.0 * plane.scatter_m).clamp(5e-4, FIRST_BAND_M);
     }
     let share = off.len() as f64 / n as f64;

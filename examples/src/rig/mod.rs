@@ -7,7 +7,7 @@ mod world;
 use std::error::Error;
 
 pub use devices::{Addresses, Devices, Loopback};
-pub use story::{Diagnosed, Plan, Told, recording, story};
+pub use story::{Diagnosed, Plan, Story, recording, story};
 pub use world::{Truth, World};
 
 /// What goes wrong is said, whatever it is.

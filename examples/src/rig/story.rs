@@ -65,7 +65,7 @@ impl Plan {
 
 /// What was felt.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct Story {
     /// The sweeps before and after the pour.
     pub sweeps: [Vec<FeltPose>; 2],
     /// Volumes felt before and after, with their standard errors, m^3.
@@ -78,7 +78,7 @@ pub struct Told {
 ///
 /// # Errors
 /// The rig's, in words, and of a pour that cannot be.
-pub fn story<R: Rotary + ForceTorque + Clock>(rig: &mut R, plan: &Plan) -> Outcome<Told> {
+pub fn story<R: Rotary + ForceTorque + Clock>(rig: &mut R, plan: &Plan) -> Outcome<Story> {
     let steps = i32::from(plan.steps);
     // Up and down again: what stays is told from what grows with time.
     let tilt = |k: i32| STEEPEST_RAD * (1.0 - f64::from((k - steps).abs()) / f64::from(steps));
@@ -97,7 +97,7 @@ pub fn story<R: Rotary + ForceTorque + Clock>(rig: &mut R, plan: &Plan) -> Outco
     feel(&plan.programme(vec![pour_rad, 0.0]))?;
     let second = feel(&sweep)?;
     let after = volume(&second)?;
-    Ok(Told { sweeps: [first, second], volumes_m3: [before, after], pour_rad })
+    Ok(Story { sweeps: [first, second], volumes_m3: [before, after], pour_rad })
 }
 
 fn settled(felt: &FeltPose) -> SettledPose {
@@ -119,7 +119,7 @@ fn volume(felt: &[FeltPose]) -> Outcome<[f64; 2]> {
 ///
 /// # Errors
 /// Those of files.
-pub fn recording(told: &Told, folder: &Path) -> Outcome<Diagnosed> {
+pub fn recording(story: &Story, folder: &Path) -> Outcome<Diagnosed> {
     let header = format!(
         "format = 1\ndomain = \"liquid-tilt\"\ndata = \"data.csv\"\n\n[rig]\n\
          container = {{ shape = \"cylinder\", radius_m = {RADIUS_M}, length_m = {LENGTH_M} }}\n\
@@ -128,7 +128,7 @@ pub fn recording(told: &Told, folder: &Path) -> Outcome<Diagnosed> {
         GRASP_M - WALL_M
     );
     let mut rows = String::from("run,theta_rad,fx_n,fy_n,tau_z_nm\n");
-    for (run, sweep) in ["before", "after"].iter().zip(&told.sweeps) {
+    for (run, sweep) in ["before", "after"].iter().zip(&story.sweeps) {
         for pose in sweep.iter().map(settled) {
             let PlanarWrench { fx_n, fy_n, tau_z_nm } = pose.wrench;
             writeln!(rows, "{run},{:.6},{fx_n:.5},{fy_n:.5},{tau_z_nm:.6}", pose.tilt_rad.clamp(0.0, PI))?;
@@ -139,7 +139,7 @@ pub fn recording(told: &Told, folder: &Path) -> Outcome<Diagnosed> {
     let (_, loaded) = missing_physics_domains::load(folder).map_err(|e| e.to_string())?;
     let options = Options { seed: 1, replicates: 499, ..Options::default() };
     let answer = diagnose(&*loaded.model, &loaded.recording, &[], &options, &Silent)?;
-    Ok(Diagnosed { answer, poses: told.sweeps[0].len() })
+    Ok(Diagnosed { answer, poses: story.sweeps[0].len() })
 }
 
 /// What the tool says of it.

@@ -103,7 +103,7 @@ fn row(columns: &[String], t_s: f64, numbers: &[f64]) -> String {
 }
 
 fn message(kind: &Kind, log_ns: u64, reading: &Reading) -> std::io::Result<String> {
-    let mut told = Map::from_iter([("t_s".to_owned(), json!(reading.t_s))]);
+    let mut message = Map::from_iter([("t_s".to_owned(), json!(reading.t_s))]);
     let date = json!({"sec": log_ns / 1_000_000_000, "nsec": log_ns % 1_000_000_000});
     let more = match (&reading.contents, kind) {
         (Contents::Numbers(numbers), Kind::Numbers(columns)) => {
@@ -124,9 +124,9 @@ fn message(kind: &Kind, log_ns: u64, reading: &Reading) -> std::io::Result<Strin
         _ => return Err(std::io::Error::other("a reading of another kind than its source's")),
     };
     if let Value::Object(more) = more {
-        told.extend(more);
+        message.extend(more);
     }
-    Ok(Value::Object(told).to_string())
+    Ok(Value::Object(message).to_string())
 }
 
 impl Store for Bag {

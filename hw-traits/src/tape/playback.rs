@@ -109,11 +109,11 @@ impl Playback {
     }
 
     fn microphones(&self) -> (usize, f64) {
-        let told = |fact: &Fact| match fact {
+        let wanted = |fact: &Fact| match fact {
             Fact::Microphones(channels, rate_hz) => Some((*channels, *rate_hz)),
             _ => None,
         };
-        self.facts.iter().find_map(told).unwrap_or((1, 1.0))
+        self.facts.iter().find_map(wanted).unwrap_or((1, 1.0))
     }
 }
 
@@ -150,11 +150,11 @@ impl ForceTorque for Playback {
 impl Rotary for Playback {
     /// Of a recording that has none, everything.
     fn limits_rad(&self) -> (f64, f64) {
-        let told = |fact: &Fact| match fact {
+        let wanted = |fact: &Fact| match fact {
             Fact::LimitsRad(low, high) => Some((*low, *high)),
             _ => None,
         };
-        self.facts.iter().find_map(told).unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+        self.facts.iter().find_map(wanted).unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
     }
 
     fn turn_to(&mut self, angle_rad: f64, rate_rad_s: f64) -> Result<(), ErrorKind> {
@@ -173,11 +173,11 @@ impl Rotary for Playback {
 impl Gripper for Playback {
     /// Of a recording that has none, everything.
     fn limits_m(&self) -> (f64, f64) {
-        let told = |fact: &Fact| match fact {
+        let wanted = |fact: &Fact| match fact {
             Fact::LimitsM(low, high) => Some((*low, *high)),
             _ => None,
         };
-        self.facts.iter().find_map(told).unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+        self.facts.iter().find_map(wanted).unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
     }
 
     fn open_to(&mut self, width_m: f64, speed_m_s: f64) -> Result<(), ErrorKind> {
@@ -228,11 +228,11 @@ impl Camera for Playback {
 impl DepthCamera for Playback {
     /// Of a recording that has none, a pinhole of no size.
     fn intrinsics(&self) -> Intrinsics {
-        let told = |fact: &Fact| match fact {
+        let wanted = |fact: &Fact| match fact {
             Fact::Intrinsics(intrinsics) => Some(*intrinsics),
             _ => None,
         };
-        self.facts.iter().find_map(told).unwrap_or(Intrinsics { fx: 0.0, fy: 0.0, cx: 0.0, cy: 0.0 })
+        self.facts.iter().find_map(wanted).unwrap_or(Intrinsics { fx: 0.0, fy: 0.0, cx: 0.0, cy: 0.0 })
     }
 
     fn depth_m(&mut self) -> Result<Stamped<Picture<f32>>, ErrorKind> {
@@ -243,11 +243,11 @@ impl DepthCamera for Playback {
 impl Motor for Playback {
     /// Of a recording that has none, none.
     fn limit_nm(&self) -> f64 {
-        let told = |fact: &Fact| match fact {
+        let wanted = |fact: &Fact| match fact {
             Fact::LimitNm(limit_nm) => Some(*limit_nm),
             _ => None,
         };
-        self.facts.iter().find_map(told).unwrap_or(f64::INFINITY)
+        self.facts.iter().find_map(wanted).unwrap_or(f64::INFINITY)
     }
 
     fn drive(&mut self, torque_nm: f64) -> Result<(), ErrorKind> {

@@ -13,21 +13,21 @@ use crate::{Error, ErrorType};
 
 /// A device, and one who is told of everything that passes.
 ///
-/// It has each trait that the device has. Facts are told once, when the recorder is asked for the first reading or command.
+/// It has each trait that the device has. Facts are recorded once, when the recorder is asked for the first reading or command.
 #[derive(Debug, Clone)]
 pub struct Recorder<D, S> {
     device: D,
     sink: S,
-    told: [bool; 5],
+    recorded: [bool; 5],
 }
 
 impl<D, S: FnMut(Event)> Recorder<D, S> {
     /// Tells `sink` of all that passes to and from `device`.
     pub fn new(device: D, sink: S) -> Self {
-        Self { device, sink, told: [false; 5] }
+        Self { device, sink, recorded: [false; 5] }
     }
 
-    /// The device, and who was told.
+    /// The device, and the sink.
     pub fn into_parts(self) -> (D, S) {
         (self.device, self.sink)
     }
@@ -40,7 +40,7 @@ impl<D, S: FnMut(Event)> Recorder<D, S> {
             Fact::Intrinsics(_) => 3,
             Fact::LimitNm(_) => 4,
         };
-        if !std::mem::replace(&mut self.told[number], true) {
+        if !std::mem::replace(&mut self.recorded[number], true) {
             (self.sink)(Event::Fact(fact));
         }
     }

@@ -236,29 +236,32 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
         }
         Command::Watch { folder, reference, alpha, settle, end_after, pipe, allow_command } => {
             permit(&folder, allow_command)?;
-            let kept = if pipe {
-                format!("rows that came are kept in {}", folder.join("data.csv").display())
-            } else {
-                "nothing was written".into()
-            };
-            on_interrupt(kept);
             let options = Options::with_alpha(alpha);
             let arguments =
                 WatchArguments { folder, reference, options, settle_s: settle, end_after_s: end_after, pipe };
-            let quiet = loudness == Loudness::Quiet;
-            commands::watch(&arguments, &mut |line| {
-                if !quiet {
-                    let mut out = std::io::stdout().lock();
-                    // A reader that has gone away misses what is said, no more.
-                    let _ = writeln!(out, "{}", shown(line, std::io::stdout().is_terminal()));
-                }
-            })?;
+            watch(&arguments, loudness)?;
             Ok(Said::default())
         }
         Command::Domains => Ok(commands::domains().into()),
         Command::Check { folder } => Ok(commands::check(&folder)?.into()),
         Command::New { domain, folder } => Ok(commands::new(&domain, &folder)?.into()),
     }
+}
+
+/// Prints what changes in a recording that grows.
+fn watch(arguments: &WatchArguments, loudness: Loudness) -> Result<(), CommandError> {
+    on_interrupt(if arguments.pipe {
+        format!("rows that came are kept in {}", arguments.folder.join("data.csv").display())
+    } else {
+        "nothing was written".into()
+    });
+    commands::watch(arguments, &mut |line| {
+        if loudness != Loudness::Quiet {
+            let mut out = std::io::stdout().lock();
+            // A reader that has gone away misses what is said, no more.
+            let _ = writeln!(out, "{}", shown(line, std::io::stdout().is_terminal()));
+        }
+    })
 }
 
 /// Asks, on a terminal, whether the program that a recording names may be started.

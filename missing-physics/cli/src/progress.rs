@@ -79,13 +79,13 @@ impl Steps {
 fn said_now_and_then(state: &Arc<Mutex<State>>, begin: Instant) -> (Sender<()>, JoinHandle<()>) {
     let (end, ended) = channel();
     let state = Arc::clone(state);
-    let told = std::thread::spawn(move || {
+    let speaker = std::thread::spawn(move || {
         while ended.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
             let said = state.lock().unwrap_or_else(PoisonError::into_inner).said();
             line(&format!("{:.0} s so far, {said}", begin.elapsed().as_secs_f64()));
         }
     });
-    (end, told)
+    (end, speaker)
 }
 
 /// How far a step is that began `spent` seconds ago, and what of it is expected to remain; nothing where its share is not known.
@@ -133,10 +133,10 @@ impl Drop for Steps {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
-        if let Some((end, told)) = self.lines.take() {
+        if let Some((end, speaker)) = self.lines.take() {
             drop(end);
             // It says lines and nothing else: there is nothing to hear from it.
-            let _ = told.join();
+            let _ = speaker.join();
         }
         if self.loudness == Loudness::Verbose {
             Self::end_of_step(&self.state.lock().unwrap_or_else(PoisonError::into_inner));

@@ -1,11 +1,8 @@
 //! Order statistics.
 
-/// The median; `None` of nothing. Sorts its argument.
+use statrs::statistics::{Data, OrderStatistics as _};
+
+/// The median; `None` of nothing. The values are put in another order.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    Some(if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) })
+    (!values.is_empty()).then(|| Data::new(values).median())
 }

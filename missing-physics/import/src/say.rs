@@ -117,12 +117,12 @@ impl Story<'_> {
 pub(crate) fn columns(tables: &[Table], choices: &[Choice]) -> String {
     let part = part_of(choices, tables);
     let mut text = String::new();
-    let mut told: Vec<(&Option<String>, Vec<&str>)> = Vec::new();
+    let mut listed: Vec<(&Option<String>, Vec<&str>)> = Vec::new();
     for table in tables {
         let file = one_line(&table.file.display().to_string());
         let part_name = table.part.as_ref().map(|p| format!(", {}", one_line(p))).unwrap_or_default();
         let titles: Vec<&str> = table.columns.iter().map(|c| c.title.as_str()).collect();
-        let again = told.iter().any(|(of, known)| **of == table.part && *known == titles);
+        let again = listed.iter().any(|(of, known)| **of == table.part && *known == titles);
         let _ = writeln!(
             text,
             "{file}{part_name}: {} rows{}",
@@ -162,7 +162,7 @@ pub(crate) fn columns(tables: &[Table], choices: &[Choice]) -> String {
         if table.columns.len() > MOST_SHOWN {
             let _ = writeln!(text, "  and {} more", table.columns.len() - MOST_SHOWN);
         }
-        told.push((&table.part, titles));
+        listed.push((&table.part, titles));
     }
     text
 }

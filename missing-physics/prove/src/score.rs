@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
+use statrs::statistics::{Data, OrderStatistics as _};
 use worlds::concealed::Hidden;
 
 use super::place;
@@ -176,11 +177,11 @@ impl DomainScore {
 
     fn add_listed(&mut self, w: &Judged, doubted: bool) {
         let o = &w.outcome;
-        let plain = |ids: &[String]| sorted(ids, &w.key.beside);
-        let truth = plain(&w.key.mechanisms);
-        let chosen = plain(&o.chosen);
+        let without_nuisances = |ids: &[String]| sorted(ids, &w.key.beside);
+        let truth = without_nuisances(&w.key.mechanisms);
+        let chosen = without_nuisances(&o.chosen);
         let answered = !o.chosen.is_empty();
-        let holds = chosen == truth || o.confused_with.iter().any(|set| plain(set) == truth);
+        let holds = chosen == truth || o.confused_with.iter().any(|set| without_nuisances(set) == truth);
         let wrong = answered && !holds && !chosen.iter().all(|m| truth.contains(m));
         self.detected.add(doubted);
         self.wrong_of_all.add(wrong);
@@ -238,8 +239,8 @@ impl DomainScore {
 
     fn finish(&mut self) {
         self.set_size = self.sizes.iter().sum::<f64>() / self.sizes.len() as f64;
-        self.heldout_ratio = median(&mut self.ratios);
-        self.seconds = median(&mut self.times);
+        self.heldout_ratio = Data::new(&mut self.ratios[..]).median();
+        self.seconds = Data::new(&mut self.times[..]).median();
         let mut merged: Vec<(f64, Part, Part)> = Vec::new();
         for (middle, tool, test) in std::mem::take(&mut self.power) {
             match merged.last_mut().filter(|last| last.1.of == 0) {
@@ -277,9 +278,4 @@ fn sorted(ids: &[String], but: &[String]) -> Vec<String> {
     let mut ids: Vec<String> = ids.iter().filter(|id| !but.contains(id)).cloned().collect();
     ids.sort();
     ids
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }

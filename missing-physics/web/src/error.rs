@@ -8,7 +8,7 @@ use missing_physics_import::ImportError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WebError {
     /// The recording cannot be read.
-    #[error("{0}{hint}", hint = elsewhere(.0))]
+    #[error("{0}{hint}", hint = other_domain(.0))]
     Read(#[from] ReadError),
     /// The recording cannot be diagnosed.
     #[error(transparent)]
@@ -22,7 +22,7 @@ pub enum WebError {
 }
 
 /// What a recording of another domain needs.
-fn elsewhere(error: &ReadError) -> &'static str {
+fn other_domain(error: &ReadError) -> &'static str {
     match error {
         ReadError::Value { key, .. } if key == "domain" => "; other domains are diagnosed by the command",
         _ => "",

@@ -34,9 +34,9 @@ impl Files {
     }
 }
 
-struct Told;
+struct Listener;
 
-impl Observer for Told {
+impl Observer for Listener {
     fn progress(&self, progress: Progress<'_>) -> bool {
         progressed(progress.stage, progress.done);
         true
@@ -92,5 +92,5 @@ pub fn check(name: &str, files: &Files) -> Result<String, String> {
 /// One line.
 #[wasm_bindgen]
 pub fn diagnose(wish: &str, files: &Files) -> Result<String, String> {
-    crate::diagnose(&asked(wish)?, &files.0, &Told).map_err(|e| e.to_string()).and_then(|a| written(&a))
+    crate::diagnose(&asked(wish)?, &files.0, &Listener).map_err(|e| e.to_string()).and_then(|a| written(&a))
 }

@@ -1,11 +1,11 @@
 //! Many markers at once, through losses and meetings.
 
 use hw_traits::picture::Picture;
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use super::pyramid::Pyramid;
 use super::step::LucasKanade;
 use crate::markers::{Marker, MarkerError, MarkerSettings, find};
-use crate::median::median;
 
 /// Why a picture could not be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -121,8 +121,8 @@ impl Tracker {
     /// [`TrackError::Marker`], [`TrackError::Lost`].
     pub fn new(picture: &Picture<u8>, settings: TrackerSettings) -> Result<Self, TrackError> {
         let markers = find(picture, &settings.markers)?;
-        let mut areas: Vec<f64> = markers.iter().map(|m| m.area_px).collect();
-        let area_px = median(&mut areas, f64::total_cmp).unwrap_or(f64::NAN);
+        let areas: Vec<f64> = markers.iter().map(|m| m.area_px).collect();
+        let area_px = Data::new(areas).median();
         let radius_px = (area_px / std::f64::consts::PI).sqrt();
         let half = settings.half_px.unwrap_or((1.4 * radius_px).ceil() as usize + 2);
         let mut before = Pyramid::default();

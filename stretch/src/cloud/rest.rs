@@ -2,9 +2,9 @@
 
 use hw_traits::picture::{Intrinsics, Picture};
 use nalgebra::{Matrix3, Vector3};
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use super::error::{CloudError, check};
-use crate::median::median;
 
 /// The membrane's plane at rest: `1/z = a + b u + c v` at column u and row v.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,14 +115,14 @@ impl Rest {
         };
         let (seen, total) = (rows().count(), window.rows * window.columns);
         let blind = CloudError::Blind { seen, total };
-        if 2 * seen < total {
+        if 2 * seen < total || seen == 0 {
             return Err(blind);
         }
-        let mut values: Vec<f64> = rows().map(|r| r.1).collect();
-        let mut plane = Vector3::new(median(&mut values, f64::total_cmp).ok_or(blind)?, 0.0, 0.0);
+        let values: Vec<f64> = rows().map(|r| r.1).collect();
+        let mut plane = Vector3::new(Data::new(values).median(), 0.0, 0.0);
         for _ in 0..12 {
-            let mut off: Vec<f64> = rows().map(|(x, y)| (y - plane.dot(&x)).abs()).collect();
-            let scale = 1.4826 * median(&mut off, f64::total_cmp).ok_or(blind)?;
+            let off: Vec<f64> = rows().map(|(x, y)| (y - plane.dot(&x)).abs()).collect();
+            let scale = 1.4826 * Data::new(off).median();
             let cut = 4.685 * scale.max(1e-6 * plane[0].abs());
             let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
             for (x, y) in rows() {

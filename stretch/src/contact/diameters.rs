@@ -1,11 +1,11 @@
 //! Diameters of a flat round face.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use super::{ContactError, spread};
 use crate::cloud::Cloud;
 use crate::measured::MeasuredLength;
-use crate::median::median;
 use crate::segment::State;
 
 /// Diameters of a flat round face.
@@ -55,7 +55,7 @@ pub fn diameters(cloud: &Cloud, states: &[State]) -> Result<Diameters, ContactEr
     if core.len() < 10 {
         return Err(ContactError::TooFew { expected: 10, got: core.len() });
     }
-    let height_m = median(&mut core, f64::total_cmp).unwrap_or(f64::NAN);
+    let height_m = Data::new(&mut core[..]).median();
     let off: Vec<f64> = core.iter().map(|h| h - height_m).collect();
     let noise = spread(&off).max(1e-6);
     // Metres a pixel on the face.

@@ -5,9 +5,9 @@ mod diameters;
 pub use diameters::{Diameters, diameters};
 
 use nalgebra::{Matrix4, SMatrix, SVector, Vector3, Vector4};
+use statrs::statistics::{Data, OrderStatistics as _};
 
 use crate::cloud::Cloud;
-use crate::median::median;
 use crate::segment::State;
 
 /// Why there is no geometry.
@@ -190,8 +190,8 @@ fn finite(points: &[[f64; 3]], expected: usize) -> Result<Vec<Vector3<f64>>, Con
 
 /// Robust standard deviation of residuals, from the median of their absolute values; NaN of nothing.
 fn spread(off: &[f64]) -> f64 {
-    let mut off: Vec<f64> = off.iter().map(|x| x.abs()).collect();
-    1.4826 * median(&mut off, f64::total_cmp).unwrap_or(f64::NAN)
+    let off: Vec<f64> = off.iter().map(|x| x.abs()).collect();
+    1.4826 * Data::new(off).median()
 }
 
 /// Points of a cloud that touch, m, in the camera's frame; not averaged, which would round off what they show.

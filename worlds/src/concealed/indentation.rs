@@ -81,12 +81,12 @@ impl Rig for Press {
 
     /// The changes of the readings that the moduli can make.
     fn nuisances(&self) -> Nuisances {
-        let plain = self.whitened(Effects::default(), &self.world.moduli_pa);
+        let baseline = self.whitened(Effects::default(), &self.world.moduli_pa);
         let mut nuisances = Nuisances::default();
         for condition in 0..self.world.moduli_pa.len() {
             let mut moduli_pa = self.world.moduli_pa.clone();
             moduli_pa[condition] *= 1.01;
-            nuisances.add(&difference(&plain, &self.whitened(Effects::default(), &moduli_pa)));
+            nuisances.add(&difference(&baseline, &self.whitened(Effects::default(), &moduli_pa)));
         }
         nuisances
     }

@@ -55,7 +55,7 @@ impl Rig for Container {
 
     /// The changes of the readings that mass and volume of each run can make, as far as they are not stated.
     fn nuisances(&self) -> Nuisances {
-        let plain = self.whitened(&self.world);
+        let baseline = self.whitened(&self.world);
         let mut nuisances = Nuisances::default();
         for run in 0..self.world.sweeps.len() {
             for part in [0, 1] {
@@ -70,7 +70,7 @@ impl Rig for Container {
                     }
                     _ => continue,
                 }
-                nuisances.add(&difference(&plain, &self.whitened(&moved)));
+                nuisances.add(&difference(&baseline, &self.whitened(&moved)));
             }
         }
         nuisances

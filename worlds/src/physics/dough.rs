@@ -323,15 +323,15 @@ mod tests {
 
     #[test]
     fn every_effect_does_what_it_says() {
-        let plain = lengths(Effects::default());
+        let baseline = lengths(Effects::default());
         let none = Effects::default();
-        assert!(lengths(Effects { response: 0.3, ..none })[39] > plain[39] * 1.03);
+        assert!(lengths(Effects { response: 0.3, ..none })[39] > baseline[39] * 1.03);
         for m in &world(Effects { response: -0.5, ..none }).rolled()[0] {
             let strain = |to: &[f64; 3]| (to[0] / m.before[0]).ln();
             approx::assert_relative_eq!(strain(&m.after), 0.5 * strain(&m.unchanged), max_relative = 1e-9);
         }
-        assert!(lengths(Effects { drying_per_s: 2e-3, ..none })[39] < plain[39] * 0.99);
-        assert!(lengths(Effects { softening_per_roll: 0.02, ..none })[39] < plain[39] * 0.99);
+        assert!(lengths(Effects { drying_per_s: 2e-3, ..none })[39] < baseline[39] * 0.99);
+        assert!(lengths(Effects { softening_per_roll: 0.02, ..none })[39] < baseline[39] * 0.99);
         let stuck = world(Effects { slip_n: 1e3, ..none }).rolled();
         assert!(stuck[0].iter().all(|m| m.after == m.before));
         let springs = &world(Effects { springback: 0.25, ..none }).rolled()[0];

@@ -382,8 +382,8 @@ mod tests {
 
     #[test]
     fn the_other_terms_are_what_they_say() {
-        let plain = world(Indenter::Sphere(0.01), Effects::default()).readings();
-        let with = |e: Effects| world(Indenter::Sphere(0.01), e).readings()[40] - plain[40];
+        let baseline = world(Indenter::Sphere(0.01), Effects::default()).readings();
+        let with = |e: Effects| world(Indenter::Sphere(0.01), e).readings()[40] - baseline[40];
         let none = Effects::default();
         approx::assert_relative_eq!(with(Effects { tension_n_m: 5.0, ..none }), 0.02, max_relative = 1e-9);
         approx::assert_relative_eq!(
@@ -395,13 +395,13 @@ mod tests {
         approx::assert_relative_eq!(with(Effects { rim, ..none }), 0.04, max_relative = 1e-9);
         approx::assert_relative_eq!(
             with(Effects { stiffening: 0.5, ..none }),
-            0.2 * plain[40],
+            0.2 * baseline[40],
             max_relative = 1e-9
         );
-        let compliant = plain[40] + with(Effects { compliance_m_n: 1e-4, ..none });
+        let compliant = baseline[40] + with(Effects { compliance_m_n: 1e-4, ..none });
         let there = Indenter::Sphere(0.01).force_n(2e4 / 0.75, 4e-3 - 1e-4 * compliant);
         approx::assert_relative_eq!(compliant, there, max_relative = 1e-9);
         assert!(with(Effects { contact_offset_m: 2e-4, ..none }) < 0.0);
-        assert!(with(Effects { thickness_m: 0.03, ..none }) > 0.2 * plain[40]);
+        assert!(with(Effects { thickness_m: 0.03, ..none }) > 0.2 * baseline[40]);
     }
 }

@@ -359,15 +359,15 @@ impl Machine {
     }
 
     /// Where to begin fitting a mechanism with these parameters.
-    pub(super) fn starts(&self, own: &[usize]) -> Vec<Vec<(usize, f64)>> {
-        let first = own.first().and_then(|first| self.parts.iter().find(|p| p.index == *first));
+    pub(super) fn starts(&self, parameters: &[usize]) -> Vec<Vec<(usize, f64)>> {
+        let first = parameters.first().and_then(|first| self.parts.iter().find(|p| p.index == *first));
         match first.map(|part| part.role) {
             Some(Role::Joint(joint, effect)) => {
                 let sizes = &self.joints[joint];
-                mechanics::joint_starts(effect, own, sizes, sizes.least_yield(self.step_s))
+                mechanics::joint_starts(effect, parameters, sizes, sizes.least_yield(self.step_s))
             }
             Some(Role::Input(input, effect)) => {
-                mechanics::input_starts(effect, own, self.inputs[input].range, self.step_s)
+                mechanics::input_starts(effect, parameters, self.inputs[input].range, self.step_s)
             }
             None => Vec::new(),
         }
@@ -449,8 +449,8 @@ mod tests {
     /// What acts where these parameters of a mechanism have these values.
     fn values(machine: &Machine, spec: &Spec, mechanism: &str, set: &[f64]) -> Vec<f64> {
         let mut shared = spec.starts(Scope::Shared);
-        let own = &spec.mechanisms.iter().find(|m| m.id == mechanism).unwrap().parameters;
-        for (index, value) in own.iter().zip(set) {
+        let parameters = &spec.mechanisms.iter().find(|m| m.id == mechanism).unwrap().parameters;
+        for (index, value) in parameters.iter().zip(set) {
             shared[*index] = *value;
         }
         machine.values(&shared).collect()

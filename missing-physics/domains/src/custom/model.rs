@@ -305,10 +305,10 @@ impl Model for CustomModel {
 
 impl MultimodalModel for CustomModel {
     fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        let own = &self.spec.mechanisms[mechanism].parameters;
-        let mut starts = self.sensors.starts(own);
+        let parameters = &self.spec.mechanisms[mechanism].parameters;
+        let mut starts = self.sensors.starts(parameters);
         if let Simulation::Program(program) = &self.simulation {
-            starts.extend(program.machine.starts(own));
+            starts.extend(program.machine.starts(parameters));
         }
         starts
     }

@@ -443,8 +443,8 @@ mod tests {
             });
         }
         for _ in 0..16 {
-            let told = all.recv_timeout(Duration::from_secs(20)).unwrap();
-            assert!(matches!(told, Err(Failure::Fatal(_))));
+            let answer = all.recv_timeout(Duration::from_secs(20)).unwrap();
+            assert!(matches!(answer, Err(Failure::Fatal(_))));
         }
     }
 }

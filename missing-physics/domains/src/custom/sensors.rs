@@ -97,11 +97,11 @@ impl Sensors {
     }
 
     /// Where to begin fitting a mechanism of these parameters, by their indices.
-    pub(super) fn starts(&self, own: &[usize]) -> Vec<Vec<(usize, f64)>> {
-        let part = own.first().and_then(|first| self.parts.iter().find(|p| p.index == *first));
+    pub(super) fn starts(&self, parameters: &[usize]) -> Vec<Vec<(usize, f64)>> {
+        let part = parameters.first().and_then(|first| self.parts.iter().find(|p| p.index == *first));
         match part.map(|part| part.role) {
             Some(Role::Output(c, effect)) => {
-                mechanics::output_starts(effect, own, self.ranges[c], self.step_s)
+                mechanics::output_starts(effect, parameters, self.ranges[c], self.step_s)
             }
             _ => Vec::new(),
         }

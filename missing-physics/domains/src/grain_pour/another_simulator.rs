@@ -224,17 +224,17 @@ fn what_a_recording_does_not_say() {
             height_m: drawn.height_m,
             ..baseline
         };
-        let plain = pictures(&rig, &rig.scene(&conditions));
+        let baseline = pictures(&rig, &rig.scene(&conditions));
         let sigma = |k: usize| {
-            let square = plain.iter().map(|s| (s[k] - mean(&plain, k)).powi(2)).sum::<f64>();
-            (square / (plain.len() - 1) as f64).sqrt().max(1e-9)
+            let square = baseline.iter().map(|s| (s[k] - mean(&baseline, k)).powi(2)).sum::<f64>();
+            (square / (baseline.len() - 1) as f64).sqrt().max(1e-9)
         };
         for (moved, (_, change)) in moved.iter_mut().zip(unsaid()) {
             let mut scene = rig.scene(&conditions);
             change(&mut scene);
             let other = pictures(&rig, &scene);
             moved.push(std::array::from_fn::<f64, COUNT, _>(|k| {
-                (mean(&other, k) - mean(&plain, k)) / sigma(k)
+                (mean(&other, k) - mean(&baseline, k)) / sigma(k)
             }));
         }
     }

@@ -29,7 +29,7 @@ struct Excess {
 pub(super) fn words(read: &Read, baseline: &[[f64; COUNT]]) -> Option<String> {
     let d = read.rig.diameter_m;
     let length = d * (read.rig.count as f64).cbrt();
-    let told: Vec<String> = largest(read, baseline)
+    let lines: Vec<String> = largest(read, baseline)
         .iter()
         .map(|e| {
             let [from, to] = [e.ring, e.ring + 1].map(|k| 1e3 * length * RINGS[k]);
@@ -40,7 +40,7 @@ pub(super) fn words(read: &Read, baseline: &[[f64; COUNT]]) -> Option<String> {
         })
         .collect();
     let text = "heights less those of the best equal spheres on level ground";
-    (!told.is_empty()).then(|| format!("{text}: {}", told.join("; ")))
+    (!lines.is_empty()).then(|| format!("{text}: {}", lines.join("; ")))
 }
 
 fn largest(read: &Read, baseline: &[[f64; COUNT]]) -> Vec<Excess> {

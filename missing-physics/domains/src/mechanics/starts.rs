@@ -9,8 +9,13 @@ type Starts = Vec<Vec<(usize, f64)>>;
 
 /// Starts of a joint's mechanism whose parameters are `own`, the first of which is `effect`; `least_yield` is the smallest displacement at
 /// which a spring yields.
-pub(crate) fn joint_starts(effect: JointEffect, own: &[usize], s: &JointSizes, least_yield: f64) -> Starts {
-    let Some(&first) = own.first() else { return Vec::new() };
+pub(crate) fn joint_starts(
+    effect: JointEffect,
+    parameters: &[usize],
+    s: &JointSizes,
+    least_yield: f64,
+) -> Starts {
+    let Some(&first) = parameters.first() else { return Vec::new() };
     let (force, [low, high]) = (s.force, s.range);
     match effect {
         JointEffect::Coulomb | JointEffect::Asymmetry | JointEffect::Constant => {
@@ -18,35 +23,42 @@ pub(crate) fn joint_starts(effect: JointEffect, own: &[usize], s: &JointSizes, l
         }
         JointEffect::StribeckLevel => [0.01, 0.05, 0.3]
             .iter()
-            .flat_map(|v| [3e-3, 0.05, 0.3].map(|f| vec![(first, f * force), (own[1], v * s.speed)]))
+            .flat_map(|v| [3e-3, 0.05, 0.3].map(|f| vec![(first, f * force), (parameters[1], v * s.speed)]))
             .collect(),
         JointEffect::LoadFraction => [0.05, 0.3].map(|f| vec![(first, f)]).to_vec(),
         // In proportion to its amplitude, a wave of any phase is a sum of these two: the better one leads to it.
         JointEffect::CogAmplitude => (1..=24)
             .flat_map(|n| {
-                [0.5, 0.5 + FRAC_PI_2]
-                    .map(|phase| vec![(first, 0.02 * force), (own[1], phase), (own[2], f64::from(n))])
+                [0.5, 0.5 + FRAC_PI_2].map(|phase| {
+                    vec![(first, 0.02 * force), (parameters[1], phase), (parameters[2], f64::from(n))]
+                })
             })
             .collect(),
         JointEffect::Gap => [0.003, 0.01, 0.03, 0.1].map(|f| vec![(first, f * (high - low))]).to_vec(),
         JointEffect::StopPosition => [0.99, 0.95, 0.88, 0.75, 0.01, 0.05, 0.12, 0.25]
             .iter()
             .flat_map(|at| {
-                [3.0, 30.0].map(|k| vec![(first, low + at * (high - low)), (own[1], k * force / s.reach)])
+                [3.0, 30.0]
+                    .map(|k| vec![(first, low + at * (high - low)), (parameters[1], k * force / s.reach)])
             })
             .collect(),
         JointEffect::YieldStiffness => [3e-3, 0.02, 0.1, 0.4]
             .iter()
             .map(|y| (y * s.reach).max(least_yield))
-            .map(|y| vec![(first, 0.05 * force / y), (own[1], y)])
+            .map(|y| vec![(first, 0.05 * force / y), (parameters[1], y)])
             .collect(),
         _ => Vec::new(),
     }
 }
 
 /// Starts of an input's mechanism whose parameters are `own`, the first of which is `effect`.
-pub(crate) fn input_starts(effect: InputEffect, own: &[usize], range: [f64; 2], step_s: f64) -> Starts {
-    match (effect, own) {
+pub(crate) fn input_starts(
+    effect: InputEffect,
+    parameters: &[usize],
+    range: [f64; 2],
+    step_s: f64,
+) -> Starts {
+    match (effect, parameters) {
         (InputEffect::Delay | InputEffect::Lag, [first, ..]) => late(*first, step_s),
         (InputEffect::Upper, [upper, lower, ..]) => two_bounds([*upper, *lower], range, &[0.03, 0.12, 0.3]),
         (InputEffect::DeadZone, [first, ..]) => {
@@ -58,8 +70,13 @@ pub(crate) fn input_starts(effect: InputEffect, own: &[usize], range: [f64; 2], 
 }
 
 /// Starts of an output's mechanism whose parameters are `own`, the first of which is `effect`.
-pub(crate) fn output_starts(effect: OutputEffect, own: &[usize], range: [f64; 2], step_s: f64) -> Starts {
-    match (effect, own) {
+pub(crate) fn output_starts(
+    effect: OutputEffect,
+    parameters: &[usize],
+    range: [f64; 2],
+    step_s: f64,
+) -> Starts {
+    match (effect, parameters) {
         (OutputEffect::Delay | OutputEffect::Lag, [first, ..]) => late(*first, step_s),
         // A bound of readings has been seen where it is one.
         (OutputEffect::Upper, [upper, lower, ..]) => {

@@ -115,7 +115,7 @@ impl<'a> Effects<'a> {
         &mut self,
         kind: &str,
         of: Option<&str>,
-        own: &[ParameterRef],
+        parameters: &[ParameterRef],
         text: [&str; 4],
         confused: &[&str],
     ) -> &mut Mechanism {
@@ -123,7 +123,7 @@ impl<'a> Effects<'a> {
             Some(of) => (format!("{kind}@{of}"), format!("{} of {of}", text[0])),
             None => (kind.to_owned(), text[0].to_owned()),
         };
-        self.builder.mechanism(&id, own, [&name, text[1], text[2], text[3]], confused)
+        self.builder.mechanism(&id, parameters, [&name, text[1], text[2], text[3]], confused)
     }
 
     fn joint(&mut self, joint: usize) {

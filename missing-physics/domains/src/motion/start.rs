@@ -68,18 +68,18 @@ pub(super) fn mechanism(
 ) -> Vec<Vec<(usize, f64)>> {
     let slots = slots(spec);
     let role = |index: usize| roles[slots[index]];
-    let own = &mechanism.parameters;
-    let Some(&first) = own.first() else { return Vec::new() };
+    let parameters = &mechanism.parameters;
+    let Some(&first) = parameters.first() else { return Vec::new() };
     match role(first) {
         Role::Joint(joint, effect) => {
             let sizes = &scales.joints[joint];
-            mechanics::joint_starts(effect, own, sizes, sizes.least_yield(scales.step_s))
+            mechanics::joint_starts(effect, parameters, sizes, sizes.least_yield(scales.step_s))
         }
         Role::Input(input, effect) => {
-            mechanics::input_starts(effect, own, scales.inputs[input].range, scales.step_s)
+            mechanics::input_starts(effect, parameters, scales.inputs[input].range, scales.step_s)
         }
         Role::Output(output, effect) => {
-            mechanics::output_starts(effect, own, scales.outputs[output].range, scales.step_s)
+            mechanics::output_starts(effect, parameters, scales.outputs[output].range, scales.step_s)
         }
         Role::Overflow(level) => {
             let state = scales.levels[level];

@@ -35,6 +35,25 @@ pub(super) struct Outcome {
     pub(super) contradicting: Option<Contradicting>,
 }
 
+/// Sets of mechanisms, compared.
+struct Compared {
+    ranking: Ranking,
+    /// Mechanisms that could not be fitted, with the reason.
+    unfitted: Vec<(usize, PredictError)>,
+    best: Option<Best>,
+    /// Sigmas of the white noise, by channel.
+    white: Vec<f64>,
+}
+
+/// What sets of mechanisms say of the data.
+struct Conclusion<'a> {
+    judge: Judge<'a>,
+    cause: Option<MainCause>,
+    explained: Option<&'a Best>,
+    /// What would explain the data, where less of it beside a cause in a part of them says clearly more.
+    replaced: Option<&'a Candidate>,
+}
+
 /// The way from a fitted baseline to an answer.
 pub(super) struct Course<'a> {
     pub(super) begun: &'a Begun<'a>,
@@ -86,7 +105,15 @@ impl Course<'_> {
             diagnosis.limits = limits(problem, rule, baseline);
             return Ok(Outcome { diagnosis, contradicting: None });
         }
-        let (mut ranking, unfitted) = self.compare(&problem.spec().asked())?;
+        let compared = self.compared()?;
+        let before = self.before(&answer)?;
+        let conclusion = self.conclusion(&compared)?;
+        self.outcome(&answer, &adequacy, before, &compared, conclusion)
+    }
+
+    /// Every set worth looking at, the preferred one, and the white noise beside which they are judged.
+    fn compared(&self) -> Result<Compared, DiagnoseError> {
+        let (mut ranking, unfitted) = self.compare(&self.begun.problem.spec().asked())?;
         let mut best = self.best(&mut ranking)?;
         let white = self.white_noise(&ranking);
         if self.explains(&ranking, best.as_ref()).is_none()
@@ -94,80 +121,98 @@ impl Course<'_> {
         {
             (ranking, best) = (other, Some(clear));
         }
-        let explained = self.explains(&ranking, best.as_ref());
-        let before = self.before(&answer)?;
-        // Noise that is correlated as long as the runs are is no noise, and a member without which unseen data are predicted better is
-        // imitating something else.
-        let sound = explained.map(|b| ranking.at(b.at)).and_then(|chosen| {
-            let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
-            let judge = || Judge::new(problem, rule, ranking.all(), &white, parts);
-            let judge = (!slow(problem, &chosen.fit.noise, &white)).then(judge);
-            judge.filter(|judge| judge.holds(&chosen.set))
-        });
+        Ok(Compared { ranking, unfitted, best, white })
+    }
+
+    /// What the sets say: one that explains the data, a main cause beside a leftover or beside a cause in a part of the data, or neither.
+    fn conclusion<'c>(&'c self, compared: &'c Compared) -> Result<Conclusion<'c>, DiagnoseError> {
+        let Begun { problem, rule, baseline, .. } = self.begun;
+        let Compared { ranking, best, white, .. } = compared;
+        let all = ranking.all();
+        let explained = self.explains(ranking, best.as_ref());
+        let sound = explained.and_then(|best| self.sound(compared, ranking.at(best.at)));
         let (judge, cause) = match sound {
             // What explains the data doubtfully is weighed against less of it beside a leftover.
             Some(judge) => {
-                (judge, explained.and_then(|best| self.less_beside_a_leftover(&ranking, best, &white)))
+                (judge, explained.and_then(|best| self.less_beside_a_leftover(ranking, best, white)))
             }
             None => {
                 self.tell("what the closest explanation leaves", 0.0)?;
-                let judge = Judge::new(problem, rule, ranking.all(), &white, |_| true);
+                let judge = Judge::new(problem, rule, all, white, |_| true);
                 let cause = judge.main_cause();
                 (judge, cause)
             }
         };
-        let chosen = cause.as_ref().map(|cause| &cause.chosen.candidate);
-        let chosen = chosen.or(explained.map(|best| ranking.at(best.at)));
-        let all = ranking.all();
-        let beside = |judge| BesideLocal { problem, baseline, all, judge, white: &white };
+        if cause.is_none() && explained.is_none() {
+            let cause = BesideLocal { problem, baseline, all, judge: &judge, white }.main_cause()?;
+            return Ok(Conclusion { judge, cause, explained, replaced: None });
+        }
         // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
-        let members =
-            chosen.filter(|_| cause.is_none()).map(|set| beside(&judge).members(set)).transpose()?.flatten();
-        let remark = chosen.filter(|_| members.is_some()).map(|set| {
-            let names = answer.names(&set.set);
-            format!("{names} would act everywhere; less of it and one unknown in a part of the data say clearly more")
-        });
-        let (judge, cause, explained) = match members {
-            None if cause.is_some() || explained.is_some() => (judge, cause, explained),
-            None => {
-                let cause = beside(&judge).main_cause()?;
-                (judge, cause, explained)
-            }
-            Some(members) => {
-                let judge = Judge::new(problem, rule, all, &white, |c| c.set.len() <= members);
-                let cause = beside(&judge).main_cause()?.or_else(|| judge.main_cause());
-                (judge, cause, None)
-            }
+        let chosen = explained.map(|best| ranking.at(best.at)).filter(|_| cause.is_none());
+        let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
+        let members = chosen.map(|set| beside.members(set)).transpose()?.flatten();
+        let Some(members) = members else {
+            return Ok(Conclusion { judge, cause, explained, replaced: None });
         };
+        let judge = Judge::new(problem, rule, all, white, |c| c.set.len() <= members);
+        let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
+        let cause = beside.main_cause()?.or_else(|| judge.main_cause());
+        Ok(Conclusion { judge, cause, explained: None, replaced: chosen })
+    }
+
+    /// A judge of a set's parts, where the set holds: noise that is correlated as long as the runs are is no noise, and a member without
+    /// which unseen data are predicted better is imitating something else.
+    fn sound<'c>(&'c self, compared: &'c Compared, chosen: &Candidate) -> Option<Judge<'c>> {
+        let Begun { problem, rule, .. } = self.begun;
+        let Compared { ranking, white, .. } = compared;
+        if slow(problem, &chosen.fit.noise, white) {
+            return None;
+        }
+        let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
+        Some(Judge::new(problem, rule, ranking.all(), white, parts)).filter(|judge| judge.holds(&chosen.set))
+    }
+
+    /// The answer that follows from a conclusion.
+    fn outcome(
+        &self,
+        answer: &Answer<'_>,
+        adequacy: &Adequacy,
+        before: Vec<ChannelFit>,
+        compared: &Compared,
+        conclusion: Conclusion<'_>,
+    ) -> Result<Outcome, DiagnoseError> {
+        let Begun { problem, baseline, .. } = self.begun;
+        let Compared { ranking, unfitted, best, white } = compared;
+        let Conclusion { judge, cause, explained, replaced } = conclusion;
+        let mut sigma = white;
         let (mut diagnosis, misses) = match (cause, explained) {
             (Some(cause), _) => {
-                let diagnosis = self.partly(&answer, &adequacy, before, &ranking, &cause, &white)?;
-                (diagnosis, Some(cause.chosen.plain))
+                let diagnosis = self.partly(answer, adequacy, before, ranking, &cause, white)?;
+                (diagnosis, Some(cause.chosen.least_squares))
             }
             (None, Some(chosen)) => {
-                (self.explained(&answer, &adequacy, before, &ranking, chosen, &judge)?, None)
+                sigma = &ranking.at(chosen.at).fit.noise.sigma;
+                (self.explained(answer, adequacy, before, ranking, chosen, &judge)?, None)
             }
             (None, None) => {
-                let mut diagnosis = answer.skeleton(&adequacy, Verdict::Unexplained, baseline, before)?;
-                diagnosis.mechanisms = answer.mechanisms(&ranking, best.as_ref())?;
+                let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
+                diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
                 let closest = judge.closest();
                 diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
-                let misses = closest.map_or_else(|| self.least_squares.clone(), |closest| closest.plain);
-                self.unexplained(&mut diagnosis, &answer, &ranking, &misses.set)?;
+                let misses = closest.map_or_else(|| self.least_squares.clone(), |c| c.least_squares);
+                self.unexplained(&mut diagnosis, answer, ranking, &misses.set)?;
                 (diagnosis, Some(misses))
             }
         };
-        let judged = misses.map(|model| contradicting(problem, &model.selection, &model.fit, &white));
+        let judged = misses.map(|model| contradicting(problem, &model.selection, &model.fit, white));
         let contradicting = judged.transpose()?.flatten();
-        let explained = explained.filter(|_| diagnosis.verdict != Verdict::Partly);
-        diagnosis.remarks.extend(remark);
-        diagnosis.remarks.extend(answer.unfitted(&unfitted));
-        diagnosis.sets = answer.sets(&ranking, best.as_ref());
-        let sigma = match explained {
-            Some(chosen) => ranking.at(chosen.at).fit.noise.sigma.clone(),
-            None => white,
-        };
-        diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &sigma)?;
+        diagnosis.remarks.extend(replaced.map(|set| {
+            let names = answer.names(&set.set);
+            format!("{names} would act everywhere; less of it and one unknown in a part of the data say clearly more")
+        }));
+        diagnosis.remarks.extend(answer.unfitted(unfitted));
+        diagnosis.sets = answer.sets(ranking, best.as_ref());
+        diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, sigma)?;
         Ok(Outcome { diagnosis, contradicting })
     }
 
@@ -186,7 +231,7 @@ impl Course<'_> {
         })
     }
 
-    /// Errors of the plain simulation.
+    /// Errors of the baseline.
     fn before(&self, answer: &Answer<'_>) -> Result<Vec<ChannelFit>, PredictError> {
         answer.errors(&self.least_squares.fit, &held_out(&self.begun.problem, self.least_squares)?)
     }
@@ -258,7 +303,7 @@ impl Course<'_> {
         diagnosis.explained_share = Some(cause.chosen.share);
         diagnosis.leftover = locate(problem, &chosen.selection, &chosen.fit, white)?;
         let after = predictions(problem, &chosen.fit)?;
-        diagnosis.after = answer.errors_of(&after, &held_out(problem, &cause.chosen.plain)?);
+        diagnosis.after = answer.errors_of(&after, &held_out(problem, &cause.chosen.least_squares)?);
         draw(&mut diagnosis, &after);
         diagnosis.confused_with = cause.rivals.iter().map(|r| answer.ids(&r.candidate.set)).collect();
         if !cause.rivals.is_empty() {

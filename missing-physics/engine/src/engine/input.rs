@@ -27,10 +27,10 @@ impl Options {
     /// As by default, with a rate of false alarms, in (0, 0.5), and replicates enough to show it: at least fifty times its inverse, and at
     /// most 99,999.
     pub fn with_alpha(alpha: f64) -> Self {
-        let plain = Self::default();
+        let default = Self::default();
         let enough = (50.0 / alpha).ceil() - 1.0;
         let replicates = if alpha > 0.0 { enough.min(MOST_REPLICATES) as usize } else { 0 };
-        Self { alpha, replicates: replicates.max(plain.replicates), ..plain }
+        Self { alpha, replicates: replicates.max(default.replicates), ..default }
     }
 }
 

@@ -55,12 +55,12 @@ impl BesideLocal<'_> {
     /// A set with its best local cause; `None` where there is none.
     fn weighed(&self, at: usize) -> Result<Option<Weighed>, PredictError> {
         let set = &self.all[at];
-        let Some(plain) = self.judge.plain(&set.set) else { return Ok(None) };
-        let local = local_cause(self.problem, &set.selection, plain, self.white)?;
+        let Some(fit) = self.judge.least_squares(&set.set) else { return Ok(None) };
+        let local = local_cause(self.problem, &set.selection, fit, self.white)?;
         Ok(local.map(|local| {
-            let after = (plain.chi2 - local.gain).max(1.0);
+            let after = (fit.chi2 - local.gain).max(1.0);
             let beyond = |squares: f64| (squares - self.rows()).max(0.0);
-            let smaller = beyond(plain.chi2) / beyond(after);
+            let smaller = beyond(fit.chi2) / beyond(after);
             Weighed { at, left: self.counted(after) + self.price(set) + local.price, smaller }
         }))
     }
@@ -75,8 +75,8 @@ impl BesideLocal<'_> {
     /// How many members of a set are left, where one unknown more that acts within an interval, or in some runs, takes away clearly more beside
     /// those than the others do; `None` where none does.
     pub(super) fn members(&self, set: &Candidate) -> Result<Option<usize>, PredictError> {
-        let Some(plain) = self.judge.plain(&set.set) else { return Ok(None) };
-        let most = self.counted(plain.chi2) + self.price(set) - CLEAR;
+        let Some(fit) = self.judge.least_squares(&set.set) else { return Ok(None) };
+        let most = self.counted(fit.chi2) + self.price(set) - CLEAR;
         let parts: Vec<Weighed> =
             self.parts(&set.set).filter_map(|at| self.weighed(at).transpose()).collect::<Result<_, _>>()?;
         let best = parts.iter().filter(|w| w.left < most).min_by(|a, b| a.left.total_cmp(&b.left));

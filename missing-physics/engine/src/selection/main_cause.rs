@@ -44,8 +44,8 @@ const CLOSE: usize = 3;
 #[derive(Clone)]
 pub(crate) struct Judged {
     pub(crate) candidate: Candidate,
-    /// The same set fitted by plain least squares.
-    pub(crate) plain: Candidate,
+    /// The same set fitted by ordinary least squares.
+    pub(crate) least_squares: Candidate,
     process: Process,
     /// The part of the squared misfit that it takes away on unseen data.
     pub(crate) share: f64,
@@ -64,15 +64,15 @@ pub(crate) struct Judge<'a> {
     rule: NoiseRule,
     all: &'a [Candidate],
     /// By candidate.
-    plain: Vec<Option<Plain>>,
+    least_squares: Vec<Option<LeastSquares>>,
     /// By candidate, once it was asked for: with a leftover in the model.
     judged: Vec<OnceLock<Option<Judged>>>,
     /// What the baseline leaves.
     base: f64,
 }
 
-/// A candidate's plain least-squares fit.
-struct Plain {
+/// A candidate's least-squares fit.
+struct LeastSquares {
     fit: Fit,
     /// The misfit that it leaves of the data it is fitted to.
     seen: f64,
@@ -86,7 +86,7 @@ fn without(set: &[usize], member: usize) -> Vec<usize> {
 }
 
 impl<'a> Judge<'a> {
-    /// Fits the wanted candidates and the baseline by plain least squares with white noise of the given sigmas.
+    /// Fits the wanted candidates and the baseline by ordinary least squares with white noise of the given sigmas.
     pub(crate) fn new(
         problem: &'a Problem<'a>,
         rule: &NoiseRule,
@@ -96,15 +96,16 @@ impl<'a> Judge<'a> {
     ) -> Self {
         let white = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
         let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-        let plain = |c: &Candidate| -> Option<Plain> {
+        let least_squares = |c: &Candidate| -> Option<LeastSquares> {
             (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
             let fit = solve(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
             let seen = (fit.chi2 - values as f64).max(0.0);
-            Some(Plain { fit, seen, unseen: OnceLock::new() })
+            Some(LeastSquares { fit, seen, unseen: OnceLock::new() })
         };
-        let plain: Vec<Option<Plain>> = all.par_iter().map(plain).collect();
+        let least_squares: Vec<Option<LeastSquares>> = all.par_iter().map(least_squares).collect();
         let judged = all.iter().map(|_| OnceLock::new()).collect();
-        let mut judge = Self { problem, rule: rule.beside_a_leftover(), all, plain, judged, base: 0.0 };
+        let mut judge =
+            Self { problem, rule: rule.beside_a_leftover(), all, least_squares, judged, base: 0.0 };
         judge.base = judge.misfit(&[]).unwrap_or(0.0);
         judge
     }
@@ -115,9 +116,9 @@ impl<'a> Judge<'a> {
         Some(if self.base > 0.0 { 1.0 - misfit / self.base } else { 1.0 })
     }
 
-    /// A set's plain least-squares fit.
-    pub(crate) fn plain(&self, set: &[usize]) -> Option<&Fit> {
-        Some(&self.plain[self.at(set)?].as_ref()?.fit)
+    /// A set's least-squares fit.
+    pub(crate) fn least_squares(&self, set: &[usize]) -> Option<&Fit> {
+        Some(&self.least_squares[self.at(set)?].as_ref()?.fit)
     }
 
     fn misfit(&self, set: &[usize]) -> Option<f64> {
@@ -126,23 +127,25 @@ impl<'a> Judge<'a> {
 
     /// The misfit that a candidate leaves of unseen data.
     fn unseen(&self, at: usize) -> Option<f64> {
-        let plain = self.plain[at].as_ref()?;
-        let misfit =
-            || unseen_misfit(self.problem, &self.all[at].selection, &plain.fit, &plain.fit.noise).ok();
-        *plain.unseen.get_or_init(misfit)
+        let least_squares = self.least_squares[at].as_ref()?;
+        let misfit = || {
+            unseen_misfit(self.problem, &self.all[at].selection, &least_squares.fit, &least_squares.fit.noise)
+                .ok()
+        };
+        *least_squares.unseen.get_or_init(misfit)
     }
 
     /// Whether a candidate leaves at most so much of unseen data; what leaves more of the data it was fitted to does not.
     fn leaves_at_most(&self, at: usize, limit: f64) -> bool {
-        self.plain[at].as_ref().is_some_and(|p| p.seen <= limit)
+        self.least_squares[at].as_ref().is_some_and(|p| p.seen <= limit)
             && self.unseen(at).is_some_and(|misfit| misfit <= limit)
     }
 
     /// Whether a set leaves at least so much of unseen data, or is not known.
     fn leaves_at_least(&self, set: &[usize], limit: f64) -> bool {
         let Some(at) = self.at(set) else { return true };
-        let Some(plain) = &self.plain[at] else { return true };
-        plain.seen >= limit || self.unseen(at).is_none_or(|misfit| misfit >= limit)
+        let Some(least_squares) = &self.least_squares[at] else { return true };
+        least_squares.seen >= limit || self.unseen(at).is_none_or(|misfit| misfit >= limit)
     }
 
     /// Where a set stands among the candidates.
@@ -153,7 +156,7 @@ impl<'a> Judge<'a> {
     /// The smallest set that takes away nearly all and is needed as a whole; larger ones only where they take away most of what that leaves.
     /// None where the baseline predicts unseen data within their noise: there is no misfit to take away.
     pub(crate) fn main_cause(&self) -> Option<MainCause> {
-        if self.base <= self.by_chance() {
+        if self.base <= self.misfit_of_noise() {
             return None;
         }
         let mut found: Option<Judged> = None;
@@ -194,7 +197,7 @@ impl<'a> Judge<'a> {
         let limit = (1.0 - NEARLY_ALL) * self.baseline_seen();
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
             .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
-            .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.seen, i)))
+            .filter_map(|i| self.least_squares[i].as_ref().map(|least_squares| (least_squares.seen, i)))
             .filter(|(seen, _)| *seen <= limit)
             .collect();
         order.sort_by(|a, b| {
@@ -206,7 +209,9 @@ impl<'a> Judge<'a> {
 
     /// What the baseline leaves of the data it is fitted to.
     fn baseline_seen(&self) -> f64 {
-        self.at(&[]).and_then(|i| self.plain[i].as_ref()).map_or(0.0, |plain| plain.seen)
+        self.at(&[])
+            .and_then(|i| self.least_squares[i].as_ref())
+            .map_or(0.0, |least_squares| least_squares.seen)
     }
 
     /// A set as the main cause with its rivals, each with the share that it takes away of the data it is fitted to; `None` where it is no
@@ -214,7 +219,7 @@ impl<'a> Judge<'a> {
     pub(crate) fn named(&self, at: usize, rivals: &[usize]) -> Option<MainCause> {
         let base = self.baseline_seen();
         let of_seen = |at: usize| {
-            let seen = self.plain[at].as_ref()?.seen;
+            let seen = self.least_squares[at].as_ref()?.seen;
             Some(Judged { share: 1.0 - seen / base, ..self.judged(at)? })
         };
         let rivals = rivals.iter().filter_map(|&i| of_seen(i)).take(MOST_RIVALS).collect();
@@ -225,7 +230,7 @@ impl<'a> Judge<'a> {
     pub(crate) fn closest(&self) -> Option<Judged> {
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
             .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
-            .filter_map(|i| self.plain[i].as_ref().map(|plain| (plain.seen, i)))
+            .filter_map(|i| self.least_squares[i].as_ref().map(|least_squares| (least_squares.seen, i)))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let helps = |&(_, i): &(f64, usize)| {
@@ -238,7 +243,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The misfit that noise alone may leave.
-    fn by_chance(&self) -> f64 {
+    fn misfit_of_noise(&self) -> f64 {
         let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
         CHANCE * (2.0 * rows as f64).sqrt()
     }
@@ -246,7 +251,7 @@ impl<'a> Judge<'a> {
     /// Whether a set leaves nothing but noise of unseen data; or takes away most of the baseline's misfit there, and predicts them no worse than it
     /// does without any one member.
     pub(crate) fn holds(&self, set: &[usize]) -> bool {
-        let Some(left) = self.misfit(set).filter(|left| *left > self.by_chance()) else { return true };
+        let Some(left) = self.misfit(set).filter(|left| *left > self.misfit_of_noise()) else { return true };
         left <= LEAST * self.base && set.iter().all(|m| self.leaves_at_least(&without(set, *m), left))
     }
 
@@ -263,42 +268,43 @@ impl<'a> Judge<'a> {
     }
 
     fn beside_a_leftover(&self, at: usize) -> Option<Judged> {
-        let (plain, misfit) = (&self.plain[at].as_ref()?.fit, self.unseen(at)?);
+        let (least_squares, misfit) = (&self.least_squares[at].as_ref()?.fit, self.unseen(at)?);
         let of = &self.all[at];
-        let (fit, process) = with_leftover(self.problem, &self.rule, &of.selection, plain).ok()?;
+        let (fit, process) = with_leftover(self.problem, &self.rule, &of.selection, least_squares).ok()?;
         let (mut worth, ruled_out) = evidence(self.problem, &of.set, &[], &of.selection, &fit);
         worth += process.log_prior(self.problem);
         // At a bound a mechanism is the limit of another one, or of nothing.
-        let bounded = of.selection.added().any(|slot| plain.at_bound.contains(&slot));
+        let bounded = of.selection.added().any(|slot| least_squares.at_bound.contains(&slot));
         let sound = worth.is_finite() && ruled_out.is_none() && !bounded;
-        let fit = self.widened(&of.selection, plain, fit);
+        let fit = self.widened(&of.selection, least_squares, fit);
         let candidate =
             Candidate { fit, alternative_modes: Vec::new(), evidence: worth, ruled_out, ..of.clone() };
-        let plain = Candidate { fit: plain.clone(), alternative_modes: Vec::new(), ..of.clone() };
-        sound.then(|| Judged { candidate, plain, process, share: 1.0 - misfit / self.base, misfit })
+        let least_squares =
+            Candidate { fit: least_squares.clone(), alternative_modes: Vec::new(), ..of.clone() };
+        sound.then(|| Judged { candidate, least_squares, process, share: 1.0 - misfit / self.base, misfit })
     }
 
-    /// The plain fit with errors that allow for a leftover: those beside the leftover that the residual shows, or, along the parameters' own
+    /// The least-squares fit with errors that allow for a leftover: those beside the leftover that the residual shows, or, along the parameters' own
     /// effect, where no residual shows it, those of a leftover that has [`DIRECTIONS`] directions open, whichever are larger; and what
     /// the two fits differ by.
-    fn widened(&self, selection: &Selection, plain: &Fit, beside: Fit) -> Fit {
+    fn widened(&self, selection: &Selection, least_squares: &Fit, beside: Fit) -> Fit {
         let problem = self.problem;
         let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let fitted = selection.shared.len() + selection.nuisance.len() * problem.rows.len();
-        let beyond = (plain.chi2 - rows.saturating_sub(fitted) as f64).max(0.0);
-        let white = covariance(&plain.information);
+        let beyond = (least_squares.chi2 - rows.saturating_sub(fitted) as f64).max(0.0);
+        let white = covariance(&least_squares.information);
         let mut wide = covariance(&beside.information);
         let n = wide.nrows();
         let factors: Vec<f64> = (0..n)
             .map(|i| ((1.0 + beyond / DIRECTIONS) * white[(i, i)] / wide[(i, i)]).max(1.0).sqrt())
             .collect();
-        let moved = |i: usize| beside.shared[selection.shared[i]] - plain.shared[selection.shared[i]];
+        let moved = |i: usize| beside.shared[selection.shared[i]] - least_squares.shared[selection.shared[i]];
         wide = DMatrix::from_fn(n, n, |i, j| factors[i] * factors[j] * wide[(i, j)] + moved(i) * moved(j));
         let information = match wide.cholesky().map(|factor| factor.inverse()) {
             Some(information) if information.iter().all(|v| v.is_finite()) => information,
             _ => beside.information,
         };
-        let (shared, nuisance) = (plain.shared.clone(), plain.nuisance.clone());
+        let (shared, nuisance) = (least_squares.shared.clone(), least_squares.nuisance.clone());
         Fit { information, shared, nuisance, ..beside }
     }
 
@@ -310,8 +316,8 @@ impl<'a> Judge<'a> {
         let with = judged.candidate.evidence - judged.process.log_prior(self.problem);
         whole.set.iter().all(|m| {
             let set = without(&whole.set, *m);
-            let near = self.at(&set).and_then(|i| self.plain[i].as_ref());
-            let Some(Plain { fit: near, .. }) = near else { return true };
+            let near = self.at(&set).and_then(|i| self.least_squares[i].as_ref());
+            let Some(LeastSquares { fit: near, .. }) = near else { return true };
             let selection = self.problem.select(&set, &[]);
             let refitted = || -> Result<f64, PredictError> {
                 let fit = given(self.problem, &selection, &curves, &judged.process, near)?;

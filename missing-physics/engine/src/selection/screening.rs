@@ -145,8 +145,8 @@ fn follow(
     let fit = solve_within(STEPS, problem, &selection, &parent.fit.noise, at).ok()?;
     let of = &problem.spec().mechanisms[mechanism];
     let shared = |p: &&usize| problem.spec().parameters[**p].scope == Scope::Shared;
-    let own = of.parameters.iter().chain(&of.companions).filter(shared).map(|&p| problem.slots[p]);
+    let slots = of.parameters.iter().chain(&of.companions).filter(shared).map(|&p| problem.slots[p]);
     // Whole numbers stay where the start has them.
-    let start: Guess = own.map(|slot| (slot, fit.shared[slot])).collect();
+    let start: Guess = slots.map(|slot| (slot, fit.shared[slot])).collect();
     fit.chi2.is_finite().then_some((fit.chi2, Promising { mechanism, start }))
 }

@@ -105,8 +105,8 @@ fn kept(model: &dyn Model, law: fn(f64) -> f64) -> Repaired {
     let read: Repaired = serde_json::from_str(&written).unwrap();
     assert_eq!(read, found.repaired);
     let with = error(&read, model, law);
-    let plain = answer(model, &draw(|x| x, 5)).repaired;
-    let without = error(&plain, model, law);
+    let baseline = answer(model, &draw(|x| x, 5)).repaired;
+    let without = error(&baseline, model, law);
     assert!(with < NOISE && without > 5.0 * with, "{:?}: {without} -> {with}", read.law);
     read
 }

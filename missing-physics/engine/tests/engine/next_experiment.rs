@@ -43,6 +43,6 @@ fn the_same_again_is_not_proposed_where_it_cannot_tell() {
     let answer = ask(std::slice::from_ref(&again));
     assert_eq!(answer.verdict.word(), "ambiguous");
     assert!(answer.next_experiment.is_none(), "{:?}", answer.next_experiment);
-    let elsewhere = experiment("elsewhere", (0..ROWS).map(|row| row as f64 / 10.0).collect());
-    assert_eq!(ask(&[again, elsewhere]).next_experiment.unwrap().words, "elsewhere");
+    let other = experiment("elsewhere", (0..ROWS).map(|row| row as f64 / 10.0).collect());
+    assert_eq!(ask(&[again, other]).next_experiment.unwrap().words, "elsewhere");
 }

@@ -11,9 +11,11 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// A line with an offset of each run's own; a bend is the mechanism.
 fn model() -> Curve {
-    let own = Parameter { scope: Scope::PerRun, ..parameter("offset", 0.0, UNBOUNDED) };
-    let parameters = vec![parameter("slope", 1.0, UNBOUNDED), parameter("bend", 0.0, UNBOUNDED), own];
-    Curve::new(parameters, vec![mechanism("bend", vec![1])], |p, own, x| own[0] + p[0] * x + p[1] * x * x)
+    let nuisance = Parameter { scope: Scope::PerRun, ..parameter("offset", 0.0, UNBOUNDED) };
+    let parameters = vec![parameter("slope", 1.0, UNBOUNDED), parameter("bend", 0.0, UNBOUNDED), nuisance];
+    Curve::new(parameters, vec![mechanism("bend", vec![1])], |p, nuisance, x| {
+        nuisance[0] + p[0] * x + p[1] * x * x
+    })
 }
 
 const ROWS: usize = 16;

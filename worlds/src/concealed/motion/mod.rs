@@ -37,7 +37,7 @@ pub(crate) struct Machine {
     /// What the baseline can take away, in sigmas.
     nuisances: Nuisances,
     /// Readings where nothing is hidden, in sigmas.
-    plain: Vec<f64>,
+    baseline: Vec<f64>,
     unlisted: [Unlisted; UNLISTED],
 }
 
@@ -88,7 +88,7 @@ impl Rig for Machine {
     }
 
     fn response(&self, effects: Effects) -> Vec<f64> {
-        difference(&self.plain, &self.readings(&self.world, &effects))
+        difference(&self.baseline, &self.readings(&self.world, &effects))
     }
 
     fn size_bounds(&self, listed: usize) -> [f64; 2] {
@@ -178,10 +178,10 @@ impl Machine {
             noises,
             sizes,
             nuisances: Nuisances::default(),
-            plain: Vec::new(),
+            baseline: Vec::new(),
             unlisted,
         };
-        machine.plain = machine.readings(&machine.world, &Effects::default());
+        machine.baseline = machine.readings(&machine.world, &Effects::default());
         machine.nuisances = machine.taken();
         machine
     }
@@ -253,7 +253,7 @@ impl Machine {
         for (which, _) in statement.constants.iter().enumerate().filter(|(_, c)| !c.2) {
             let plant = plants::with_constant(self.world.plant, which, 1.001);
             let other = MachineWorld { plant, ..self.world.clone() };
-            nuisances.add(&difference(&self.plain, &self.readings(&other, &Effects::default())));
+            nuisances.add(&difference(&self.baseline, &self.readings(&other, &Effects::default())));
         }
         if statement.from_rest {
             return nuisances;
@@ -266,10 +266,10 @@ impl Machine {
                 start[state] += 1e-3;
                 let other = Run { start, ..run.clone() };
                 let alone = MachineWorld { runs: vec![other], ..self.world.clone() };
-                let mut column = vec![0.0; self.plain.len()];
+                let mut column = vec![0.0; self.baseline.len()];
                 let moved = self.in_sigmas(alone.readings(0, &Effects::default()));
                 let part = before..before + rows;
-                column[part.clone()].copy_from_slice(&difference(&self.plain[part], &moved));
+                column[part.clone()].copy_from_slice(&difference(&self.baseline[part], &moved));
                 nuisances.add(&column);
             }
             before += rows;
@@ -404,7 +404,7 @@ mod tests {
             if !plants::statement(&other.plant).from_rest {
                 other.runs[1].start[0] += 2e-4;
             }
-            let moved = difference(&machine.plain, &machine.readings(&other, &Effects::default()));
+            let moved = difference(&machine.baseline, &machine.readings(&other, &Effects::default()));
             let whole = Nuisances::default().residual_norm(&moved);
             assert!(machine.nuisances.residual_norm(&moved) < 0.02 * whole, "{which}");
         }

@@ -181,12 +181,12 @@ pub(super) fn draw(which: usize, rng: &mut ChaCha8Rng) -> MachineWorld {
             if from_rest || plant.level().is_some() { 0.0 } else { row_s * between(rng, 14.0, 30.0) };
         let command = match plant {
             Plant::Pendulum(_) | Plant::Hull(_) => Vec::new(),
-            Plant::Tank(_) => told(rows, row_s * 400.0, 1.0, 1.0, row_s, rng)
+            Plant::Tank(_) => command(rows, row_s * 400.0, 1.0, 1.0, row_s, rng)
                 .into_iter()
                 // So much as flows out at a third of a metre, at the most.
                 .map(|u| ((2e-4 + 4e-4 * (0.5 + 0.5 * u)) * 1e7).round() / 1e7)
                 .collect(),
-            _ => told(rows, row_s * 200.0, 0.0, between(rng, 0.4, 1.5), row_s, rng),
+            _ => command(rows, row_s * 200.0, 0.0, between(rng, 0.4, 1.5), row_s, rng),
         };
         Run { start, lead_s, rows, command }
     });
@@ -194,7 +194,7 @@ pub(super) fn draw(which: usize, rng: &mut ChaCha8Rng) -> MachineWorld {
 }
 
 /// A command in the range from -size to size: steps, a sum of sines, or ramps up and down; nought at first from rest.
-fn told(rows: usize, slow_s: f64, first: f64, size: f64, row_s: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+fn command(rows: usize, slow_s: f64, first: f64, size: f64, row_s: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let still = if first == 0.0 { rows / 20 } else { 0 };
     let kind = whole(rng, 0, 2);
     let mut level = 0.0;

@@ -28,8 +28,8 @@ impl<'a> Drive<'a> {
 
     /// When what acts jumps or bends.
     pub(super) fn jumps(&self) -> impl Iterator<Item = f64> + '_ {
-        let told = !self.commands.is_empty();
-        self.knots.iter().filter(move |_| told).map(|t| t + self.effects.delay_s)
+        let driven = !self.commands.is_empty();
+        self.knots.iter().filter(move |_| driven).map(|t| t + self.effects.delay_s)
     }
 
     /// The number of the knot from which on what acts at a time was said.
