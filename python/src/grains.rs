@@ -2,7 +2,7 @@
 
 use bayes_sim::points::Points;
 use granular_infer::posterior::GrainPosterior;
-use granular_infer::scene::{Grain, Scene};
+use granular_infer::scene::{Grain, SERIES_M, Scene};
 use granular_infer::summary::{COUNT, NAMES};
 use granular_infer::view::View;
 use numpy::{PyArray1, PyArray2};
@@ -42,7 +42,7 @@ pub(crate) fn pour_grains<'py>(
 /// Draws of a posterior (draws, 3), its mean, and how many pictures in one are as unlike the others.
 type Inferred<'py> = (Bound<'py, PyArray2<f64>>, [f64; 3], f64);
 
-/// What statistics of a picture tell of the grains, by the posterior that is shipped.
+/// What statistics of one picture, or of one from each of [`SERIES_M`] one after the other, tell of the grains, by the posteriors that are shipped.
 #[pyfunction]
 pub(crate) fn infer_grains<'py>(
     py: Python<'py>,
@@ -51,13 +51,25 @@ pub(crate) fn infer_grains<'py>(
     seed: u64,
 ) -> PyResult<Inferred<'py>> {
     let values = column(statistics, "statistics")?;
-    let got = values.len();
-    let statistics: [f64; COUNT] =
-        values.try_into().map_err(|_| refused(format!("{got} statistics, expected {COUNT}")))?;
-    let inferred = GrainPosterior::shipped().map_err(refused)?.infer(&statistics).map_err(refused)?;
+    let (pictures, rest) = values.as_chunks::<COUNT>();
+    let learned = match (pictures.len(), rest) {
+        (1, []) => GrainPosterior::shipped(),
+        (n, []) if n == SERIES_M.len() => GrainPosterior::shipped_series(),
+        _ => {
+            let (got, three) = (values.len(), SERIES_M.len());
+            return Err(refused(format!("{got} statistics, expected {COUNT}, or {three} times {COUNT}")));
+        }
+    };
+    let inferred = learned.map_err(refused)?.infer_series(pictures).map_err(refused)?;
     let drawn: Points = inferred.posterior.sample(count, &mut ChaCha8Rng::seed_from_u64(seed)).theta;
     let draws: Vec<Vec<f64>> = drawn.rows().map(<[f64]>::to_vec).collect();
     Ok((PyArray2::from_vec2(py, &draws)?, inferred.estimate().theta(), inferred.resemblance.p_value))
+}
+
+/// Heights from which the grains of a series are poured, m.
+#[pyfunction]
+pub(crate) fn grain_series() -> [f64; SERIES_M.len()] {
+    SERIES_M
 }
 
 /// Names of the statistics, in their order.

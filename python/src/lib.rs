@@ -26,7 +26,7 @@ mod _engine {
     #[pymodule_export]
     use crate::function::Simulator;
     #[pymodule_export]
-    use crate::grains::{grain_statistics, infer_grains, pour_grains};
+    use crate::grains::{grain_series, grain_statistics, infer_grains, pour_grains};
     #[pymodule_export]
     use crate::hearing::hear_impacts;
     #[pymodule_export]

@@ -28,7 +28,7 @@ impl Proof {
         seed: u64,
         threads: usize,
     ) -> Self {
-        Self(ProveArguments { domain, worlds, kind, seed, folder, threads })
+        Self(ProveArguments { domain, worlds, kind, seed, runs: None, folder, threads })
     }
 
     /// Draws, seals, diagnoses and scores; goes on where it was stopped.

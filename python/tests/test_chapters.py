@@ -130,7 +130,14 @@ def test_a_pour_tells_its_grains():
     assert np.all(np.abs(inferred.estimate - inferred.draws.mean(0)) < 4 * inferred.draws.std(0) / np.sqrt(500) + 0.05)
     low, high = np.quantile(inferred.draws[:, 2], [0.005, 0.995])
     assert low < 0.5 < high
-    with pytest.raises(errors.ChapterError, match="15 statistics, expected 16"):
+    series = np.array([granular_infer.pour(height_m=height, seed=2).statistics for height in granular_infer.SERIES_M])
+    by_three = granular_infer.infer(series, count=4000)
+    assert series.shape == (3, 16) and by_three.draws.shape == (4000, 3) and by_three.p_value > 0.01
+    one = granular_infer.infer(poured.statistics, count=4000)
+    assert by_three.draws[:, 2].std() < 0.9 * one.draws[:, 2].std()
+    with pytest.raises(errors.ArrayError, match=r"shape \(16, 3\), expected \(16,\) or \(3, 16\)"):
+        granular_infer.infer(series.T)
+    with pytest.raises(errors.ChapterError, match="15 statistics, expected 16, or 3 times 16"):
         granular_infer.infer(poured.statistics[:15])
     with pytest.raises(errors.ChapterError):
         granular_infer.pour(restitution=2.0)

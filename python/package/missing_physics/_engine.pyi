@@ -16,6 +16,7 @@ __all__ = [
     "diagnose",
     "domains",
     "fit_contact",
+    "grain_series",
     "grain_statistics",
     "hear_impacts",
     "infer_grains",
@@ -126,6 +127,7 @@ def pour_grains(
 def infer_grains(
     statistics: Any, count: int, seed: int
 ) -> tuple[NDArray[np.float64], list[float], float]: ...
+def grain_series() -> list[float]: ...
 def grain_statistics() -> list[str]: ...
 def diagnose(
     source: Source,

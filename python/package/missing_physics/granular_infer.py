@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _engine
+from .errors import ArrayError
 
 Floats = NDArray[np.float64]
 
 #: Names of the 16 statistics of a depth picture, in their order.
 STATISTICS: tuple[str, ...] = tuple(_engine.grain_statistics())
+
+#: Heights in m from which the grains of a series are poured, once each.
+SERIES_M: tuple[float, ...] = tuple(_engine.grain_series())
 
 
 @dataclass(frozen=True)
@@ -53,9 +57,14 @@ def pour(
 
 
 def infer(statistics: ArrayLike, *, count: int = 4000, seed: int = 1) -> Inferred:
-    """What the statistics (16,) of a picture of a heap poured from 12 cm tell of its grains, by the posterior that is shipped.
+    """What the statistics (16,) of a picture of a heap poured from 12 cm tell of its grains, by the posterior that is shipped; or those
+    (3, 16) of three heaps of the same grains, poured from each of :data:`SERIES_M`, which tell more.
 
-    Raises :class:`~missing_physics.errors.ChapterError`.
+    Raises :class:`~missing_physics.errors.ChapterError`, and :class:`~missing_physics.errors.ArrayError` for another shape.
     """
-    draws, estimate, p_value = _engine.infer_grains(np.asarray(statistics, dtype=np.float64), count, seed)
+    values = np.asarray(statistics, dtype=np.float64)
+    series = (len(SERIES_M), len(STATISTICS))
+    if values.ndim != 1 and values.shape != series:
+        raise ArrayError(f"statistics has the shape {values.shape}, expected {series[1:]} or {series}")
+    draws, estimate, p_value = _engine.infer_grains(values.ravel(), count, seed)
     return Inferred(draws, np.array(estimate), p_value)
