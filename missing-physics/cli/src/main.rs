@@ -127,6 +127,9 @@ enum Command {
         /// Seed of the worlds.
         #[arg(long, default_value_t = 1)]
         seed: u64,
+        /// Of each recording the first runs only, so many; all without it.
+        #[arg(long)]
+        runs: Option<usize>,
         /// The folder of the proof; one that was stopped goes on.
         #[arg(long, default_value = "proof")]
         out: PathBuf,
@@ -225,13 +228,13 @@ fn run(command: Command, loudness: Loudness) -> Result<Said, CommandError> {
             on_interrupt("nothing was written".into());
             commands::predict(&model, &folder, csv.as_deref())
         }
-        Command::Prove { domain, worlds, kind, seed, out, threads } => {
+        Command::Prove { domain, worlds, kind, seed, runs, out, threads } => {
             let threads = useful(threads);
             on_interrupt(format!(
                 "worlds that were judged are kept in {}, the same command goes on",
                 out.display()
             ));
-            let arguments = ProveArguments { domain, worlds, kind, seed, folder: out, threads };
+            let arguments = ProveArguments { domain, worlds, kind, seed, runs, folder: out, threads };
             Ok(prove(&arguments, &Steps::new(loudness))?.into())
         }
         Command::Watch { folder, reference, alpha, settle, end_after, pipe, allow_command } => {

@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+mod arguments;
 mod error;
 mod files;
 mod key;
@@ -9,6 +10,7 @@ mod score;
 mod table;
 mod world;
 
+pub use arguments::ProveArguments;
 pub use error::ProveError;
-pub use proof::{ProveArguments, provable, prove, prove_world, seal_worlds};
+pub use proof::{provable, prove, prove_world, seal_worlds};
 pub use score::{DomainScore, Part, Score};

@@ -1,6 +1,6 @@
 //! The proof as a whole: worlds drawn and sealed, diagnosed, opened and scored.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use missing_physics::observer::{Observer, Progress};
@@ -9,28 +9,12 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use worlds::concealed::{Hidden, Maker, makers};
 
+use crate::arguments::ProveArguments;
 use crate::error::ProveError;
 use crate::files::{make_folder, write_json, write_whole};
 use crate::score::Score;
 use crate::world::World;
 use crate::{key, page, table};
-
-/// What `prove` is asked for.
-#[derive(Debug, Clone)]
-pub struct ProveArguments {
-    /// One domain; all that can be proven without it.
-    pub domain: Option<String>,
-    /// Worlds of each domain.
-    pub worlds: usize,
-    /// One kind of worlds (`nothing`, `one`, `two`, `unlisted`, `leftover`, `imitated`, `local`); all in turns without it.
-    pub kind: Option<String>,
-    /// Seed of the worlds.
-    pub seed: u64,
-    /// The folder of the proof.
-    pub folder: PathBuf,
-    /// Number of threads; 0 for all cores.
-    pub threads: usize,
-}
 
 /// What is being proven.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +27,8 @@ struct Plan {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     kind: Option<String>,
     seed: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    runs: Option<usize>,
     /// SHA-256 of the answers, before any diagnosis.
     seal: String,
 }
@@ -106,7 +92,7 @@ pub fn prove_world(arguments: &ProveArguments, name: &str) -> Result<(), ProveEr
     if number >= arguments.worlds {
         return Err(unknown());
     }
-    let world = World::new(maker, number, kind, arguments.seed, &arguments.folder);
+    let world = World::new(maker, number, kind, arguments);
     world.diagnose()?;
     world.fit_oracle()
 }
@@ -119,7 +105,7 @@ fn asked(arguments: &ProveArguments) -> Result<(Vec<&'static dyn Maker>, Option<
         let domain = arguments.domain.clone().unwrap_or_default();
         return Err(ProveError::UnknownDomain { domain, known: provable() });
     }
-    if arguments.worlds == 0 {
+    if arguments.worlds == 0 || arguments.runs == Some(0) {
         return Err(ProveError::NoWorlds);
     }
     let unknown = |kind: &String| ProveError::UnknownKind { kind: kind.clone() };
@@ -156,7 +142,7 @@ impl Proof {
         let worlds: Vec<World> = chosen
             .iter()
             .flat_map(|&maker| (0..arguments.worlds).map(move |number| (maker, number)))
-            .map(|(maker, number)| World::new(maker, number, kind, arguments.seed, &arguments.folder))
+            .map(|(maker, number)| World::new(maker, number, kind, arguments))
             .collect();
         report(observer, "drawing the worlds", 0.0)?;
         let keys: Vec<String> =
@@ -168,6 +154,7 @@ impl Proof {
             worlds: arguments.worlds,
             kind: arguments.kind.clone(),
             seed: arguments.seed,
+            runs: arguments.runs,
             seal: seal(&keys),
         };
         begin(&arguments.folder, &plan)?;

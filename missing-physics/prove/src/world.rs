@@ -1,6 +1,6 @@
 //! One world of a proof: drawn, diagnosed, judged.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use missing_physics::data::Recording;
@@ -14,6 +14,7 @@ use worlds::concealed::{Concealed, Hidden, Key, Maker};
 use missing_physics_domains as domains;
 use missing_physics_report::{self as report, ReportContext};
 
+use crate::arguments::ProveArguments;
 use crate::error::ProveError;
 use crate::files::{make_folder, read_json, write_json, write_whole};
 
@@ -31,6 +32,7 @@ pub(super) struct World {
     maker: &'static dyn Maker,
     hidden: Hidden,
     seed: u64,
+    runs: Option<usize>,
     name: String,
     folder: PathBuf,
 }
@@ -96,9 +98,9 @@ impl World {
         maker: &'static dyn Maker,
         number: usize,
         kind: Option<Hidden>,
-        seed: u64,
-        folder: &Path,
+        arguments: &ProveArguments,
     ) -> Self {
+        let ProveArguments { seed, runs, folder, .. } = arguments;
         let name = format!("{}/{number:04}", maker.name());
         // FNV-1a of the name, so that a domain's worlds do not depend on which others are asked for.
         let hash =
@@ -106,7 +108,8 @@ impl World {
                 (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
             });
         let folder = folder.join(&name);
-        Self { maker, hidden: kind.unwrap_or(TURNS[number % TURNS.len()]), seed: hash, name, folder }
+        let hidden = kind.unwrap_or(TURNS[number % TURNS.len()]);
+        Self { maker, hidden, seed: hash, runs: *runs, name, folder }
     }
 
     pub(super) fn name(&self) -> &str {
@@ -114,7 +117,11 @@ impl World {
     }
 
     pub(super) fn draw(&self) -> Concealed {
-        self.maker.conceal(self.hidden, self.seed)
+        let drawn = self.maker.conceal(self.hidden, self.seed);
+        match self.runs {
+            Some(runs) => drawn.first_runs(runs),
+            None => drawn,
+        }
     }
 
     /// Writes the recording and diagnoses it from its files, unless that has been done.
