@@ -20,9 +20,10 @@ use crate::runs::contradicting::{Contradicting, contradicting};
 use crate::selection::candidate::{Candidate, candidate, nested};
 use crate::selection::confusion::confusion;
 use crate::selection::held_out::held_out;
-use crate::selection::main_cause::{Judge, MainCause};
+use crate::selection::main_cause::{Judge, Judged, MainCause};
 use crate::selection::ranking::{Best, Ranking, clearly};
 use crate::selection::search::{Searched, search};
+use crate::selection::share::Cut;
 
 /// Tells the observer of a step; an error where it stops the work.
 pub(super) fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseError> {
@@ -144,7 +145,8 @@ impl Course<'_> {
             }
         };
         if cause.is_none() && explained.is_none() {
-            let cause = BesideLocal { problem, baseline, all, judge: &judge, white }.main_cause()?;
+            let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
+            let cause = beside.main_cause()?.or_else(|| judge.near()?.main_cause());
             return Ok(Conclusion { judge, cause, explained, replaced: None });
         }
         // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
@@ -187,7 +189,8 @@ impl Course<'_> {
         let mut sigma = white;
         let (mut diagnosis, misses) = match (cause, explained) {
             (Some(cause), _) => {
-                let diagnosis = self.partly(answer, adequacy, before, ranking, &cause, white)?;
+                let mut diagnosis = self.partly(answer, adequacy, before, ranking, &cause, white)?;
+                diagnosis.remarks.extend(seen_near_by(answer, &judge, &cause));
                 (diagnosis, Some(cause.chosen.least_squares))
             }
             (None, Some(chosen)) => {
@@ -211,6 +214,9 @@ impl Course<'_> {
             format!("{names} would act everywhere; less of it and one unknown in a part of the data say clearly more")
         }));
         diagnosis.remarks.extend(answer.unfitted(unfitted));
+        if problem.rows.len() == 1 && !diagnosis.chosen.is_empty() {
+            diagnosis.remarks.push("one run alone: whether another needs the same was not tested".into());
+        }
         diagnosis.sets = answer.sets(ranking, best.as_ref());
         diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, sigma)?;
         Ok(Outcome { diagnosis, contradicting })
@@ -391,6 +397,18 @@ impl Course<'_> {
         }
         Ok(())
     }
+}
+
+/// What is said of a main cause that was found by pieces of a single run, where whole fifths left out show less of it.
+fn seen_near_by(answer: &Answer<'_>, judge: &Judge<'_>, cause: &MainCause) -> Option<String> {
+    let Judged { candidate, cut, .. } = &cause.chosen;
+    let far = judge.share(&candidate.set).filter(|_| *cut == Cut::Hundredths)?;
+    Some(format!(
+        "{}: named by hundredths of the run, every fifth of them left out; of whole fifths left out, where what dies away lies in one of \
+         them, {:.0} % of the misfit",
+        answer.names(&candidate.set),
+        (100.0 * far).floor()
+    ))
 }
 
 /// Which sets stand whoever asked for their members: each that nobody has asked for takes away so much that a cause which is like it to

@@ -15,7 +15,7 @@ use crate::noise::rule::{NoiseRule, NoiseState};
 use crate::problem::{Problem, Selection};
 use crate::selection::candidate::Candidate;
 use crate::selection::evidence::evidence;
-use crate::selection::share::unseen_misfit;
+use crate::selection::share::{Cut, unseen_misfit};
 
 /// The part of the squared misfit beyond the noise that a main cause takes away on unseen data.
 const NEARLY_ALL: f64 = 0.9;
@@ -49,6 +49,8 @@ pub(crate) struct Judged {
     process: Process,
     /// The part of the squared misfit that it takes away on unseen data.
     pub(crate) share: f64,
+    /// How a single run was cut for that.
+    pub(crate) cut: Cut,
     misfit: f64,
 }
 
@@ -67,6 +69,8 @@ pub(crate) struct Judge<'a> {
     least_squares: Vec<Option<LeastSquares>>,
     /// By candidate, once it was asked for: with a leftover in the model.
     judged: Vec<OnceLock<Option<Judged>>>,
+    /// How a single run is cut.
+    cut: Cut,
     /// What the baseline leaves.
     base: f64,
 }
@@ -104,10 +108,32 @@ impl<'a> Judge<'a> {
         };
         let least_squares: Vec<Option<LeastSquares>> = all.par_iter().map(least_squares).collect();
         let judged = all.iter().map(|_| OnceLock::new()).collect();
-        let mut judge =
-            Self { problem, rule: rule.beside_a_leftover(), all, least_squares, judged, base: 0.0 };
-        judge.base = judge.misfit(&[]).unwrap_or(0.0);
-        judge
+        let rule = rule.beside_a_leftover();
+        Self { problem, rule, all, least_squares, judged, cut: Cut::Fifths, base: 0.0 }.with_base()
+    }
+
+    /// A judge by unseen data that lie close to those seen; of a single run only, since of several the others show what each one does.
+    pub(crate) fn near(&self) -> Option<Self> {
+        (self.problem.recording.runs.len() == 1).then_some(())?;
+        let again = |known: &Option<LeastSquares>| {
+            let LeastSquares { fit, seen, .. } = known.as_ref()?;
+            Some(LeastSquares { fit: fit.clone(), seen: *seen, unseen: OnceLock::new() })
+        };
+        let judge = Self {
+            problem: self.problem,
+            rule: self.rule.clone(),
+            all: self.all,
+            least_squares: self.least_squares.iter().map(again).collect(),
+            judged: self.all.iter().map(|_| OnceLock::new()).collect(),
+            cut: Cut::Hundredths,
+            base: 0.0,
+        };
+        Some(judge.with_base())
+    }
+
+    fn with_base(mut self) -> Self {
+        self.base = self.misfit(&[]).unwrap_or(0.0);
+        self
     }
 
     /// The part of the squared misfit beyond the noise that a set takes away on unseen data.
@@ -127,12 +153,10 @@ impl<'a> Judge<'a> {
 
     /// The misfit that a candidate leaves of unseen data.
     fn unseen(&self, at: usize) -> Option<f64> {
-        let least_squares = self.least_squares[at].as_ref()?;
-        let misfit = || {
-            unseen_misfit(self.problem, &self.all[at].selection, &least_squares.fit, &least_squares.fit.noise)
-                .ok()
-        };
-        *least_squares.unseen.get_or_init(misfit)
+        let LeastSquares { fit, unseen, .. } = self.least_squares[at].as_ref()?;
+        let selection = &self.all[at].selection;
+        let misfit = || unseen_misfit(self.problem, selection, fit, &fit.noise, self.cut).ok();
+        *unseen.get_or_init(misfit)
     }
 
     /// Whether a candidate leaves at most so much of unseen data; what leaves more of the data it was fitted to does not.
@@ -281,7 +305,8 @@ impl<'a> Judge<'a> {
             Candidate { fit, alternative_modes: Vec::new(), evidence: worth, ruled_out, ..of.clone() };
         let least_squares =
             Candidate { fit: least_squares.clone(), alternative_modes: Vec::new(), ..of.clone() };
-        sound.then(|| Judged { candidate, least_squares, process, share: 1.0 - misfit / self.base, misfit })
+        let (share, cut) = (1.0 - misfit / self.base, self.cut);
+        sound.then_some(Judged { candidate, least_squares, process, share, cut, misfit })
     }
 
     /// The least-squares fit with errors that allow for a leftover: those beside the leftover that the residual shows, or, along the parameters' own

@@ -12,15 +12,34 @@ use crate::problem::{Problem, Selection};
 /// Groups in which runs, or the rows of a single run, are left out.
 const FOLDS: usize = 5;
 
+/// Into what the rows of a single run are cut, before every fifth piece is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// Five pieces: what is left out lies far from what is seen. Of a motion that dies away the first one holds what no other shows.
+    Fifths,
+    /// A hundred pieces: what lasts for a few of them is both seen and left out.
+    Hundredths,
+}
+
+impl Cut {
+    fn pieces(self) -> usize {
+        match self {
+            Self::Fifths => FOLDS,
+            Self::Hundredths => 100,
+        }
+    }
+}
+
 /// Sum of squares, in units of white noise, by which unseen data miss a fit beyond that noise.
 ///
-/// Each run (or each of five groups of runs) is left out in turn, its nuisance parameters then fitted to it; of a single run, each fifth of
-/// its rows. Fits are plain least squares: a slow misfit is not taken for noise.
+/// Each run (or each of five groups of runs) is left out in turn, its nuisance parameters then fitted to it; of a single run, every fifth
+/// of its pieces. Fits are plain least squares: a slow misfit is not taken for noise.
 pub(crate) fn unseen_misfit(
     problem: &Problem<'_>,
     selection: &Selection,
     fit: &Fit,
     white: &NoiseState,
+    cut: Cut,
 ) -> Result<f64, PredictError> {
     let miss = |residual: Vec<Vec<Vec<f64>>>| -> f64 {
         let columns = residual.iter().flat_map(|run| white.sigma.iter().zip(run));
@@ -40,11 +59,11 @@ pub(crate) fn unseen_misfit(
     };
     let of_rows = |fold: usize| -> Result<f64, PredictError> {
         let rows = problem.recording.runs[0].len();
-        let block = rows * fold / FOLDS..rows * (fold + 1) / FOLDS;
+        let left_out = |row: usize| row * cut.pieces() / rows % FOLDS == fold;
         let without = |inside: bool| {
             let mut recording = problem.recording.clone();
             for column in &mut recording.runs[0].outputs {
-                let rows = column.iter_mut().enumerate().filter(|(i, _)| block.contains(i) == inside);
+                let rows = column.iter_mut().enumerate().filter(|(i, _)| left_out(*i) == inside);
                 rows.for_each(|(_, v)| *v = f64::NAN);
             }
             problem.with(recording)

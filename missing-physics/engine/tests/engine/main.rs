@@ -18,5 +18,6 @@ mod power;
 mod runs;
 mod serialized;
 mod short_runs;
+mod single_run;
 mod stochastic;
 mod stream;
