@@ -380,6 +380,23 @@ fn shared_long_measured_force_of_a_wave_shows_the_arm_as_well() {
     assert!(answer["leftover"][0]["to"].as_f64().unwrap() < 2.0, "{}", answer["leftover"]);
 }
 
+/// Single runs of which nothing on the list takes away nine tenths: what plain least squares finds first is said to come closest.
+#[test]
+#[ignore = "needs ../shared"]
+fn shared_measured_single_runs_say_what_comes_closest() {
+    let closest = |name: &str| {
+        let answer = answer(&shared("recordings/real").join(name), "0");
+        assert_eq!(answer["verdict"], "unexplained", "{name}");
+        (ids(&answer["closest"]["ids"]), answer["closest"]["parameters"][0]["value"].as_f64().unwrap())
+    };
+    assert_eq!(closest("indentation/afm-reference-point-0").0, ["force-offset"]);
+    assert_eq!(closest("indentation/afm-reference-point-2").0, ["contact-offset", "membrane-stretching"]);
+    // A hull at speed: 3.7 1/s^2 where it is alone.
+    let (stiffens, coefficient) = closest("motion/roll-kvlcc2-15kn");
+    assert_eq!(stiffens, ["cubic-stiffness"]);
+    assert!((3.0..5.0).contains(&coefficient), "{coefficient}");
+}
+
 /// A cell that is held relaxes, and something is left beside one time of relaxation.
 #[test]
 #[ignore = "needs ../shared"]

@@ -49,6 +49,8 @@ struct Compared {
 /// What sets of mechanisms say of the data.
 struct Conclusion<'a> {
     judge: Judge<'a>,
+    /// A judge of a single run by data close to those seen, where the other names nothing.
+    near: Option<Judge<'a>>,
     cause: Option<MainCause>,
     explained: Option<&'a Best>,
     /// What would explain the data, where less of it beside a cause in a part of them says clearly more.
@@ -145,21 +147,22 @@ impl Course<'_> {
             }
         };
         if cause.is_none() && explained.is_none() {
+            let near = judge.near();
             let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
-            let cause = beside.main_cause()?.or_else(|| judge.near()?.main_cause());
-            return Ok(Conclusion { judge, cause, explained, replaced: None });
+            let cause = beside.main_cause()?.or_else(|| near.as_ref()?.main_cause());
+            return Ok(Conclusion { judge, near, cause, explained, replaced: None });
         }
         // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
         let chosen = explained.map(|best| ranking.at(best.at)).filter(|_| cause.is_none());
         let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
         let members = chosen.map(|set| beside.members(set)).transpose()?.flatten();
         let Some(members) = members else {
-            return Ok(Conclusion { judge, cause, explained, replaced: None });
+            return Ok(Conclusion { judge, near: None, cause, explained, replaced: None });
         };
         let judge = Judge::new(problem, rule, all, white, |c| c.set.len() <= members);
         let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
         let cause = beside.main_cause()?.or_else(|| judge.main_cause());
-        Ok(Conclusion { judge, cause, explained: None, replaced: chosen })
+        Ok(Conclusion { judge, near: None, cause, explained: None, replaced: chosen })
     }
 
     /// A judge of a set's parts, where the set holds: noise that is correlated as long as the runs are is no noise, and a member without
@@ -185,7 +188,7 @@ impl Course<'_> {
     ) -> Result<Outcome, DiagnoseError> {
         let Begun { problem, baseline, .. } = self.begun;
         let Compared { ranking, unfitted, best, white } = compared;
-        let Conclusion { judge, cause, explained, replaced } = conclusion;
+        let Conclusion { judge, near, cause, explained, replaced } = conclusion;
         let mut sigma = white;
         let (mut diagnosis, misses) = match (cause, explained) {
             (Some(cause), _) => {
@@ -200,7 +203,7 @@ impl Course<'_> {
             (None, None) => {
                 let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
                 diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
-                let closest = judge.closest();
+                let closest = near.as_ref().unwrap_or(&judge).closest();
                 diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
                 let misses = closest.map_or_else(|| self.least_squares.clone(), |c| c.least_squares);
                 self.unexplained(&mut diagnosis, answer, ranking, &misses.set)?;
