@@ -20,3 +20,18 @@ pub struct ProveArguments {
     /// Number of threads; 0 for all cores.
     pub threads: usize,
 }
+
+impl Default for ProveArguments {
+    /// A hundred worlds of each domain from the first seed, whole, in the folder `proof`.
+    fn default() -> Self {
+        Self {
+            domain: None,
+            worlds: 100,
+            kind: None,
+            seed: 1,
+            runs: None,
+            folder: "proof".into(),
+            threads: 0,
+        }
+    }
+}
