@@ -20,12 +20,12 @@ pub struct Edge<'a> {
     pub items: BTreeSet<String>,
 }
 
-/// Files each of which needs the others, and what edges them.
+/// Files each of which needs the others, and the imports by which they do.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Circle<'a> {
     /// The files, sorted.
     pub files: Vec<&'a Path>,
-    /// What edges them, sorted.
+    /// The imports among them, sorted.
     pub edges: Vec<Edge<'a>>,
 }
 

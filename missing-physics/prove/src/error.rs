@@ -44,6 +44,9 @@ pub enum ProveError {
     /// No world was asked for.
     #[error("0 worlds prove nothing, expected at least 1")]
     NoWorlds,
+    /// No run of each world was asked for.
+    #[error("0 runs of each world prove nothing, expected at least 1")]
+    NoRuns,
     /// The threads that were asked for cannot be started.
     #[error("{threads} threads cannot be had: {error}")]
     Threads {

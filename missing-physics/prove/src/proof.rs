@@ -105,8 +105,11 @@ fn asked(arguments: &ProveArguments) -> Result<(Vec<&'static dyn Maker>, Option<
         let domain = arguments.domain.clone().unwrap_or_default();
         return Err(ProveError::UnknownDomain { domain, known: provable() });
     }
-    if arguments.worlds == 0 || arguments.runs == Some(0) {
+    if arguments.worlds == 0 {
         return Err(ProveError::NoWorlds);
+    }
+    if arguments.runs == Some(0) {
+        return Err(ProveError::NoRuns);
     }
     let unknown = |kind: &String| ProveError::UnknownKind { kind: kind.clone() };
     let hidden = |wanted: &String| key::hidden(wanted).ok_or_else(|| unknown(wanted));

@@ -54,19 +54,25 @@ pub struct Concealed {
 }
 
 impl Concealed {
-    /// The recording without all but its first runs (at least one), where it is a table; sounds stay as they are.
+    /// The recording without all but its first runs (at least one), where it is a table; sounds stay as they are. A table's runs follow each
+    /// other.
     pub fn first_runs(mut self, count: usize) -> Self {
         for (_, contents) in self.files.iter_mut().filter(|(name, _)| name == "data.csv") {
             let text = String::from_utf8_lossy(contents);
-            let run = |line: &str| line.split(',').next().unwrap_or_default().to_owned();
-            let mut runs: Vec<String> = Vec::new();
-            let kept = text.lines().enumerate().take_while(|(row, line)| {
-                if *row > 0 && !runs.contains(&run(line)) {
-                    runs.push(run(line));
-                }
-                runs.len() <= count.max(1)
+            let mut lines = text.lines();
+            let header = lines.next().unwrap_or_default();
+            let (mut run, mut runs) = ("", 0);
+            let kept = lines.take_while(|line| {
+                let label = line.split(',').next().unwrap_or_default();
+                runs += usize::from(label != run);
+                run = label;
+                runs <= count.max(1)
             });
-            *contents = kept.map(|(_, line)| format!("{line}\n")).collect::<String>().into_bytes();
+            *contents = std::iter::once(header)
+                .chain(kept)
+                .map(|line| format!("{line}\n"))
+                .collect::<String>()
+                .into_bytes();
         }
         self
     }

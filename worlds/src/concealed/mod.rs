@@ -128,6 +128,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_first_runs_are_kept_whole() {
+        for (domain, worlds) in worlds(11) {
+            for world in worlds.iter().filter(|w| !file(w, "data.csv").is_empty()) {
+                let cut = world.clone().first_runs(1);
+                let (all, kept) = (file(world, "data.csv"), file(&cut, "data.csv"));
+                let label = |line: &str| line.split(',').next().unwrap_or_default().to_owned();
+                let first = label(all.lines().nth(1).unwrap());
+                let expected: Vec<&str> =
+                    all.lines().filter(|l| l.starts_with("run,") || label(l) == first).collect();
+                assert!(kept.lines().eq(expected) && kept.len() < all.len(), "{domain}");
+                assert_eq!(world.clone().first_runs(1000), *world, "{domain}");
+            }
+        }
+    }
+
     /// Every file but the header is a sound that the header names, of one rate, whose samples are not all nought or clipped.
     fn sounds_are_well_formed(world: &Concealed) {
         let header = file(world, "recording.toml");

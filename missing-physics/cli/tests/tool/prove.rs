@@ -64,6 +64,25 @@ fn a_kind_that_a_domain_has_not_is_refused() {
 }
 
 #[test]
+fn no_worlds_and_no_runs_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    for (option, expected) in
+        [("--worlds", "0 worlds prove nothing"), ("--runs", "0 runs of each world prove nothing")]
+    {
+        let proof = folder.path().join("proof");
+        let output = Command::new(tool)
+            .args(["prove", "--domain", "slosh", option, "0", "--out"])
+            .arg(&proof)
+            .output()
+            .unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains(expected), "{said}");
+        assert!(!proof.exists());
+    }
+}
+
+#[test]
 fn a_domain_without_worlds_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let tool = env!("CARGO_BIN_EXE_missing-physics");
