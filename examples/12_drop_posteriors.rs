@@ -113,7 +113,7 @@ fn main() -> Result<(), Failure> {
     let density = full.ok_or("nothing was learned")?;
     let logarithms = DropSimulator { scale: Scale::Logarithms, ..simulator };
     let balls = joint(density.as_ref(), &logarithms, &model)?;
-    if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
+    if let Some(file) = examples::argument("--picture") {
         std::fs::write(&file, picture(&balls)?)?;
         println!("\ndrawn: {file}");
     }

@@ -79,7 +79,7 @@ fn main() -> Result<(), Failure> {
     println!(
         "\nThe mean leaves the outliers out, as the figure of [Matl 2021] does. Its room was a real one; ours are image sources."
     );
-    if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
+    if let Some(file) = examples::argument("--picture") {
         std::fs::write(&file, picture(&drawn)?)?;
         println!("drawn: {file}");
     }

@@ -97,7 +97,7 @@ fn main() -> Result<(), Failure> {
     println!(
         "\n[Matl 2021] dropped where its gripper was; here the ball is dropped where the map is highest, so the shares are not the same numbers."
     );
-    if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
+    if let Some(file) = examples::argument("--picture") {
         let scene = Scene::thesis(Ball::new(0.8, 1e3)?, 0.02)?;
         std::fs::write(&file, picture(&maps, &releases, scene.cup(), &size)?)?;
         println!("drawn: {file}");

@@ -20,6 +20,7 @@ use dough_mbrl::predictor::{Predictor, Refit};
 use dough_mbrl::repair::{Repaired, Response};
 use dough_mbrl::ridge::Ridge;
 use dough_mbrl::rollout::{End, Rolled, RolloutError, Setup};
+use examples::argument;
 use examples::bars::Bars;
 use examples::dough::{mean_and_half, rollouts, rolls};
 use missing_physics::diagnosis::{Diagnosis, Verdict};
@@ -85,11 +86,6 @@ struct Day {
     response: Response,
     /// Rolls by model and goal.
     bars: Vec<Done>,
-}
-
-/// What follows a word on the command line.
-fn argument(word: &str) -> Option<String> {
-    std::env::args().skip_while(|a| a != word).nth(1)
 }
 
 fn main() -> Outcome<()> {

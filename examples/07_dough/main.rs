@@ -21,6 +21,7 @@ use dough_mbrl::predictor::{Predictor, Refit};
 use dough_mbrl::ridge::Ridge;
 use dough_mbrl::roll::Roll;
 use dough_mbrl::rollout::{Rolled, RolloutError};
+use examples::argument;
 use examples::dough::{explore, rolls};
 
 type Failure = Box<dyn std::error::Error>;
@@ -55,7 +56,6 @@ struct Learned {
 }
 
 fn main() -> Result<(), Failure> {
-    let argument = |what: &str| std::env::args().skip_while(|a| a != what).nth(1);
     let seed = 1000 * argument("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
     let size = if examples::small() {
         let goals = vec![2.0, 4.0];

@@ -71,7 +71,7 @@ impl Bar {
 
 /// The number after an option.
 fn number(option: &str) -> Option<u64> {
-    std::env::args().skip_while(|a| a != option).nth(1)?.parse().ok()
+    examples::argument(option)?.parse().ok()
 }
 
 fn main() -> Result<(), Failure> {
@@ -84,7 +84,7 @@ fn main() -> Result<(), Failure> {
     for &listener in &listeners[..if small || number("--throws").is_some() { 1 } else { 2 }] {
         bars.push(compare(place, listener, &known, throws)?);
     }
-    if let Some(file) = std::env::args().skip_while(|a| a != "--picture").nth(1) {
+    if let Some(file) = examples::argument("--picture") {
         std::fs::write(&file, picture::picture(&bars[0])?)?;
         println!("\ndrawn: {file}");
     }

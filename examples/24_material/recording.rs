@@ -3,17 +3,14 @@
 use bounce_audio::fake::knock::SUBSTANCES;
 use bounce_audio::material::{Classifier, Given, Observation, Senses};
 use bounce_audio::wav::Sound;
+use examples::argument;
 
 use crate::{CONFIDENT, FLAT, LEVEL, Outcome};
 
-fn option(name: &str) -> Option<String> {
-    std::env::args().skip_while(|a| a != name).nth(1)
-}
-
 /// Answers for the file of `--wav`, by each sense that it and `--mass-kg`, `--diameter-m` allow.
 pub(crate) fn print(classifier: &Classifier) -> Outcome<()> {
-    let Some(file) = option("--wav") else { return Ok(()) };
-    let number = |name: &str| -> Outcome<Option<f64>> { Ok(option(name).map(|v| v.parse()).transpose()?) };
+    let Some(file) = argument("--wav") else { return Ok(()) };
+    let number = |name: &str| -> Outcome<Option<f64>> { Ok(argument(name).map(|v| v.parse()).transpose()?) };
     let given = Given {
         mass_kg: number("--mass-kg")?,
         diameter_m: number("--diameter-m")?,

@@ -23,6 +23,11 @@ pub fn small() -> bool {
     std::env::args().any(|a| a == "--small")
 }
 
+/// What follows an option on the command line.
+pub fn argument(option: &str) -> Option<String> {
+    std::env::args().skip_while(|a| a != option).nth(1)
+}
+
 /// The model of a flight of which nothing is known but gravity.
 pub fn model(measured: Measured) -> TrajectoryModel {
     let axes = match measured {
