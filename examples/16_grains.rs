@@ -6,24 +6,19 @@
 
 use std::error::Error;
 
-use examples::grains::{begin, heap, height_map, panel, rings, scatter};
+use examples::grains::{begin, heap, height_map, look, panel, pour, rings, scatter};
 use granular_infer::campaign::{Grains, Rig};
 use granular_infer::fake::{FakeRig, Kind};
 use granular_infer::posterior::{GrainPosterior, Inferred};
 use granular_infer::scene::{COUSCOUS, Grain, Scene, prior};
-use granular_infer::seeing::HeightMap;
 use granular_infer::summary::NAMES;
 use granular_infer::tasks::{Bowl, Ring, RingHeights, spilled};
 use granular_infer::view::View;
-use hw_traits::arm::{Arm, Pose};
-use hw_traits::camera::DepthCamera;
-use hw_traits::clock::Clock;
-use hw_traits::gripper::Gripper;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let (posterior, heights) = (GrainPosterior::shipped()?, RingHeights::shipped()?);
     let mut svg = begin(3, 2);
     let hidden = Grain { sliding_friction: 0.45, rolling_friction: 0.12, restitution: 0.35 };
@@ -42,29 +37,12 @@ fn dice(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// Carries the funnel to a place, pours it out and waits.
-fn pour(rig: &mut FakeRig, position_m: [f64; 3]) -> Result<(), Box<dyn Error>> {
-    rig.move_to(Pose { position_m, rotation_xyzw: [0.0, 0.0, 0.0, 1.0] }, 2.0)?;
-    rig.sleep_s(2.1)?;
-    rig.refill()?;
-    let (_, open) = rig.limits_m();
-    rig.open_to(open, 0.1)?;
-    Ok(rig.sleep_s(2.0)?)
-}
-
-/// A picture of the rig's camera as heights.
-fn look(rig: &mut FakeRig) -> Result<HeightMap, Box<dyn Error>> {
-    let picture = rig.depth_m()?.value;
-    let depths: Vec<f64> = picture.data().iter().map(|d| f64::from(*d)).collect();
-    Ok(HeightMap::from_depths(&rig.view().camera, &depths, 1e-6)?)
-}
-
 /// One pour, one picture, one posterior; then the same again with what was inferred.
 fn one_picture(
     posterior: &GrainPosterior,
     hidden: Grain,
     svg: &mut String,
-) -> Result<Inferred, Box<dyn Error>> {
+) -> Result<Inferred, Box<dyn Error + Send + Sync>> {
     let (scene, view) = (Scene::default(), View::default());
     let kind = Kind { grain: hidden, shape: None, size_variation: 0.0, work_of_adhesion_j_m2: 0.0 };
     let mut rig = FakeRig::new(scene, kind, view, 11);
@@ -111,7 +89,7 @@ fn one_picture(
 }
 
 /// Section 3.6: errors over heaps of unseen grains, and the statistics of heaps poured again.
-fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error>> {
+fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error + Send + Sync>> {
     let heaps: u64 = if examples::small() { 3 } else { 50 };
     let (scene, view, prior) = (Scene::default(), View::default(), prior()?);
     let one = |i: u64| -> Option<[f64; 4]> {
@@ -143,7 +121,7 @@ fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error>> {
 }
 
 /// Three rings at three places, each asked for by its two radii; the fake pours, the camera compares.
-fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error>> {
+fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error + Send + Sync>> {
     let (scene, view) = (Scene::default(), View::default());
     // The wanted radii are those that couscous made once, from heights that the planner does not know.
     let makes = [0.025, 0.06, 0.11];
@@ -193,7 +171,7 @@ fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error>
 }
 
 /// Spilled grains, foretold from the posterior and poured with the hidden grain.
-fn bowl(hidden: Grain, inferred: &Inferred) -> Result<(), Box<dyn Error>> {
+fn bowl(hidden: Grain, inferred: &Inferred) -> Result<(), Box<dyn Error + Send + Sync>> {
     let (count, pours) = if examples::small() { (40, 2) } else { (250, 8) };
     let scene = Scene { rig: Rig { count, ..Scene::default().rig }, ..Scene::default() };
     let bowl = Bowl::round(0.03, 0.05, 0.025)?;

@@ -8,6 +8,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -97,8 +98,10 @@ struct Header {
 
 const FORMAT: &str = "bayes-sim campaign";
 const VERSION: u32 = 1;
-/// Draws between two writes and two looks at the stop flag.
+/// Most draws between two writes and two looks at the stop flag.
 const CHUNK: usize = 256;
+/// After draws that took less than this, in s, twice as many come between two writes.
+const SOON_S: f64 = 2.5;
 
 impl Campaign {
     /// The parameters and the generator of draw `index`.
@@ -122,8 +125,8 @@ impl Campaign {
         Record { index, theta, outcome }
     }
 
-    /// Runs what is missing of a shard and appends it to the file, which is made if it is not there. `progress` is told after
-    /// every few hundred how many are done, of how many; once `stop` is true, the run ends there and a later call goes on.
+    /// Runs what is missing of a shard and appends it to the file, which is made if it is not there. `progress` is told every few
+    /// seconds (after a draw for each thread, where draws take longer) how many are done, of how many; once `stop` is true, the run ends there and a later call goes on.
     ///
     /// # Errors
     /// [`Error::Setting`] for a shard that does not exist; [`Error::Mismatch`] if the file holds another campaign or the
@@ -158,10 +161,11 @@ impl Campaign {
         progress(done, total);
         let file = OpenOptions::new().append(true).open(path).map_err(Error::io(path))?;
         let mut writer = BufWriter::new(file);
-        for chunk in missing.chunks(CHUNK) {
-            if stop.load(Ordering::Relaxed) {
-                break;
-            }
+        let (mut left, mut size) = (missing.as_slice(), rayon::current_num_threads());
+        while !left.is_empty() && !stop.load(Ordering::Relaxed) {
+            let (chunk, rest) = left.split_at(size.min(left.len()));
+            left = rest;
+            let begin = Instant::now();
             let records: Vec<Record> = chunk.par_iter().map(|&i| self.simulate(simulator, i)).collect();
             for record in records {
                 writeln!(writer, "{}", record.line()).map_err(Error::io(path))?;
@@ -170,6 +174,9 @@ impl Campaign {
             writer.flush().map_err(Error::io(path))?;
             done += chunk.len();
             progress(done, total);
+            if begin.elapsed().as_secs_f64() < SOON_S {
+                size = (2 * size).min(CHUNK);
+            }
         }
         Ok(results)
     }

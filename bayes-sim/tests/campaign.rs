@@ -84,6 +84,18 @@ fn a_run_that_was_stopped_and_cut_goes_on_to_the_same_end() {
     assert_eq!(Results::read(&path).unwrap().simulations().unwrap(), fresh.simulations().unwrap());
 }
 
+/// Draws that take hours are not lost: the first are written once each thread has one.
+#[test]
+fn the_first_draws_are_written_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let stop = AtomicBool::new(false);
+    let progress = |done: usize, _: usize| stop.store(done > 0, Ordering::Relaxed);
+    let path = folder.path().join("file");
+    let part = campaign(1200).run(&Shaky, Shard::WHOLE, &path, &progress, &stop).unwrap();
+    assert_eq!(part.missing(), 1200 - rayon::current_num_threads());
+    assert_eq!(Results::read(&path).unwrap().missing(), part.missing());
+}
+
 #[test]
 fn wrong_files_are_told() {
     let folder = tempfile::tempdir().unwrap();

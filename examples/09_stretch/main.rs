@@ -2,7 +2,7 @@
 //! by palpation, a cookie.
 //!
 //! `cargo run --release -p examples --example 09_stretch` (`--small`: fewer states); prints the figures' tables and draws them into
-//! `stretch.svg` in the temporary folder. Not drawn: the photographs of figure 6.1, and of 6.6's objects those that bend.
+//! `stretch.svg` in the temporary folder. Not drawn: the photographs of figure 6.1.
 #![allow(clippy::print_stdout, reason = "printing is what an example is for")]
 
 mod forces;

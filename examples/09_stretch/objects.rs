@@ -4,6 +4,7 @@ use examples::plot::{Panel, hue};
 use hw_traits::arm::{Arm, Pose};
 use hw_traits::camera::DepthCamera;
 use hw_traits::gripper::Gripper;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use stretch::contact::points;
 use stretch::fake::{Filling, Lump, Rig, Shape};
@@ -13,64 +14,174 @@ use stretch::shape::{Rolling, Settling, circularity, roll};
 
 use super::{Outcome, at, look};
 
-/// An object, the least and the largest x and y of it (m), and where it is touched: along x, and how far below its highest point (m).
-type Object = (&'static str, Shape, [[f64; 2]; 2], &'static [[f64; 2]]);
+/// An object that is touched.
+struct Object {
+    name: &'static str,
+    shape: Shape,
+    filling: Filling,
+    /// The least and the largest x and y of it, m.
+    extent_m: [[f64; 2]; 2],
+    /// Where it is touched: along x, and how far below its highest point (m).
+    touches: Vec<[f64; 2]>,
+    /// What it is turned by before each round of touches, about an axis along y so far (m) below its highest point.
+    turns: (f64, Vec<f64>),
+}
 
-const OBJECTS: [Object; 8] = [
-    ("cube, 1 touch", Shape::Box { half_m: [0.015, 0.015] }, [[-0.015, 0.015]; 2], &[[0.0, 0.008]]),
-    ("cylinder, 1", Shape::Cylinder { radius_m: 0.015 }, [[-0.015, 0.015]; 2], &[[0.0, 0.008]]),
-    ("ball, 1", Shape::Ball { radius_m: 0.02 }, [[-0.02, 0.02]; 2], &[[0.0, 0.012]]),
-    (
-        "half-cylinder, 3",
-        Shape::Ridge { radius_m: 0.012, half_length_m: 0.03 },
-        [[-0.03, 0.03], [-0.012, 0.012]],
-        &[[-0.016, 0.008], [0.0, 0.008], [0.016, 0.008]],
-    ),
-    (
-        "bridge, 3",
-        Shape::Box { half_m: [0.03, 0.01] },
-        [[-0.03, 0.03], [-0.01, 0.01]],
-        &[[-0.016, 0.008], [0.0, 0.008], [0.016, 0.008]],
-    ),
-    (
-        "snowman, 3",
-        Shape::Snowman { radii_m: [0.015, 0.0135, 0.012] },
-        [[-0.015, 0.066], [-0.015, 0.015]],
-        &[[0.0, 0.008], [0.0285, 0.011], [0.054, 0.014]],
-    ),
-    ("wire circle, 1", Shape::Hoop { radius_m: 0.02, wire_m: 0.002 }, [[-0.022, 0.022]; 2], &[[0.0, 0.008]]),
-    (
-        "wire triangle, 1",
-        Shape::Triangle { radius_m: 0.025, wire_m: 0.002 },
-        [[-0.015, 0.027], [-0.024, 0.024]],
-        &[[0.0, 0.008]],
-    ),
-];
+impl Object {
+    fn new(name: &'static str, shape: Shape, extent_m: [[f64; 2]; 2], touches: &[[f64; 2]]) -> Self {
+        let (touches, turns) = (touches.to_vec(), (0.0, vec![0.0]));
+        Self { name, shape, filling: Filling::Rigid, extent_m, touches, turns }
+    }
 
-/// Figure 6.6: touches at no stretch, merged in the world.
+    /// Of folded paper, whose top sinks by the force over a stiffness.
+    fn of_paper(self) -> Self {
+        Self { filling: Filling::Springy(PAPER_N_M), ..self }
+    }
+
+    /// Touched from so many sides about an axis so far (m) below its highest point.
+    fn touched_round(self, sides: u32, axis_m: f64) -> Self {
+        let angle = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(sides);
+        Self { turns: (axis_m, (0..sides).map(angle).collect()), ..self }
+    }
+}
+
+/// Stiffness of a box of folded paper from above, N/m: 3 mm for half a newton.
+const PAPER_N_M: f64 = 160.0;
+
+/// The ten of figure 6.6, a standing cylinder and a ball; a bridge is a bar here.
+fn objects() -> Vec<Object> {
+    let one = &[[0.0, 0.008]];
+    let three = &[[-0.016, 0.008], [0.0, 0.008], [0.016, 0.008]];
+    let cube = |name| Object::new(name, Shape::Box { half_m: [0.015, 0.015] }, [[-0.015, 0.015]; 2], one);
+    let half_cylinder = |name| {
+        let shape = Shape::Ridge { radius_m: 0.012, half_length_m: 0.03 };
+        Object::new(name, shape, [[-0.03, 0.03], [-0.012, 0.012]], three)
+    };
+    let (circle_m, corner_m, wire_m) = (0.02, 0.025, 0.002);
+    // A side of the triangle, and how far it is from the middle.
+    let (half_side_m, to_side_m) = (0.5 * 3f64.sqrt() * corner_m, 0.5 * corner_m);
+    let upright = |half_m: f64| [[-half_m, half_m], [-wire_m, wire_m]];
+    vec![
+        cube("cube"),
+        Object::new("cylinder", Shape::Cylinder { radius_m: 0.015 }, [[-0.015, 0.015]; 2], one),
+        Object::new("ball", Shape::Ball { radius_m: 0.02 }, [[-0.02, 0.02]; 2], &[[0.0, 0.012]]),
+        Object::new(
+            "prism",
+            Shape::Prism { half_m: 0.015, height_m: 0.015, half_length_m: 0.03 },
+            [[-0.03, 0.03], [-0.015, 0.015]],
+            three,
+        ),
+        half_cylinder("half-cylinder"),
+        Object::new("bridge", Shape::Box { half_m: [0.03, 0.01] }, [[-0.03, 0.03], [-0.01, 0.01]], three),
+        Object::new(
+            "snowman",
+            Shape::Snowman { radii_m: [0.015, 0.0135, 0.012] },
+            [[-0.015, 0.066], [-0.015, 0.015]],
+            &[[0.0, 0.008], [0.0285, 0.011], [0.054, 0.014]],
+        ),
+        cube("paper cube").of_paper(),
+        half_cylinder("paper half-cyl.").of_paper(),
+        Object::new(
+            "paper pyramid",
+            Shape::Pyramid { half_m: 0.02, height_m: 0.02 },
+            [[-0.02, 0.02]; 2],
+            &[[0.0, 0.012]],
+        )
+        .of_paper(),
+        Object::new("circle, lying", Shape::Hoop { radius_m: circle_m, wire_m }, [[-0.022, 0.022]; 2], one),
+        Object::new("circle, upright", Shape::Rim { radius_m: circle_m, wire_m }, upright(0.022), one)
+            .touched_round(6, circle_m + wire_m),
+        Object::new(
+            "triangle, lying",
+            Shape::Triangle { radius_m: corner_m, wire_m },
+            [[-0.015, 0.027], [-0.024, 0.024]],
+            one,
+        ),
+        Object::new(
+            "triangle, upright",
+            Shape::Ridge { radius_m: wire_m, half_length_m: half_side_m },
+            upright(half_side_m),
+            one,
+        )
+        .touched_round(3, to_side_m + wire_m),
+    ]
+}
+
+/// Figure 6.6: touches at no stretch, merged in the frame of the object.
 pub(crate) fn reconstructed(panels: &mut Vec<Panel>) -> Outcome<()> {
-    println!("\nObjects from touches at no stretch (figure 6.6; [Matl 2021]: dimensions within 2 mm)");
-    println!("{:>18} {:>8} {:>24} {:>14}", "", "points", "off the surface: median", "95 % (mm)");
-    let objects = if examples::small() { &OBJECTS[..1] } else { &OBJECTS[..] };
-    for (name, shape, extent_m, places) in objects.iter().copied() {
+    println!(
+        "\nObjects from touches at no stretch (figure 6.6; [Matl 2021]: dimensions within 2 mm, of paper 3 mm)"
+    );
+    println!(
+        "{:>18} {:>8} {:>8} {:>24} {:>10}",
+        "", "touches", "points", "off the surface: median", "95 % (mm)"
+    );
+    let objects = objects();
+    let objects = if examples::small() { &objects[..1] } else { &objects[..] };
+    for object in objects {
         let mut merged = Merged::new(1.5e-3)?;
-        for (k, &[x, below]) in places.iter().enumerate() {
-            let mut rig = Rig::new(shape, Filling::Rigid, 660 + k as u64);
-            let (cloud, segmenter) = look(&mut rig, 0.0, at(x, -below))?;
-            // The camera looks down on the membrane: its rows go against the world's y.
-            let z = rig.eye.distance_m - below;
-            let camera = Pose { position_m: [x, 0.0, z], rotation_xyzw: [1.0, 0.0, 0.0, 0.0] };
-            merged.add(&camera, &points(&cloud, &segmenter.states))?;
+        let (axis_m, turns) = &object.turns;
+        let mut surface_m = Vec::new();
+        for (side, &turn) in turns.iter().enumerate() {
+            let turned = about(turn, *axis_m);
+            for (k, &[x, below]) in object.touches.iter().enumerate() {
+                let mut rig = Rig::new(object.shape, object.filling, 660 + (3 * side + k) as u64);
+                let (cloud, segmenter) = look(&mut rig, 0.0, at(x, -below))?;
+                // The camera looks down on the membrane: its rows go against the world's y.
+                let camera = Isometry3::from_parts(
+                    Translation3::new(x, 0.0, rig.eye.distance_m - below),
+                    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
+                );
+                merged.add(&pose(&(turned * camera)), &points(&cloud, &segmenter.states))?;
+            }
+            let upper = surface(&object.shape, object.extent_m);
+            surface_m.extend(
+                upper.iter().map(|p| -> [f64; 3] { turned.transform_point(&(*p).into()).coords.into() }),
+            );
         }
         let seen = merged.points(3);
-        let surface = surface(&shape, extent_m);
-        let mut off: Vec<f64> = seen.iter().map(|p| nearest_m(&surface, p)).collect();
+        let mut off: Vec<f64> = seen.iter().map(|p| nearest_m(&surface_m, p)).collect();
         off.sort_by(f64::total_cmp);
         let share = |part: usize| off.get(off.len() * part / 100).map_or(f64::NAN, |d| 1e3 * d);
-        println!("{name:>18} {:>8} {:>24.2} {:>14.2}", seen.len(), share(50), share(95));
-        panels.push(heights(name, &seen, extent_m));
+        println!(
+            "{:>18} {:>8} {:>8} {:>24.2} {:>10.2}",
+            object.name,
+            turns.len() * object.touches.len(),
+            seen.len(),
+            share(50),
+            share(95)
+        );
+        panels.push(if turns.len() > 1 {
+            from_side(object.name, &seen, &surface_m)
+        } else {
+            heights(object.name, &seen, object.extent_m)
+        });
     }
     Ok(())
+}
+
+/// A turn (rad) about an axis along y, so far (m) below the origin.
+fn about(turn: f64, axis_m: f64) -> Isometry3<f64> {
+    let below = Translation3::new(0.0, 0.0, -axis_m);
+    below * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn) * below.inverse()
+}
+
+fn pose(of: &Isometry3<f64>) -> Pose {
+    Pose { position_m: of.translation.vector.into(), rotation_xyzw: of.rotation.coords.into() }
+}
+
+/// What stands upright from the side: points that were felt over those of its surface.
+fn from_side(name: &str, seen: &[[f64; 3]], surface_m: &[[f64; 3]]) -> Panel {
+    let of = |points: &[[f64; 3]]| points.iter().map(|p| [1e3 * p[0], 1e3 * p[2]]).collect::<Vec<_>>();
+    let step = 1 + surface_m.len() / 2000;
+    let mut panel = Panel::new(format!("6.6: {name}"), "x (mm)", "z (mm)").map();
+    for [x, z] in of(&surface_m.iter().step_by(step).copied().collect::<Vec<_>>()) {
+        panel.cell([x, z], [0.6, 0.6], "lightgrey");
+    }
+    for [x, z] in of(seen) {
+        panel.cell([x, z], [0.8, 0.8], "firebrick");
+    }
+    panel
 }
 
 /// Points of an object's upper side every half millimetre, m.

@@ -1,13 +1,41 @@
-//! Pictures of grains as SVG.
+//! Grains on a fake rig, and pictures of them as SVG.
 
 use std::fmt::{Error, Write};
 
 use granular_infer::campaign::Grains;
+use granular_infer::fake::FakeRig;
 use granular_infer::seeing::HeightMap;
 use granular_infer::tasks::Ring;
+use hw_traits::arm::{Arm as _, Pose};
+use hw_traits::camera::DepthCamera as _;
+use hw_traits::clock::Clock as _;
+use hw_traits::gripper::Gripper as _;
 
 /// Pixels a panel is wide and high.
 pub const PANEL: f64 = 320.0;
+
+/// Carries the funnel to a place (m, its outlet), pours it out and waits.
+///
+/// # Errors
+/// The rig's, for a place that it cannot reach.
+pub fn pour(rig: &mut FakeRig, position_m: [f64; 3]) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    rig.move_to(Pose { position_m, rotation_xyzw: [0.0, 0.0, 0.0, 1.0] }, 2.0)?;
+    rig.sleep_s(2.1)?;
+    rig.refill()?;
+    let (_, open) = rig.limits_m();
+    rig.open_to(open, 0.1)?;
+    Ok(rig.sleep_s(2.0)?)
+}
+
+/// A picture of the rig's camera as heights.
+///
+/// # Errors
+/// Those of a picture that shows no grains on a ground.
+pub fn look(rig: &mut FakeRig) -> Result<HeightMap, Box<dyn std::error::Error + Send + Sync>> {
+    let picture = rig.depth_m()?.value;
+    let depths: Vec<f64> = picture.data().iter().map(|d| f64::from(*d)).collect();
+    Ok(HeightMap::from_depths(&rig.view().camera, &depths, 1e-6)?)
+}
 
 /// Begins a picture of so many panels in a row, and rows of them.
 pub fn begin(columns: usize, rows: usize) -> String {

@@ -24,7 +24,7 @@ use granular_infer::dem::Clump;
 use granular_infer::posterior::{GrainPosterior, settings};
 use granular_infer::scene::{Grain, Scene};
 use granular_infer::summary::COUNT;
-use granular_infer::tasks::{Ring, RingHeights, rings};
+use granular_infer::tasks::{Heights, Ring, RingHeights, heights};
 use granular_infer::view::{View, seen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -49,10 +49,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let out = Path::new(out);
     let shards = files.iter().map(|f| Results::read(Path::new(f))).collect::<Result<Vec<_>, _>>()?;
-    let (pours, heights): (Vec<_>, Vec<_>) = shards.into_iter().partition(|s| s.campaign.prior.dim() == 3);
+    let (pours, of_heights): (Vec<_>, Vec<_>) = shards.into_iter().partition(|s| s.campaign.prior.dim() == 3);
     let (scene, view) = (Scene::default(), View::default());
-    if !heights.is_empty() {
-        learn_heights(&Results::merge(heights)?, &scene, &view, out)?;
+    if !of_heights.is_empty() {
+        learn_heights(&Results::merge(of_heights)?, &scene, &view, out)?;
+    }
+    if pours.is_empty() {
+        return Ok(());
     }
     let results = Results::merge(pours)?;
     let (mut training, mut unseen) = (results.clone(), results.clone());
@@ -175,27 +178,32 @@ fn ship(posterior: &GrainPosterior, out: &Path) -> Result<(), Box<dyn Error>> {
 
 /// Heights for rings: every fifth pour is held out.
 fn learn_heights(results: &Results, scene: &Scene, view: &View, out: &Path) -> Result<(), Box<dyn Error>> {
-    let all = rings(results, scene, view, 1)?;
-    let part = |held_out: bool| {
-        let rows: Vec<usize> = (0..all.len()).filter(|i| (i % 5 == 0) == held_out).collect();
-        (all.theta().select(&rows), all.x().select(&rows))
+    let all = heights(results, scene, view, 1)?;
+    let part = |held_out: bool| -> Result<Heights, bayes_sim::error::Error> {
+        let rows: Vec<usize> = (0..all.radii.len()).filter(|i| i.is_multiple_of(5) == held_out).collect();
+        let of = |s: &Simulations| Simulations::new(s.theta().select(&rows), s.x().select(&rows));
+        Ok(Heights { radii: of(&all.radii)?, pictures: of(&all.pictures)? })
     };
-    let ((theta, x), (truth, seen)) = (part(false), part(true));
-    let heights = RingHeights::train(&results.campaign.prior, &Simulations::new(theta, x)?, 1)?;
-    std::fs::write(out.join("heights.json.gz"), heights.to_bytes()?)?;
-    let mut errors = Vec::new();
-    let mut scores = Vec::new();
-    for (t, x) in truth.rows().zip(seen.rows()) {
-        let (mean, sd) = heights.height_m(Ring { inner_m: x[0], outer_m: x[1] })?;
-        errors.push(100.0 * (mean - t[0]));
-        scores.push((mean - t[0]) / sd);
-    }
-    let (mean, sd) = mean_sd(errors.iter().copied());
-    let within = scores.iter().filter(|z| z.abs() < 1.96).count();
-    println!(
-        "height for a ring: error {mean:+.4} +- {sd:.4} cm over {} unseen pours ([Matl 2021]: 0.0530 +- 0.2221), {within} of them within 1.96 sigma",
-        errors.len()
+    let tests = part(true)?;
+    let learned = RingHeights::train(&results.campaign.prior, &part(false)?, 1)?;
+    std::fs::write(out.join("heights.json.gz"), learned.to_bytes()?)?;
+    let print = |name: &str, found: Vec<(f64, f64)>| {
+        let errors = || found.iter().zip(tests.radii.theta().rows()).map(|(f, t)| f.0 - t[0]);
+        let within = errors().zip(&found).filter(|(e, f)| e.abs() < 1.96 * f.1).count();
+        let (mean, sd) = mean_sd(errors().map(|e| 100.0 * e));
+        println!(
+            "height by {name}: error {mean:+.4} +- {sd:.4} cm (the mean +- {:.4}) over {} unseen pours ([Matl 2021]: 0.0530 +- 0.2221), {within} of them within 1.96 sigma",
+            of_mean(sd, found.len()),
+            found.len()
+        );
+    };
+    let ring = |x: &[f64]| Ring { inner_m: x[0], outer_m: x[1] };
+    print(
+        "a ring's radii",
+        tests.radii.x().rows().map(|x| learned.height_m(ring(x))).collect::<Result<_, _>>()?,
     );
+    let by_picture = |i| learned.poured_from_m(&statistics(&tests.pictures, i));
+    print("16 statistics", (0..tests.pictures.len()).map(by_picture).collect::<Result<_, _>>()?);
     Ok(())
 }
 

@@ -29,8 +29,8 @@ pub struct Grain {
 /// Heights in m of the outlet from which a series of pours is made: low enough that grains hardly bounce, and three times as high as one pour.
 pub const SERIES_M: [f64; 3] = [0.04, 0.12, 0.24];
 
-/// Grains that pour as couscous does. [Matl 2021] has `mu_s = 0.67` and e = 0.77; its `mu_r = 8e-7` means something in its solver alone.
-pub const COUSCOUS: Grain = Grain { sliding_friction: 0.6687, rolling_friction: 0.05, restitution: 0.5 };
+/// Couscous as [Matl 2021] inferred it (section 3.6); its `mu_r = 8e-7` means something in its solver alone.
+pub const COUSCOUS: Grain = Grain { sliding_friction: 0.6687, rolling_friction: 0.05, restitution: 0.7689 };
 
 impl Grain {
     /// From `[mu_s, mu_r, e]`; none for another number of parameters.
@@ -190,6 +190,9 @@ pub struct FromHeights {
     pub scene: Scene,
     /// Heights of the outlet in m.
     pub heights_m: Vec<f64>,
+    /// Range within which the cloth's rolling friction is drawn, flat in its logarithm, once for all heights: a nuisance parameter. None for the
+    /// scene's.
+    pub cloths: Option<[f64; 2]>,
 }
 
 impl Simulator for FromHeights {
@@ -201,9 +204,13 @@ impl Simulator for FromHeights {
         let grain = Grain::from_theta(theta).ok_or_else(|| SimulationFailure {
             reason: format!("{} parameters instead of 3", theta.len()),
         })?;
+        let mut scene = self.scene;
+        if let Some([low, high]) = self.cloths {
+            scene.cloth_rolling_friction = low * (high / low).powf(rng.random());
+        }
         let mut x = Vec::with_capacity(self.x_dim());
         for &height_m in &self.heights_m {
-            x.extend(self.scene.features(&grain, height_m, rng)?);
+            x.extend(scene.features(&grain, height_m, rng)?);
         }
         Ok(x)
     }

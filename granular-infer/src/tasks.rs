@@ -11,10 +11,13 @@ use bayes_sim::simulations::Simulations;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use statrs::statistics::Statistics as _;
 
 use crate::dem::{DemError, Mesh, Shape, Wall};
+use crate::posterior::settings;
 use crate::scene::{Grain, Scene};
 use crate::shipped::{self, ShippedError};
+use crate::summary::{COUNT, summary};
 use crate::view::View;
 
 /// A ring, as [Matl 2021] measures one: the 5th and the 50th percentile of the distances at which grains are seen.
@@ -49,15 +52,27 @@ const SHIPPED: &[u8] = include_bytes!("../heights.json.gz");
 /// Which height makes which ring, learned from pours of one kind of grain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RingHeights {
-    density: Mdrff,
+    /// From a ring's two radii.
+    of_radii: Mdrff,
+    /// From all statistics of a picture.
+    of_pictures: Mdrff,
 }
 
-/// Heights (m) and rings of a campaign of [`crate::scene::OfGrain`]: what [`RingHeights::train`] learns from.
+/// Pours of one kind of grain from known heights.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Heights {
+    /// Heights (m) and radii ([`Ring`]).
+    pub radii: Simulations,
+    /// Heights (m) and the 16 statistics of each picture.
+    pub pictures: Simulations,
+}
+
+/// Heights, rings and statistics of a campaign of [`crate::scene::OfGrain`]: what [`RingHeights::train`] learns from.
 ///
 /// # Errors
 /// [`Error::Length`] for a campaign of another number of grains; [`Error::TooFew`] below 50 pictures.
-pub fn rings(results: &Results, scene: &Scene, view: &View, seed: u64) -> Result<Simulations, Error> {
-    let (mut theta, mut x) = (Points::new(1), Points::new(2));
+pub fn heights(results: &Results, scene: &Scene, view: &View, seed: u64) -> Result<Heights, Error> {
+    let (mut theta, mut radii, mut pictures) = (Points::new(1), Points::new(2), Points::new(COUNT));
     for record in results.records.values() {
         let Ok(centres) = &record.outcome else { continue };
         let grains = scene.from_features(centres).ok_or(Error::Length {
@@ -68,12 +83,16 @@ pub fn rings(results: &Results, scene: &Scene, view: &View, seed: u64) -> Result
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(record.index as u64);
         let points = view.points(&grains, &scene.rig, &mut rng).unwrap_or_default();
-        if let Some(ring) = Ring::of(&points, [0.0; 2], f64::INFINITY) {
+        if let (Some(ring), Ok(picture)) = (Ring::of(&points, [0.0; 2], f64::INFINITY), summary(&points)) {
             theta.push(&record.theta)?;
-            x.push(&[ring.inner_m, ring.outer_m])?;
+            radii.push(&[ring.inner_m, ring.outer_m])?;
+            pictures.push(&picture.values)?;
         }
     }
-    Simulations::new(theta, x)
+    Ok(Heights {
+        radii: Simulations::new(theta.clone(), radii)?,
+        pictures: Simulations::new(theta, pictures)?,
+    })
 }
 
 impl RingHeights {
@@ -81,9 +100,12 @@ impl RingHeights {
     ///
     /// # Errors
     /// Those of [`Mdrff::train`].
-    pub fn train(prior: &Prior, rings: &Simulations, seed: u64) -> Result<Self, Error> {
-        let settings = MdrffSettings { frequencies: 50, components: 2, ..MdrffSettings::default() };
-        Ok(Self { density: Mdrff::train(prior, rings, &settings, seed)? })
+    pub fn train(prior: &Prior, poured: &Heights, seed: u64) -> Result<Self, Error> {
+        let few = MdrffSettings { frequencies: 50, components: 2, ..MdrffSettings::default() };
+        Ok(Self {
+            of_radii: Mdrff::train(prior, &poured.radii, &few, seed)?,
+            of_pictures: Mdrff::train(prior, &poured.pictures, &settings(), seed)?,
+        })
     }
 
     /// The heights that are shipped: pours of [`crate::scene::COUSCOUS`] from 1 to 13 cm, in the scene and the view of chapter 3.
@@ -102,25 +124,43 @@ impl RingHeights {
         shipped::pack(self)
     }
 
-    /// The posterior over the height in m for a wanted ring.
+    /// The posterior over the height in m for a ring that is wanted by its radii.
     ///
     /// # Errors
     /// [`Error::NotFinite`].
     pub fn infer(&self, wanted: Ring) -> Result<Posterior, Error> {
-        self.density.posterior(&[wanted.inner_m, wanted.outer_m])
+        self.of_radii.posterior(&[wanted.inner_m, wanted.outer_m])
     }
 
-    /// Mean and spread of that posterior, m.
+    /// The posterior over the height in m from which a picture's heap was poured: surer than that for its radii alone.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
+    pub fn infer_poured(&self, statistics: &[f64; COUNT]) -> Result<Posterior, Error> {
+        self.of_pictures.posterior(statistics)
+    }
+
+    /// Mean and spread of [`RingHeights::infer`], m.
     ///
     /// # Errors
     /// As [`RingHeights::infer`].
     pub fn height_m(&self, wanted: Ring) -> Result<(f64, f64), Error> {
-        let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let draws = self.infer(wanted)?.sample(2000, &mut rng).theta.column(0);
-        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
-        let variance = draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / draws.len() as f64;
-        Ok((mean, variance.sqrt()))
+        Ok(mean_and_spread(&self.infer(wanted)?))
     }
+
+    /// Mean and spread of [`RingHeights::infer_poured`], m.
+    ///
+    /// # Errors
+    /// As [`RingHeights::infer_poured`].
+    pub fn poured_from_m(&self, statistics: &[f64; COUNT]) -> Result<(f64, f64), Error> {
+        Ok(mean_and_spread(&self.infer_poured(statistics)?))
+    }
+}
+
+/// Of a posterior over one number, by 2,000 draws of a separate generator.
+fn mean_and_spread(posterior: &Posterior) -> (f64, f64) {
+    let draws = posterior.sample(2000, &mut ChaCha8Rng::seed_from_u64(0)).theta.column(0);
+    (draws.as_slice().mean(), draws.as_slice().population_std_dev())
 }
 
 /// A bowl that stands on the cloth under the funnel.

@@ -32,6 +32,22 @@ pub enum Shape {
         /// Half its length, m.
         half_length_m: f64,
     },
+    /// A prism that lies along x, an edge up.
+    Prism {
+        /// Half its breadth, m.
+        half_m: f64,
+        /// Its height, m.
+        height_m: f64,
+        /// Half its length, m.
+        half_length_m: f64,
+    },
+    /// A pyramid on a square, tip up.
+    Pyramid {
+        /// Half the square's side, m.
+        half_m: f64,
+        /// Its height, m.
+        height_m: f64,
+    },
     /// Three balls in a row along x that lie on one table, the first on the axis.
     Snowman {
         /// Radii, the largest first, m.
@@ -39,6 +55,13 @@ pub enum Shape {
     },
     /// A wire bent to a circle about the axis.
     Hoop {
+        /// Radius of the circle, m.
+        radius_m: f64,
+        /// Radius of the wire, m.
+        wire_m: f64,
+    },
+    /// A wire bent to a circle that stands on edge in the plane of x and z.
+    Rim {
         /// Radius of the circle, m.
         radius_m: f64,
         /// Radius of the wire, m.
@@ -86,6 +109,13 @@ impl Shape {
             Self::Ridge { radius_m, half_length_m } => {
                 (x.abs() <= half_length_m).then(|| round_m(radius_m, y.abs())).flatten()
             }
+            Self::Prism { half_m, height_m, half_length_m } => {
+                (x.abs() <= half_length_m && y.abs() <= half_m).then(|| -height_m * y.abs() / half_m)
+            }
+            Self::Pyramid { half_m, height_m } => {
+                let out = x.abs().max(y.abs());
+                (out <= half_m).then(|| -height_m * out / half_m)
+            }
             Self::Snowman { radii_m } => {
                 let mut middle_m = 0.0;
                 let mut before_m = None;
@@ -98,6 +128,11 @@ impl Shape {
                 radii_m.map(ball).into_iter().flatten().reduce(f64::max)
             }
             Self::Hoop { radius_m, wire_m } => round_m(wire_m, (r - radius_m).abs()),
+            Self::Rim { radius_m, wire_m } => {
+                let outer_m = radius_m + wire_m;
+                round_m(wire_m, y.abs())
+                    .and_then(|z| round_m(outer_m + z, x.abs()).map(|lower_m| z + lower_m))
+            }
             Self::Triangle { radius_m, wire_m } => round_m(wire_m, from_triangle_m(radius_m, x, y)),
             Self::Lump(lump) => lump.below_top_m(x, y),
         }
@@ -122,6 +157,26 @@ mod tests {
         }
         assert_relative_eq!(height_m(&row, 5.0, 1.0), -2.0 + 3f64.sqrt() - 2.0, epsilon = 1e-12);
         assert!(row.height_m(3.0, 0.0).is_none() && row.height_m(9.5, 0.0).is_none());
+    }
+
+    #[test]
+    fn edges_and_tips_fall_off_evenly() {
+        let roof = Shape::Prism { half_m: 2.0, height_m: 3.0, half_length_m: 5.0 };
+        assert_relative_eq!(height_m(&roof, -4.0, 1.0), -1.5, epsilon = 1e-12);
+        let tip = Shape::Pyramid { half_m: 2.0, height_m: 3.0 };
+        assert_relative_eq!(height_m(&tip, -0.5, 1.0), -1.5, epsilon = 1e-12);
+        assert!(roof.height_m(5.1, 0.0).is_none() && tip.height_m(0.0, 2.1).is_none());
+    }
+
+    /// Every point of the upper side is a wire's radius from the circle.
+    #[test]
+    fn a_standing_circle_is_a_torus() {
+        let rim = Shape::Rim { radius_m: 2.0, wire_m: 0.2 };
+        for (x, y) in [(0.0, 0.0), (0.9, 0.1), (-1.7, -0.15), (2.1, 0.05)] {
+            let z = height_m(&rim, x, y) + 2.2;
+            assert_relative_eq!((x.hypot(z) - 2.0).hypot(y), 0.2, epsilon = 1e-12);
+        }
+        assert!(rim.height_m(0.0, 0.21).is_none() && rim.height_m(2.19, 0.15).is_none());
     }
 
     #[test]
