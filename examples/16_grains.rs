@@ -17,6 +17,7 @@ use granular_infer::view::View;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use statrs::statistics::Statistics as _;
 
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let (posterior, heights) = (GrainPosterior::shipped()?, RingHeights::shipped()?);
@@ -112,9 +113,8 @@ fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error + Send + Sync>
     let published = [(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148), (1.582, 0.336)];
     for (k, (name, (m, s))) in ["mu_s", "ln mu_r", "e", "L2 of statistics"].iter().zip(published).enumerate()
     {
-        let n = errors.len() as f64;
-        let mean = errors.iter().map(|e| e[k]).sum::<f64>() / n;
-        let sd = (errors.iter().map(|e| (e[k] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let of = || errors.iter().map(|e| e[k]);
+        let (mean, sd) = (of().mean(), of().std_dev());
         println!("  {name:30} {mean:+8.4} +- {sd:.4}   {m:+8.4} +- {s:.4}");
     }
     Ok(())

@@ -22,6 +22,7 @@ use granular_infer::scene::{SERIES_M, Scene};
 use granular_infer::summary::COUNT;
 use granular_infer::view::{View, seen};
 use rayon::prelude::*;
+use statrs::statistics::Statistics as _;
 
 /// One series in so many is held out.
 const HELD_OUT: usize = 5;
@@ -123,10 +124,9 @@ fn errors(
         ])
     };
     let all = (0..tests.len()).into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
-    let n = all.len() as f64;
     Ok(std::array::from_fn(|j| {
-        let mean = all.iter().map(|e| e[j]).sum::<f64>() / n;
-        (mean, (all.iter().map(|e| (e[j] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+        let errors = || all.iter().map(|e| e[j]);
+        (errors().mean(), errors().std_dev())
     }))
 }
 

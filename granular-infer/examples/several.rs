@@ -19,6 +19,7 @@ use granular_infer::view::View;
 use rand::{RngExt as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use statrs::statistics::Statistics as _;
 
 const HEIGHT_M: f64 = 0.12;
 /// Draws from which intervals are read.
@@ -69,8 +70,8 @@ fn measured(
         .collect::<Result<_, bayes_sim::error::Error>>()?;
     let n = all.len() as f64;
     let of = |j: usize, name: &str| {
-        let mean = all.iter().map(|e| e[j].0).sum::<f64>() / n;
-        let spread = (all.iter().map(|e| (e[j].0 - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let errors = || all.iter().map(|e| e[j].0);
+        let (mean, spread) = (errors().mean(), errors().std_dev());
         let within = all.iter().filter(|e| e[j].1).count();
         format!("{name} {mean:+.3} ± {spread:.3} (± {:.3}), {within} within", 1.96 * spread / n.sqrt())
     };

@@ -18,9 +18,7 @@ use bayes_sim::posterior::ConditionalDensity;
 use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
 use granular_infer::camera::Flaws;
-use granular_infer::campaign::Grains;
 use granular_infer::columns::{Table, npz};
-use granular_infer::dem::Clump;
 use granular_infer::posterior::{GrainPosterior, settings};
 use granular_infer::scene::{Grain, Scene};
 use granular_infer::summary::COUNT;
@@ -29,6 +27,7 @@ use granular_infer::view::{View, seen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use statrs::statistics::Statistics as _;
 
 const HEIGHT_M: f64 = 0.12;
 /// One pour in so many is held out.
@@ -39,8 +38,6 @@ const HEAPS: usize = 50;
 const LEAST: usize = 50;
 /// Unseen heaps that are poured again with what was inferred.
 const AGAIN: usize = 50;
-/// Heaps of each other shape.
-const SHAPED: usize = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -109,7 +106,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     row("here", &errors(&posterior, &tests)?, tests.len());
     row("of the prior", &of_prior(&posterior, &tests), tests.len());
     again(&posterior, &scene, &view, &tests)?;
-    shapes(&posterior, &scene, &view, &tests)?;
 
     fewer(prior, &simulations, &tests)?;
     flawed(&posterior, [&training, &unseen], &scene, &view)
@@ -245,9 +241,7 @@ fn of_prior(posterior: &GrainPosterior, tests: &Simulations) -> Vec<(f64, f64)> 
 }
 
 fn mean_sd(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let n = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / n;
-    (mean, (values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+    (values.clone().mean(), values.std_dev())
 }
 
 /// Half of the 95 % interval of the mean of `count` values of a spread.
@@ -316,43 +310,6 @@ fn again(
         truth.0,
         truth.1
     );
-    Ok(())
-}
-
-/// Cubes and cylinders as heavy as the spheres, inferred as if they were spheres (section 3.6).
-fn shapes(
-    posterior: &GrainPosterior,
-    scene: &Scene,
-    view: &View,
-    tests: &Simulations,
-) -> Result<(), Box<dyn Error>> {
-    println!("\nother shapes, inferred as spheres, over {SHAPED} heaps each");
-    let volume_m3 = scene.rig.grain_volume_m3();
-    let edge_m = volume_m3.cbrt();
-    // As long as it is wide: pi/4 d^3.
-    let across_m = (4.0 * volume_m3 / std::f64::consts::PI).cbrt();
-    let cube = Clump::cube(edge_m)?;
-    let cylinder = Clump::cylinder(across_m, across_m)?;
-    for (name, clump) in [("cubes", cube), ("cylinders", cylinder)] {
-        let one = |i: usize| -> Option<([f64; 3], bool)> {
-            let truth = Grain::from_theta(tests.theta().row(i))?;
-            let poured = scene.pour(&truth, HEIGHT_M).run_with(&clump, i as u64).ok()?;
-            let grains = Grains { positions_m: poured.positions_m, radii_m: poured.radii_m };
-            let x = view.features(&grains, &scene.rig, &mut ChaCha8Rng::seed_from_u64(i as u64)).ok()?;
-            let inferred = posterior.infer(&x).ok()?;
-            let grain = inferred.estimate();
-            let error = [
-                grain.sliding_friction - truth.sliding_friction,
-                (grain.rolling_friction / truth.rolling_friction).ln(),
-                grain.restitution - truth.restitution,
-            ];
-            Some((error, inferred.resemblance.is_doubtful()))
-        };
-        let found: Vec<_> = (0..SHAPED.min(tests.len())).into_par_iter().filter_map(one).collect();
-        let errors: Vec<_> = (0..3).map(|j| mean_sd(found.iter().map(|f| f.0[j]))).collect();
-        row(name, &errors, found.len());
-        println!("{:14} {} of {} pictures doubted", "", found.iter().filter(|f| f.1).count(), found.len());
-    }
     Ok(())
 }
 

@@ -133,7 +133,9 @@ impl Evidence<'_> {
         let bound = added.iter().map(|&i| selection.shared[i]).find(|slot| fit.at_bound.contains(slot));
         let at_bound = |slot: usize| {
             let name = &problem.spec().parameters[problem.shared.index[slot]].name;
-            format!("{name} ended at its bound of {}", fit.shared[slot])
+            // Four digits: a bound often follows from the data.
+            let bound = format!("{:.3e}", fit.shared[slot]).parse().unwrap_or(fit.shared[slot]);
+            format!("{name} ended at its bound of {bound}")
         };
         let senseless = || {
             let limits = problem.model.extensions().limits?;
