@@ -79,7 +79,7 @@ fn one_picture(
     panel(svg, 0, 0, "poured: mu_s 0.45, mu_r 0.12, e 0.35")?;
     heap(svg, &rig.truth(), 0.09)?;
     panel(svg, 1, 0, "heights that the depth camera sees")?;
-    height_map(svg, &map, 0.02)?;
+    height_map(svg, &map, 0.02, 1.0)?;
     panel(svg, 2, 0, "poured with what was inferred")?;
     heap(svg, &again, 0.09)?;
     panel(svg, 0, 1, "posterior, truth in red")?;

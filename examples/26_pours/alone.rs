@@ -44,7 +44,7 @@ pub(crate) fn print(bench: &Bench) -> Outcome<()> {
             x.push(picture)?;
         }
         let training = Simulations::new(theta, x)?;
-        let density = Mdrff::train(&prior, &training, &settings(), 1)?;
+        let density = Mdrff::train(&prior, &training, &settings(1), 1)?;
         let error = |(mu, picture): &&(f64, [f64; COUNT])| -> Outcome<f64> {
             let draws = density.posterior(picture)?.sample(DRAWS, &mut ChaCha8Rng::seed_from_u64(0));
             Ok(draws.theta.column(0).mean() - mu)

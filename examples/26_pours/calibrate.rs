@@ -14,6 +14,8 @@ use crate::{Bench, HEIGHT_M, Outcome, spread};
 const OTHERS_M: [f64; 5] = [0.02, 0.04, 0.06, 0.08, 0.10];
 /// White in a picture of heights, m.
 const WHITE_M: f64 = 0.025;
+/// Part of the picture that is drawn: 20 cm.
+const SHOWN: f64 = 0.4;
 
 /// What a rig poured, as its camera saw it.
 struct Poured {
@@ -95,9 +97,9 @@ pub(crate) fn print(bench: &Bench) -> Outcome<()> {
             let foretold = bench.scene.grains(&grain, height_m, 70_000 + column as u64)?;
             let (map, _) = bench.view.look(&foretold, &bench.scene.rig, &mut ChaCha8Rng::seed_from_u64(1))?;
             panel(&mut svg, column, 2 * row, &format!("{name}, from {:.0} cm", 100.0 * height_m))?;
-            height_map(&mut svg, &of_rig.map, WHITE_M)?;
+            height_map(&mut svg, &of_rig.map, WHITE_M, SHOWN)?;
             panel(&mut svg, column, 2 * row + 1, "foretold, as spheres")?;
-            height_map(&mut svg, &map, WHITE_M)?;
+            height_map(&mut svg, &map, WHITE_M, SHOWN)?;
         }
         println!();
     }

@@ -78,21 +78,22 @@ pub fn heap(svg: &mut String, grains: &Grains, extent_m: f64) -> Result<(), Erro
     Ok(())
 }
 
-/// Heights above the ground, two by two pixels each, white at `most_m`.
+/// Heights above the ground in the middle `part` of a picture (at most 1), two by two pixels each, white at `most_m`.
 ///
 /// # Errors
 /// As [`panel`].
-pub fn height_map(svg: &mut String, map: &HeightMap, most_m: f64) -> Result<(), Error> {
+pub fn height_map(svg: &mut String, map: &HeightMap, most_m: f64, part: f64) -> Result<(), Error> {
     let [width, height] = map.size_px;
-    let size = 288.0 / width.max(height) as f64;
+    let [left, top] = [width, height].map(|side| (0.5 * (1.0 - part) * side as f64) as usize);
+    let size = 288.0 / (part * width.max(height) as f64);
     write!(svg, "<rect x='16' y='26' width='288' height='288' fill='black'/>")?;
-    for v in (0..height).step_by(2) {
-        for u in (0..width).step_by(2) {
+    for v in (top..height - top).step_by(2) {
+        for u in (left..width - left).step_by(2) {
             let z = map.heights_m[v * width + u];
             let share = (z / most_m).clamp(0.0, 1.0);
             // Noise of the cloth stays black.
             if share > 0.06 {
-                let (x, y) = (16.0 + size * u as f64, 26.0 + size * v as f64);
+                let (x, y) = (16.0 + size * (u - left) as f64, 26.0 + size * (v - top) as f64);
                 let (hue, light) = (260.0 - 220.0 * share, 20.0 + 60.0 * share);
                 write!(
                     svg,

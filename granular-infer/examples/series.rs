@@ -91,7 +91,7 @@ fn learn(
     [training, calibrating]: [&Simulations; 2],
     heights: &[usize],
 ) -> Result<GrainPosterior, Box<dyn Error>> {
-    let learned = GrainPosterior::train(prior, &pictures(training, heights)?, &settings(), 1)?;
+    let learned = GrainPosterior::train(prior, &pictures(training, heights)?, &settings(heights.len()), 1)?;
     Ok(learned.widened(&pictures(calibrating, heights)?)?)
 }
 

@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let simulations = seen(&training, &scene, &view, 1)?.simulations;
     let prior = &results.campaign.prior;
-    let learned = GrainPosterior::train(prior, &simulations, &settings(), 1)?;
+    let learned = GrainPosterior::train(prior, &simulations, &settings(1), 1)?;
     if unseen.records.len() < 2 * LEAST {
         println!("fewer than {} unseen pours: nothing is measured, nothing widened", 2 * LEAST);
         return ship(&learned, out);
@@ -117,7 +117,7 @@ fn fewer(prior: &Prior, simulations: &Simulations, tests: &Simulations) -> Resul
     for share in [8, 2] {
         let rows: Vec<usize> = (0..simulations.len() / share).collect();
         let few = Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))?;
-        let less = GrainPosterior::train(prior, &few, &settings(), 1)?;
+        let less = GrainPosterior::train(prior, &few, &settings(1), 1)?;
         row(&format!("{}", few.len()), &errors(&less, tests)?, tests.len());
     }
     Ok(())
@@ -140,7 +140,7 @@ fn flawed(
             GrainPosterior::train(
                 &training.campaign.prior,
                 &seen(training, scene, &base, 1)?.simulations,
-                &settings(),
+                &settings(1),
                 1,
             )?
         } else {

@@ -47,12 +47,12 @@ pub struct Inferred {
     pub resemblance: Resemblance,
 }
 
-/// Settings that learn the posterior of [Matl 2021], chapter 3: Matern 5/2 as there; few frequencies and two components, with weights that
-/// decay, since a thousand pictures of 16 numbers are soon learned by heart.
-pub fn settings() -> MdrffSettings {
-    let training =
-        TrainingSettings { weight_decay: 0.05, max_epochs: 200, ..MdrffSettings::default().training };
-    MdrffSettings { frequencies: 40, components: 2, training, ..MdrffSettings::default() }
+/// Settings that learn a posterior of so many pictures of the same grains: Matern 5/2 as in [Matl 2021], chapter 3; two components, with weights that
+/// decay, since a thousand pictures of 16 numbers are soon learned by heart. One picture is learned from as well with few frequencies.
+pub fn settings(pictures: usize) -> MdrffSettings {
+    let (frequencies, weight_decay) = if pictures > 1 { (400, 0.1) } else { (40, 0.05) };
+    let training = TrainingSettings { weight_decay, max_epochs: 200, ..MdrffSettings::default().training };
+    MdrffSettings { frequencies, components: 2, training, ..MdrffSettings::default() }
 }
 
 impl GrainPosterior {

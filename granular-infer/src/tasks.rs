@@ -104,7 +104,7 @@ impl RingHeights {
         let few = MdrffSettings { frequencies: 50, components: 2, ..MdrffSettings::default() };
         Ok(Self {
             of_radii: Mdrff::train(prior, &poured.radii, &few, seed)?,
-            of_pictures: Mdrff::train(prior, &poured.pictures, &settings(), seed)?,
+            of_pictures: Mdrff::train(prior, &poured.pictures, &settings(1), seed)?,
         })
     }
 
