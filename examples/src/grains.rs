@@ -87,8 +87,8 @@ pub fn height_map(svg: &mut String, map: &HeightMap, most_m: f64, part: f64) -> 
     let [left, top] = [width, height].map(|side| (0.5 * (1.0 - part) * side as f64) as usize);
     let size = 288.0 / (part * width.max(height) as f64);
     write!(svg, "<rect x='16' y='26' width='288' height='288' fill='black'/>")?;
-    for v in (top..height - top).step_by(2) {
-        for u in (left..width - left).step_by(2) {
+    for v in (top..height - top - 1).step_by(2) {
+        for u in (left..width - left - 1).step_by(2) {
             let z = map.heights_m[v * width + u];
             let share = (z / most_m).clamp(0.0, 1.0);
             // Noise of the cloth stays black.
