@@ -3,7 +3,7 @@
 //! ```text
 //! cargo run --release -p granular-infer --example pours -- grains 2000 SHARD OF FILE    prior over the grains, from 12 cm
 //! cargo run --release -p granular-infer --example pours -- series 1684 SHARD OF FILE    the same, from three heights each
-//! cargo run --release -p granular-infer --example pours -- cloths 660 SHARD OF FILE     the same, each on a cloth of its own rolling friction
+//! cargo run --release -p granular-infer --example pours -- cloths 1684 SHARD OF FILE     the same, each on a cloth of its own rolling friction
 //! cargo run --release -p granular-infer --example pours -- heights 800 SHARD OF FILE     couscous from 1 to 13 cm
 //! ```
 //! A sixth argument is the number of grains (600). Run again with the same arguments it goes on where it was stopped. SHARD counts from 0.
@@ -15,10 +15,7 @@ use std::sync::atomic::AtomicBool;
 
 use bayes_sim::campaign::{Campaign, Shard, Simulator};
 use bayes_sim::prior::Prior;
-use granular_infer::scene::{COUSCOUS, FromHeights, OfGrain, SERIES_M, Scene, check_prior, prior};
-
-/// Rolling friction of cloths, from felt that grains roll on to velvet that holds them.
-const CLOTHS: [f64; 2] = [0.1, 1.0];
+use granular_infer::scene::{CLOTHS, COUSCOUS, FromHeights, OfGrain, SERIES_M, Scene, check_prior, prior};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -1,8 +1,8 @@
 //! What a product of posteriors says of grains that are poured several times from 12 cm: from the first picture, from two, and so on.
 //!
 //! Each posterior is the shipped one's, learned from single pictures: what it does not know of grains is the same in every picture of them, and a
-//! product takes it for chance. Intervals get too narrow, which is why the crate has no such function; it has a posterior of series of three heights,
-//! which is measured on the same grains.
+//! product takes it for chance. Intervals get too narrow, which is why the crate has no such function; it has posteriors of series of three heights,
+//! which are measured on the same grains, on the velvet that the first of them knows and on other cloths.
 //!
 //! ```text
 //! cargo run --release -p granular-infer --example several -- 100 8     grains, pours of each
@@ -13,7 +13,7 @@ use std::error::Error;
 
 use bayes_sim::posterior::Posterior;
 use granular_infer::posterior::{GrainPosterior, Inferred};
-use granular_infer::scene::{Grain, SERIES_M, Scene, prior};
+use granular_infer::scene::{CLOTHS, Grain, SERIES_M, Scene, prior};
 use granular_infer::summary::COUNT;
 use granular_infer::view::View;
 use rand::{RngExt as _, SeedableRng};
@@ -31,29 +31,36 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (posterior, prior) = (GrainPosterior::shipped()?, prior()?);
     let mut rng = ChaCha8Rng::seed_from_u64(2026);
     let drawn: Vec<(Vec<f64>, u64)> = (0..grains).map(|_| (prior.sample(&mut rng), rng.random())).collect();
-    let whole = poured(&drawn, &vec![HEIGHT_M; pours]);
+    let whole = poured(&drawn, &vec![HEIGHT_M; pours], None);
     println!("{} grains, {} of which left the picture once", grains, grains - whole.len());
     let counts = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n <= pours);
     for count in counts {
         let infer = |pictures: &[[f64; COUNT]]| product(&posterior, &pictures[..count]);
         println!("{count} pictures: {}", measured(&whole, infer)?);
     }
-    let (series, whole) = (GrainPosterior::shipped_series()?, poured(&drawn, &SERIES_M));
-    println!("{} of them left the picture of a series", grains - whole.len());
-    println!(
-        "one from each of {SERIES_M:?} m: {}",
-        measured(&whole, |pictures| series.infer_series(pictures))?
-    );
+    let (velvet, cloths) = (GrainPosterior::shipped_series()?, GrainPosterior::shipped_cloths()?);
+    for (on, of) in [("velvet", None), ("a cloth of its own each", Some(CLOTHS))] {
+        let whole = poured(&drawn, &SERIES_M, of);
+        println!("once from each of {SERIES_M:?} m on {on}; {} left the picture", grains - whole.len());
+        for (learned, posterior) in [("velvet", &velvet), ("any cloth", &cloths)] {
+            println!("  learned on {learned:9}: {}", measured(&whole, |p| posterior.infer_series(p))?);
+        }
+    }
     Ok(())
 }
 
 /// Parameters of grains, and the statistics of each of their pours.
 type Poured = (Vec<f64>, Vec<[f64; COUNT]>);
 
-/// The grains all of whose pours stay in the picture.
-fn poured(drawn: &[(Vec<f64>, u64)], heights_m: &[f64]) -> Vec<Poured> {
+/// The grains all of whose pours stay in the picture, each on a cloth of its own where there is a range of their rolling friction.
+fn poured(drawn: &[(Vec<f64>, u64)], heights_m: &[f64], cloths: Option<[f64; 2]>) -> Vec<Poured> {
     let of = |(theta, seed): &(Vec<f64>, u64)| {
-        let pictures = pictures(theta, heights_m, *seed);
+        let mut scene = Scene::default();
+        if let Some([low, high]) = cloths {
+            let part = ChaCha8Rng::seed_from_u64(!seed).random::<f64>();
+            scene.cloth_rolling_friction = low * (high / low).powf(part);
+        }
+        let pictures = pictures(&scene, theta, heights_m, *seed);
         (pictures.len() == heights_m.len()).then(|| (theta.clone(), pictures))
     };
     drawn.par_iter().filter_map(of).collect()
@@ -90,8 +97,8 @@ fn product(
 }
 
 /// The statistics of the pours of one kind of grains that stay in the picture.
-fn pictures(theta: &[f64], heights_m: &[f64], seed: u64) -> Vec<[f64; COUNT]> {
-    let (scene, view) = (Scene::default(), View::default());
+fn pictures(scene: &Scene, theta: &[f64], heights_m: &[f64], seed: u64) -> Vec<[f64; COUNT]> {
+    let view = View::default();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let of_pour = |height_m: &f64| {
         let heap = scene.grains(&Grain::from_theta(theta)?, *height_m, rng.random()).ok()?;

@@ -22,6 +22,8 @@ use crate::summary::COUNT;
 const SHIPPED: &[u8] = include_bytes!("../posterior.json.gz");
 /// The shipped posterior of a series, as `granular-infer/examples/series.rs` writes it.
 const SHIPPED_SERIES: &[u8] = include_bytes!("../series.json.gz");
+/// The same on any cloth.
+const SHIPPED_CLOTHS: &[u8] = include_bytes!("../cloths.json.gz");
 /// Draws of which an estimate is the mean.
 const DRAWS: usize = 4000;
 /// Factors on variances that are tried.
@@ -111,12 +113,21 @@ impl GrainPosterior {
     }
 
     /// The posterior of a series that is shipped: the same grains poured once from each of [`crate::scene::SERIES_M`], else as
-    /// [`GrainPosterior::shipped`]. [`GrainPosterior::infer_series`] takes the three pictures.
+    /// [`GrainPosterior::shipped`]. [`GrainPosterior::infer_series`] takes the three pictures. Like that one it takes the cloth for velvet of the
+    /// scene's rolling friction, and is too sure of itself on any other: see [`GrainPosterior::shipped_cloths`].
     ///
     /// # Errors
     /// [`ShippedError`], if the crate's file is damaged.
     pub fn shipped_series() -> Result<Self, ShippedError> {
         Self::from_bytes(SHIPPED_SERIES)
+    }
+
+    /// The same for a cloth whose rolling friction is not known, anywhere in [`crate::scene::CLOTHS`]: a nuisance parameter, integrated out.
+    ///
+    /// # Errors
+    /// [`ShippedError`], if the crate's file is damaged.
+    pub fn shipped_cloths() -> Result<Self, ShippedError> {
+        Self::from_bytes(SHIPPED_CLOTHS)
     }
 
     /// Reads what [`GrainPosterior::to_bytes`] wrote.

@@ -29,6 +29,9 @@ pub struct Grain {
 /// Heights in m of the outlet from which a series of pours is made: low enough that grains hardly bounce, and three times as high as one pour.
 pub const SERIES_M: [f64; 3] = [0.04, 0.12, 0.24];
 
+/// Range of the rolling friction of cloths, from felt that grains roll on to velvet that holds them.
+pub const CLOTHS: [f64; 2] = [0.1, 1.0];
+
 /// Couscous as [Matl 2021] inferred it (section 3.6); its `mu_r = 8e-7` means something in its solver alone.
 pub const COUSCOUS: Grain = Grain { sliding_friction: 0.6687, rolling_friction: 0.05, restitution: 0.7689 };
 

@@ -61,6 +61,23 @@ fn a_series_from_three_heights_tells_the_restitution() {
     assert!(posterior.infer(&[0.02; 16]).is_err());
 }
 
+/// On a cloth that holds grains less than the velvet that one posterior takes for granted, the one for any cloth still holds the restitution.
+#[test]
+fn a_series_on_an_unknown_cloth_tells_the_restitution() {
+    let posterior = GrainPosterior::shipped_cloths().unwrap();
+    let view = View::default();
+    for cloth_rolling_friction in [0.12, 0.8] {
+        let scene = Scene { cloth_rolling_friction, ..Scene::default() };
+        let grain = Grain { sliding_friction: 0.6, rolling_friction: 0.05, restitution: 0.5 };
+        let of = |height_m: f64| {
+            let heap = scene.grains(&grain, height_m, 12).unwrap();
+            view.features(&heap, &scene.rig, &mut ChaCha8Rng::seed_from_u64(12)).unwrap()
+        };
+        let found = posterior.infer_series(&SERIES_M.map(of)).unwrap().estimate().restitution;
+        assert!((found - 0.5).abs() < 0.2, "{found} on a cloth of {cloth_rolling_friction}");
+    }
+}
+
 #[test]
 fn what_no_pour_looks_like_is_doubted_or_refused() {
     let posterior = GrainPosterior::shipped().unwrap();

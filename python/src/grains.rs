@@ -42,18 +42,25 @@ pub(crate) fn pour_grains<'py>(
 /// Draws of a posterior (draws, 3), its mean, and how many pictures in one are as unlike the others.
 type Inferred<'py> = (Bound<'py, PyArray2<f64>>, [f64; 3], f64);
 
-/// What statistics of one picture, or of one from each of [`SERIES_M`] one after the other, tell of the grains, by the posteriors that are shipped.
+/// What statistics of one picture, or of one from each of [`SERIES_M`] one after the other, tell of the grains, by the posteriors that are shipped: on
+/// the scene's velvet, or of a series on any cloth.
 #[pyfunction]
 pub(crate) fn infer_grains<'py>(
     py: Python<'py>,
     statistics: &Bound<'py, PyAny>,
+    any_cloth: bool,
     count: usize,
     seed: u64,
 ) -> PyResult<Inferred<'py>> {
     let values = column(statistics, "statistics")?;
     let (pictures, rest) = values.as_chunks::<COUNT>();
     let learned = match (pictures.len(), rest) {
+        (1, []) if any_cloth => {
+            let three = SERIES_M.len();
+            return Err(refused(format!("any_cloth is learned from {three} heaps; of one it is not known")));
+        }
         (1, []) => GrainPosterior::shipped(),
+        (n, []) if n == SERIES_M.len() && any_cloth => GrainPosterior::shipped_cloths(),
         (n, []) if n == SERIES_M.len() => GrainPosterior::shipped_series(),
         _ => {
             let (got, three) = (values.len(), SERIES_M.len());

@@ -135,6 +135,9 @@ def test_a_pour_tells_its_grains():
     assert series.shape == (3, 16) and by_three.draws.shape == (4000, 3) and by_three.p_value > 0.01
     one = granular_infer.infer(poured.statistics, count=4000)
     assert by_three.draws[:, 2].std() < 0.9 * one.draws[:, 2].std()
+    assert granular_infer.infer(series, any_cloth=True).draws[:, 2].std() > by_three.draws[:, 2].std()
+    with pytest.raises(errors.ChapterError, match="any_cloth is learned from 3 heaps"):
+        granular_infer.infer(poured.statistics, any_cloth=True)
     with pytest.raises(errors.ArrayError, match=r"shape \(16, 3\), expected \(16,\) or \(3, 16\)"):
         granular_infer.infer(series.T)
     with pytest.raises(errors.ChapterError, match="15 statistics, expected 16, or 3 times 16"):

@@ -56,9 +56,12 @@ def pour(
     return Poured(*_engine.pour_grains(grain, float(height_m), seed))
 
 
-def infer(statistics: ArrayLike, *, count: int = 4000, seed: int = 1) -> Inferred:
+def infer(statistics: ArrayLike, *, any_cloth: bool = False, count: int = 4000, seed: int = 1) -> Inferred:
     """What the statistics (16,) of a picture of a heap poured from 12 cm tell of its grains, by the posterior that is shipped; or those
     (3, 16) of three heaps of the same grains, poured from each of :data:`SERIES_M`, which tell more.
+
+    The cloth is taken for velvet, on which grains roll as :func:`pour` has them; ``any_cloth`` is for three heaps on one whose rolling friction is
+    not known.
 
     Raises :class:`~missing_physics.errors.ChapterError`, and :class:`~missing_physics.errors.ArrayError` for another shape.
     """
@@ -66,5 +69,5 @@ def infer(statistics: ArrayLike, *, count: int = 4000, seed: int = 1) -> Inferre
     series = (len(SERIES_M), len(STATISTICS))
     if values.ndim != 1 and values.shape != series:
         raise ArrayError(f"statistics has the shape {values.shape}, expected {series[1:]} or {series}")
-    draws, estimate, p_value = _engine.infer_grains(values.ravel(), count, seed)
+    draws, estimate, p_value = _engine.infer_grains(values.ravel(), any_cloth, count, seed)
     return Inferred(draws, np.array(estimate), p_value)
