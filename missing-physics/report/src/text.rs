@@ -218,8 +218,12 @@ const NEARLY_ALL: f64 = 0.9;
 pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     let Some(closest) = &d.closest else { return Vec::new() };
     let share = 100.0 * floored(closest.share.max(0.0));
-    // What takes away nearly all is not named where other sets do as well, or where less of it does.
-    let why = if closest.share < NEARLY_ALL { "too little to be named" } else { "but others do as well" };
+    // What takes away nearly all is not named where a leftover may stand in for it, or for a member.
+    let why = match closest.ids.len() {
+        _ if closest.share < NEARLY_ALL => "too little to be named",
+        1 => "but something smooth would do as well",
+        _ => "but something smooth in place of one of them would do as well",
+    };
     let words = format!("{} takes away {share:.0} % of the misfit, {why}", named(d, &closest.ids));
     let parameters = closest.parameters.iter().map(|e| format!("{}, if it is at work", estimate(e)));
     std::iter::once(words).chain(parameters).collect()

@@ -83,6 +83,23 @@ impl BesideLocal<'_> {
         Ok(best.map(|w| self.all[w.at].set.len()))
     }
 
+    /// The part of a set that leaves least, of those whose every member acts with errors that allow for what is left: one that does not may be
+    /// imitating that.
+    fn acting_part(&self, set: &[usize], close: &[usize]) -> Option<usize> {
+        let part = |&at: &usize| {
+            let part = &self.all[at].set;
+            part.len() < set.len() && part.iter().all(|m| set.contains(m)) && self.acts(at)
+        };
+        let left =
+            |at: usize| self.judge.least_squares(&self.all[at].set).map_or(f64::INFINITY, |fit| fit.chi2);
+        close.iter().copied().filter(part).min_by(|&a, &b| left(a).total_cmp(&left(b)))
+    }
+
+    /// Whether each member of a set of several acts beside what is left.
+    fn acts(&self, at: usize) -> bool {
+        self.all[at].set.len() < 2 || self.judge.acts(at)
+    }
+
     /// The main cause where what it leaves is a cause in a part of the data: each member of the set is clearly needed beside that.
     ///
     /// Such a cause drags the estimates of all runs in which it acts, so that the share that is asked for is of the data that are fitted. Of
@@ -93,7 +110,7 @@ impl BesideLocal<'_> {
         }
         let close: Vec<usize> = self.judge.nearly_all(CLOSE);
         let weigh = |at: usize| self.weighed(at).transpose();
-        let weighed: Vec<Weighed> = close.into_iter().filter_map(weigh).collect::<Result<_, _>>()?;
+        let weighed: Vec<Weighed> = close.iter().copied().filter_map(weigh).collect::<Result<_, _>>()?;
         let Some(mut chosen) = weighed.iter().min_by(|a, b| a.left.total_cmp(&b.left)) else {
             return Ok(None);
         };
@@ -110,6 +127,10 @@ impl BesideLocal<'_> {
         // What a local cause does not take away most of has another reason.
         if chosen.smaller < SMALLER {
             return Ok(None);
+        }
+        if !self.acts(chosen.at) {
+            let part = self.acting_part(&self.all[chosen.at].set, &close);
+            return Ok(part.and_then(|at| self.judge.named(at, &[])));
         }
         let as_likely = |w: &Weighed| w.left < chosen.left + CLEAR;
         for part in self.parts(&self.all[chosen.at].set) {

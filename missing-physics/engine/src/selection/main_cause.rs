@@ -250,6 +250,11 @@ impl<'a> Judge<'a> {
         Some(MainCause { chosen: of_seen(at)?, rivals })
     }
 
+    /// Whether a candidate is an explanation beside a leftover, each member of which acts there.
+    pub(crate) fn acts(&self, at: usize) -> bool {
+        self.judged(at).is_some_and(|judged| self.each_acts(&judged))
+    }
+
     /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them.
     pub(crate) fn closest(&self) -> Option<Judged> {
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
