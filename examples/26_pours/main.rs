@@ -13,7 +13,7 @@ mod shapes;
 
 use std::error::Error;
 
-use granular_infer::campaign::Rig;
+use granular_infer::campaign::{Grains, Rig};
 use granular_infer::dem::Clump;
 use granular_infer::posterior::GrainPosterior;
 use granular_infer::scene::{Grain, Scene};
@@ -50,14 +50,11 @@ impl Bench {
         height_m: f64,
         seed: u64,
     ) -> Option<[f64; COUNT]> {
-        let pour = self.scene.pour(grain, height_m);
-        let poured = match shape {
-            Some(clump) => pour.run_with(clump, seed),
-            None => pour.run(seed),
-        }
-        .ok()?;
-        let grains =
-            granular_infer::campaign::Grains { positions_m: poured.positions_m, radii_m: poured.radii_m };
+        let of = |clump| {
+            let poured = self.scene.pour(grain, height_m).run_with(clump, seed)?;
+            Ok(Grains { positions_m: poured.positions_m, radii_m: poured.radii_m })
+        };
+        let grains = shape.map_or_else(|| self.scene.grains(grain, height_m, seed), of).ok()?;
         self.view.features(&grains, &self.scene.rig, &mut ChaCha8Rng::seed_from_u64(seed)).ok()
     }
 }

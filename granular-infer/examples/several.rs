@@ -55,11 +55,8 @@ type Poured = (Vec<f64>, Vec<[f64; COUNT]>);
 /// The grains all of whose pours stay in the picture, each on a cloth of its own where there is a range of their rolling friction.
 fn poured(drawn: &[(Vec<f64>, u64)], heights_m: &[f64], cloths: Option<[f64; 2]>) -> Vec<Poured> {
     let of = |(theta, seed): &(Vec<f64>, u64)| {
-        let mut scene = Scene::default();
-        if let Some([low, high]) = cloths {
-            let part = ChaCha8Rng::seed_from_u64(!seed).random::<f64>();
-            scene.cloth_rolling_friction = low * (high / low).powf(part);
-        }
+        let part = || ChaCha8Rng::seed_from_u64(!seed).random();
+        let scene = cloths.map_or(Scene::default(), |range| Scene::default().on_cloth(range, part()));
         let pictures = pictures(&scene, theta, heights_m, *seed);
         (pictures.len() == heights_m.len()).then(|| (theta.clone(), pictures))
     };

@@ -125,6 +125,12 @@ impl Default for Scene {
 }
 
 impl Scene {
+    /// The same on a cloth whose rolling friction lies within a range, at a part of it from 0 to 1, even in the logarithm.
+    #[must_use]
+    pub fn on_cloth(self, [low, high]: [f64; 2], part: f64) -> Self {
+        Self { cloth_rolling_friction: low * (high / low).powf(part), ..self }
+    }
+
     /// The pour of grains from an outlet at a height in m above the cloth.
     pub fn pour(&self, grain: &Grain, height_m: f64) -> Pour {
         let grains = Coefficients::dry(grain.restitution, grain.sliding_friction, grain.rolling_friction);
@@ -207,10 +213,7 @@ impl Simulator for FromHeights {
         let grain = Grain::from_theta(theta).ok_or_else(|| SimulationFailure {
             reason: format!("{} parameters instead of 3", theta.len()),
         })?;
-        let mut scene = self.scene;
-        if let Some([low, high]) = self.cloths {
-            scene.cloth_rolling_friction = low * (high / low).powf(rng.random());
-        }
+        let scene = self.cloths.map_or(self.scene, |range| self.scene.on_cloth(range, rng.random()));
         let mut x = Vec::with_capacity(self.x_dim());
         for &height_m in &self.heights_m {
             x.extend(scene.features(&grain, height_m, rng)?);
