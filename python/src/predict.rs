@@ -59,7 +59,7 @@ pub(crate) fn domains() -> String {
             "baseline": spec.baseline,
             "reads": domain.reads(),
             "columns": domain.columns().iter().map(|c| json!({"name": c.name, "what": c.what})).collect::<Vec<_>>(),
-            "mechanisms": spec.mechanisms.iter().map(mechanism).collect::<Vec<_>>(),
+            "mechanisms": spec.mechanisms.iter().filter(|m| !m.between_runs).map(mechanism).collect::<Vec<_>>(),
         })
     });
     serde_json::Value::Array(described.collect()).to_string()

@@ -54,6 +54,13 @@ impl UprightCylinder {
         Ok(Self { radius_m, fill_height_m, gravity_m_s2 })
     }
 
+    /// The same cylinder with so many times its fill height; unchanged where that is not above zero and finite.
+    #[must_use]
+    pub fn filled_by(&self, times: f64) -> Self {
+        let filled = Self::new(self.radius_m, times * self.fill_height_m, self.gravity_m_s2);
+        filled.unwrap_or(*self)
+    }
+
     /// Wave number of an antisymmetric mode (0: the first), in 1/m; the last root known for higher ones.
     pub fn wave_number_per_m(&self, mode: usize) -> f64 {
         ANTISYMMETRIC_ROOTS[mode.min(ANTISYMMETRIC_ROOTS.len() - 1)] / self.radius_m

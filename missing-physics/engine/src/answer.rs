@@ -4,7 +4,7 @@ use crate::adequacy::test::Adequacy;
 use crate::data::Run;
 use crate::diagnosis::{
     ChannelFit, ChannelNoise, Closest, Curves, Diagnosis, Estimate, MechanismReport, NoiseSource, Outlier,
-    RunSpread, SetReport, Verdict,
+    RunDifference, RunSpread, RunValue, SetReport, Verdict,
 };
 use crate::estimate::estimates::{estimates, of_mechanism};
 use crate::estimate::open_noise::with_open_noise;
@@ -34,8 +34,10 @@ pub(crate) struct Answer<'a> {
 }
 
 impl Answer<'_> {
+    /// Identifiers of the members of a set that have names.
     pub(crate) fn ids(&self, set: &[usize]) -> Vec<String> {
-        set.iter().map(|&m| self.problem.spec().mechanisms[m].id.clone()).collect()
+        let mechanisms = set.iter().map(|&m| &self.problem.spec().mechanisms[m]);
+        mechanisms.filter(|m| !m.between_runs).map(|m| m.id.clone()).collect()
     }
 
     pub(crate) fn names(&self, set: &[usize]) -> String {
@@ -81,6 +83,7 @@ impl Answer<'_> {
             closest: None,
             limits: Vec::new(),
             between_runs,
+            run_differences: Vec::new(),
             contradiction: None,
             final_p_value: None,
             after: before.clone(),
@@ -196,6 +199,26 @@ impl Answer<'_> {
         self.problem.integer_slots(&chosen.set).into_iter().filter_map(open).collect()
     }
 
+    /// What differs from run to run by a member of a set that stands for that: its values.
+    pub(crate) fn run_differences(&self, model: &Candidate, mechanism: usize) -> Vec<RunDifference> {
+        let spec = self.problem.spec();
+        let of = &spec.mechanisms[mechanism];
+        let values = |&p: &usize| {
+            let slot = self.problem.slots[p];
+            let at = model.selection.nuisance.iter().position(|&free| free == slot);
+            let of_run = |(r, run): (usize, &Run)| RunValue {
+                run: run.label.clone(),
+                value: model.fit.nuisance[r][slot],
+                standard_error: at.map_or(f64::NAN, |at| model.fit.nuisance_errors[r].error[at]),
+            };
+            let by_run = self.problem.recording.runs.iter().enumerate().map(of_run).collect();
+            let quantity = &spec.parameters[p];
+            let (parameter, unit) = (quantity.name.clone(), quantity.unit.clone());
+            RunDifference { name: of.name.clone(), parameter, unit, by_run }
+        };
+        of.parameters.iter().map(values).collect()
+    }
+
     /// The closest explanation, with what its parameters would be.
     pub(crate) fn closest(&self, judged: &Judged) -> Closest {
         let spec = self.problem.spec();
@@ -256,7 +279,7 @@ impl Answer<'_> {
         sets: &[(&Candidate, f64)],
         profile: bool,
     ) -> Vec<MechanismReport> {
-        let mut reports: Vec<MechanismReport> = (0..self.problem.spec().mechanisms.len())
+        let mut reports: Vec<MechanismReport> = (self.problem.spec().named().into_iter())
             .filter_map(|m| self.mechanism(m, ranking, best, sets, profile))
             .collect();
         reports.sort_by(|a, b| b.probability.total_cmp(&a.probability));

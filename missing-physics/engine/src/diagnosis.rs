@@ -211,6 +211,33 @@ pub struct RunSpread {
     pub standard_deviation: f64,
 }
 
+/// The part of the squared misfit beyond the noise that a main cause takes away on unseen data, at least.
+pub const NEARLY_ALL: f64 = 0.9;
+
+/// What is left over because the runs are not alike, in a quantity that was taken to be the same in all of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunDifference {
+    /// What it is, for a person, with its article.
+    pub name: String,
+    /// Name of the quantity, with its unit as a suffix.
+    pub parameter: String,
+    /// The unit alone.
+    pub unit: String,
+    /// In each run.
+    pub by_run: Vec<RunValue>,
+}
+
+/// A run's value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunValue {
+    /// Label of the run.
+    pub run: String,
+    /// The value.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+}
+
 /// A few runs that contradict the others, and the answer without them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contradiction {
@@ -358,6 +385,8 @@ pub struct Diagnosis {
     pub limits: Vec<Limit>,
     /// Parameters of the chosen mechanisms that differ from run to run.
     pub between_runs: Vec<RunSpread>,
+    /// What the runs differ by that no mechanism names.
+    pub run_differences: Vec<RunDifference>,
     /// Runs that contradict the others, where there are a few and the others have a better answer.
     pub contradiction: Option<Contradiction>,
     /// p-value of the final model's adequacy, where one was chosen.

@@ -32,8 +32,9 @@ pub(crate) fn best(
     if !(value >= WORTHWHILE && value.is_finite()) {
         return None;
     }
-    let mut separates: Vec<String> =
-        rivals.iter().flat_map(|r| r.set.iter().map(|&m| problem.spec().mechanisms[m].id.clone())).collect();
+    let named = |m: &&usize| !problem.spec().mechanisms[**m].between_runs;
+    let id = |&m: &usize| problem.spec().mechanisms[m].id.clone();
+    let mut separates: Vec<String> = rivals.iter().flat_map(|r| r.set.iter().filter(named).map(id)).collect();
     separates.sort();
     separates.dedup();
     let names = |set: &Candidate| {

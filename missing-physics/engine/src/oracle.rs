@@ -45,7 +45,7 @@ pub fn oracle(
     }
     set.sort_unstable();
     let competing = rule.competing();
-    let everything: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
+    let everything = problem.spec().named();
     let among = candidate(&problem, &competing, &[], &[], &baseline.fit, &[])?;
     let all = search(&problem, &competing, among, &everything, &|_| true).ok_or(DiagnoseError::Stopped)?.all;
     let at_work = problem.at_work(&set);

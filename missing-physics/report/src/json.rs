@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use missing_physics::diagnosis::{
     AsIf, ChannelFit, ChannelNoise, Closest, Confusion, Contradiction, Diagnosis, Estimate, Law, Limit,
-    Location, MechanismReport, NextExperiment, Outlier, RunSpread, SetReport, TestOutcome,
+    Location, MechanismReport, NextExperiment, Outlier, RunDifference, RunSpread, SetReport, TestOutcome,
 };
 use serde::Serialize;
 use serde_json::{Value, json as value};
@@ -30,6 +30,7 @@ struct Answer<'a> {
     closest: Value,
     limits: Vec<Value>,
     between_runs: Vec<Value>,
+    run_differences: Vec<Value>,
     contradiction: Value,
     law: Value,
     next_experiment: Value,
@@ -69,6 +70,7 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
         closest: d.closest.as_ref().map_or(Value::Null, closest),
         limits: d.limits.iter().map(limit).collect(),
         between_runs: d.between_runs.iter().map(spread).collect(),
+        run_differences: d.run_differences.iter().map(run_difference).collect(),
         contradiction: d.contradiction.as_ref().map_or(Value::Null, contradiction),
         law: d.law.as_ref().map_or(Value::Null, law),
         next_experiment: d.next_experiment.as_ref().map_or(Value::Null, next_experiment),
@@ -111,6 +113,13 @@ fn closest(c: &Closest) -> Value {
 
 fn limit(l: &Limit) -> Value {
     value!({"id": l.id, "parameter": l.parameter, "unit": l.unit, "upper": l.upper})
+}
+
+fn run_difference(d: &RunDifference) -> Value {
+    let by_run: Vec<Value> = (d.by_run.iter())
+        .map(|r| value!({"run": r.run, "value": r.value, "standard_error": r.standard_error}))
+        .collect();
+    value!({"name": d.name, "parameter": d.parameter, "unit": d.unit, "by_run": by_run})
 }
 
 fn spread(s: &RunSpread) -> Value {

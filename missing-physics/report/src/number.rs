@@ -22,6 +22,15 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
     format!("{shown:.decimals$}")
 }
 
+/// A value and its standard error, in two digits of that.
+pub(super) fn with_error(value: f64, error: f64) -> String {
+    if !(error > 0.0 && error.is_finite()) {
+        return significant(value, 3);
+    }
+    let decimals = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$} +- {error:.decimals$}")
+}
+
 /// Value and interval with digits that the interval's width supports.
 pub(super) fn estimate(e: &Estimate) -> String {
     let unit = if e.unit.is_empty() { String::new() } else { format!(" {}", e.unit) };
@@ -92,6 +101,13 @@ mod tests {
         assert_eq!(significant(-1234.5, 2), "-1200");
         assert_eq!(significant(f64::NAN, 2), "unknown");
         assert_eq!(significant(0.0, 2), "0");
+    }
+
+    #[test]
+    fn an_error_says_how_many_digits_a_value_has() {
+        assert_eq!(with_error(-0.0124, 0.000_67), "-0.01240 +- 0.00067");
+        assert_eq!(with_error(1234.0, 21.0), "1234 +- 21");
+        assert_eq!(with_error(1.234, f64::INFINITY), "1.23");
     }
 
     #[test]

@@ -2,10 +2,13 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Law, Location, MechanismReport, RunSpread, SetReport, Verdict};
+use missing_physics::diagnosis::{
+    Diagnosis, Law, Location, MechanismReport, NEARLY_ALL, RunDifference, RunSpread, RunValue, SetReport,
+    Verdict,
+};
 
 use super::context::ReportContext;
-use super::number::{estimate, listed, p_value, probability, significant};
+use super::number::{estimate, listed, p_value, probability, significant, with_error};
 
 const WIDTH: usize = 100;
 const INDENT: usize = 9;
@@ -128,6 +131,13 @@ pub(super) fn headline(d: &Diagnosis) -> String {
                 "Something is wrong here ({p}) that no known mechanism describes; the residual follows a law."
             )
         }
+        Verdict::Unexplained if !d.run_differences.is_empty() => {
+            let names: Vec<&str> = d.run_differences.iter().map(|of| of.name.as_str()).collect();
+            format!(
+                "Something is wrong here ({p}) that no known mechanism describes; it looks like {}.",
+                names.join(" with ")
+            )
+        }
         Verdict::Unexplained => {
             format!(
                 "Something is wrong here ({p}) that no known mechanism describes, and no law is supported."
@@ -145,7 +155,9 @@ fn named(d: &Diagnosis, set: &[String]) -> String {
 
 /// Whether the diagnosis has a second fit to draw.
 pub(super) fn changed(d: &Diagnosis) -> bool {
-    d.law.is_some() || matches!(d.verdict, Verdict::Explained | Verdict::Partly | Verdict::Ambiguous)
+    d.law.is_some()
+        || !d.run_differences.is_empty()
+        || matches!(d.verdict, Verdict::Explained | Verdict::Partly | Verdict::Ambiguous)
 }
 
 /// A share that is not the whole is not said to be the whole.
@@ -211,9 +223,6 @@ pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
     )
 }
 
-/// The part of the misfit from which on a set is named, if it alone is needed.
-const NEARLY_ALL: f64 = 0.9;
-
 /// What comes closest where nothing explains the data, and what its parameters would be.
 pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     let Some(closest) = &d.closest else { return Vec::new() };
@@ -231,6 +240,14 @@ pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
 
 /// How runs differ, and which contradict the others, a line each.
 pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
+    let differs = |of: &RunDifference| {
+        let value = |r: &RunValue| {
+            format!("{} {} in run {}", with_error(r.value, r.standard_error), of.unit, r.run)
+                .replace("  ", " ")
+        };
+        let values: Vec<String> = of.by_run.iter().map(value).collect();
+        format!("what is left looks like {}: {} = {}", of.name, of.parameter, values.join(", "))
+    };
     let spread = |s: &RunSpread| {
         // A name such as a rate's says nothing where several mechanisms have one.
         let is_of =
@@ -245,7 +262,8 @@ pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
         )
         .replace("  ", " ")
     };
-    let mut lines: Vec<String> = d.between_runs.iter().map(spread).collect();
+    let mut lines: Vec<String> =
+        d.run_differences.iter().map(differs).chain(d.between_runs.iter().map(spread)).collect();
     let Some(c) = &d.contradiction else { return lines };
     let (which, them) = match &c.runs[..] {
         [one] => (format!("run {one} contradicts the others and holds"), "it"),

@@ -20,7 +20,7 @@ pub fn domains() -> String {
             let _ = writeln!(text, "    {what}\n        {how}");
         }
         let _ = writeln!(text, "\n  mechanisms");
-        for mechanism in &spec.mechanisms {
+        for mechanism in spec.mechanisms.iter().filter(|m| !m.between_runs) {
             let names: Vec<&str> = mechanism
                 .parameters
                 .iter()
@@ -32,6 +32,13 @@ pub fn domains() -> String {
             let _ = writeln!(text, "        {}", mechanism.equation);
             let _ = writeln!(text, "        source: {}", mechanism.reference);
             let _ = writeln!(text, "        easily confused with: {}", mechanism.confused_with.join(", "));
+        }
+        let mut between = spec.mechanisms.iter().filter(|m| m.between_runs).peekable();
+        if between.peek().is_some() {
+            let _ = writeln!(text, "\n  may differ from run to run, which is said as what is left over");
+        }
+        for mechanism in between {
+            let _ = writeln!(text, "    {}: {}", mechanism.name, mechanism.explanation);
         }
         let _ = writeln!(text, "\n  candidate terms of an unknown law");
         for term in &spec.terms {
@@ -71,7 +78,8 @@ pub fn check(folder: &Path) -> Result<String, CommandError> {
     let calibrated =
         if calibrated.is_empty() { "none, it will be estimated".into() } else { calibrated.join(", ") };
     let _ = writeln!(text, "  calibrated noise: {calibrated}");
-    let ids: Vec<&str> = spec.mechanisms.iter().map(|m| m.id.as_str()).collect();
+    let named = spec.mechanisms.iter().filter(|m| !m.between_runs);
+    let ids: Vec<&str> = named.map(|m| m.id.as_str()).collect();
     let _ = writeln!(text, "  mechanisms that can show: {}", ids.join(", "));
     let _ = writeln!(text, "  unknowns of the baseline: {} in each run", spec.count(Scope::PerRun));
     for hint in &checked.hints {

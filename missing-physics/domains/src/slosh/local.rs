@@ -20,11 +20,11 @@ impl LocalCauses for SloshModel {
         _: (usize, usize),
         runs: &[Run],
         shared: &[f64],
-        _: &[Vec<f64>],
+        nuisance: &[Vec<f64>],
         amounts: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, PredictError> {
-        let of_run = |(run, amounts): (&Run, &Vec<f64>)| {
-            let [omega, ratio] = self.first_mode(run, shared);
+        let of_run = |((run, nuisance), amounts): ((&Run, &Vec<f64>), &Vec<f64>)| {
+            let [omega, ratio] = self.first_mode(run, [shared, nuisance]);
             let decay = ratio * omega;
             let ringing = omega * (1.0 - ratio * ratio).sqrt();
             let times = &run.inputs[0];
@@ -45,6 +45,6 @@ impl LocalCauses for SloshModel {
             }
             out
         };
-        Ok(runs.iter().zip(amounts).map(of_run).collect())
+        Ok(runs.iter().zip(nuisance).zip(amounts).map(of_run).collect())
     }
 }

@@ -91,8 +91,8 @@ impl SloshModel {
     }
 
     /// Angular frequency (rad/s) and damping ratio of a run's first mode.
-    pub(super) fn first_mode(&self, run: &Run, shared: &[f64]) -> [f64; 2] {
-        self.reading(run).first_mode(shared)
+    pub(super) fn first_mode(&self, run: &Run, parameters: [&[f64]; 2]) -> [f64; 2] {
+        self.reading(run).first_mode(parameters)
     }
 
     fn reading<'a>(&'a self, run: &'a Run) -> Reading<'a> {

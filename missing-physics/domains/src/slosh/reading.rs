@@ -57,10 +57,16 @@ impl Free {
 
 impl Reading<'_> {
     /// Angular frequency (rad/s) and damping ratio of the first mode.
-    pub(super) fn first_mode(&self, shared: &[f64]) -> [f64; 2] {
+    pub(super) fn first_mode(&self, [shared, nuisance]: [&[f64]; 2]) -> [f64; 2] {
         let p = self.layout;
-        let omega = self.cylinder.angular_frequency_rad_s(0, shared[p.tension.slot] / self.density_kg_m3);
-        [omega, self.cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999)]
+        let cylinder = self.filled(nuisance);
+        let omega = cylinder.angular_frequency_rad_s(0, shared[p.tension.slot] / self.density_kg_m3);
+        [omega, cylinder.damping_ratio(shared[p.viscosity.slot]).min(0.999)]
+    }
+
+    /// The run's cylinder with what was in it then.
+    fn filled(&self, nuisance: &[f64]) -> UprightCylinder {
+        self.cylinder.filled_by(1.0 + nuisance[self.layout.fill.slot])
     }
 
     /// All of the reading.
@@ -122,10 +128,28 @@ impl Reading<'_> {
                 for ((d, fade), t) in column.iter_mut().zip(&fade).zip(times(self.run)?) {
                     *d = transient * fade * t / (lag * lag);
                 }
-            } else if !known.iter().any(|known| self.derive(known, parameters, by, column)) {
-                let [shared, nuisance] = by.moved(parameters);
-                self.read(Mode::First, [&shared, &nuisance], column)?;
-                column.iter_mut().zip(&first).for_each(|(d, y)| *d = (*d - y) / by.step);
+            } else {
+                // Modes of which each depends on it add up.
+                let mut derived = 0;
+                for known in &known {
+                    if self.derive(known, parameters, by, &mut more) {
+                        column
+                            .iter_mut()
+                            .zip(&more)
+                            .for_each(|(d, m)| *d = if derived > 0 { *d + m } else { *m });
+                        derived += 1;
+                    }
+                }
+                let of_first = by.is_nuisance(p.fill) && known.first().is_none_or(|k| k.0 != Mode::First);
+                if derived == 0 || of_first {
+                    let [shared, nuisance] = by.moved(parameters);
+                    self.read(Mode::First, [&shared, &nuisance], &mut more)?;
+                    let change = more.iter().zip(&first).map(|(m, y)| (m - y) / by.step);
+                    column
+                        .iter_mut()
+                        .zip(change)
+                        .for_each(|(d, c)| *d = if derived > 0 { *d + c } else { c });
+                }
             }
         }
         Ok(())
@@ -140,10 +164,8 @@ impl Reading<'_> {
         let mut known = Vec::new();
         for mode in [Mode::First, Mode::Second, Mode::Arm] {
             let (of_start, of_decay) = self.parameters(mode);
-            let by = |f: &Free| {
-                of_start.iter().any(|p| f.is_nuisance(*p)) || of_decay.iter().any(|p| f.is_shared(*p))
-            };
-            let decay = self.decay(mode, shared);
+            let by = |f: &Free| of_start.iter().any(|p| f.is_nuisance(*p)) || self.moves(f, mode, of_decay);
+            let decay = self.decay(mode, [shared, nuisance]);
             if decay.is_linear() && (self.start(mode, nuisance) != [0.0; 2] || free.iter().any(by)) {
                 known.push((mode, decay.linear(times(self.run)?).map_err(|e| e.to_string())?));
             }
@@ -164,28 +186,35 @@ impl Reading<'_> {
             column.copy_from_slice(&known.unit()[place]);
             return true;
         }
-        if !of_decay.iter().any(|p| by.is_shared(*p)) {
+        if !self.moves(by, *mode, of_decay) {
             return false;
         }
-        let [shared, nuisance] = parameters;
-        let at = |shared: &[f64]| {
-            let decay = self.decay(*mode, shared);
+        let at = |parameters: [&[f64]; 2]| {
+            let decay = self.decay(*mode, parameters);
             [decay.omega_rad_s, decay.damping_ratio]
         };
-        let ([omega, ratio], [high_omega, high_ratio]) = (at(shared), at(&by.moved(parameters)[0]));
+        let [shared, nuisance] = by.moved(parameters);
+        let ([omega, ratio], [high_omega, high_ratio]) = (at(parameters), at([&shared, &nuisance]));
         let slope = [(high_omega - omega) / by.step, (high_ratio - ratio) / by.step];
-        known.derivative(self.start(*mode, nuisance), slope, column);
+        known.derivative(self.start(*mode, parameters[1]), slope, column);
         true
     }
 
+    /// Whether a mode's frequency or damping depends on a parameter; `of_decay` are the shared ones that they depend on.
+    fn moves(&self, by: &Free, mode: Mode, of_decay: [ParameterRef; 2]) -> bool {
+        of_decay.iter().any(|p| by.is_shared(*p)) || mode != Mode::Arm && by.is_nuisance(self.layout.fill)
+    }
+
     /// A mode as it decays.
-    fn decay(&self, mode: Mode, shared: &[f64]) -> Decay {
+    fn decay(&self, mode: Mode, parameters: [&[f64]; 2]) -> Decay {
+        let [shared, nuisance] = parameters;
         let p = self.layout;
         let (omega_rad_s, damping_ratio) = match mode {
-            Mode::First => self.first_mode(shared).into(),
+            Mode::First => self.first_mode(parameters).into(),
             // With another fill the second mode moves by as much as theory says.
             Mode::Second => {
-                let [here, full] = [self.cylinder, self.full].map(|c| c.angular_frequency_rad_s(1, 0.0));
+                let [here, full] =
+                    [self.filled(nuisance), *self.full].map(|c| c.angular_frequency_rad_s(1, 0.0));
                 (here / full * shared[p.second_omega.slot], shared[p.second_damping.slot])
             }
             Mode::Arm => (shared[p.arm_omega.slot], shared[p.arm_damping.slot]),
@@ -219,7 +248,7 @@ impl Reading<'_> {
 
     /// The reading of a mode.
     fn read(&self, mode: Mode, [shared, nuisance]: [&[f64]; 2], out: &mut [f64]) -> Result<(), String> {
-        let decay = self.decay(mode, shared);
+        let decay = self.decay(mode, [shared, nuisance]);
         decay.read(times(self.run)?, self.start(mode, nuisance), out).map_err(|e| e.to_string())
     }
 

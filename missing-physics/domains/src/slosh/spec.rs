@@ -28,6 +28,8 @@ pub(super) struct Layout {
     pub(super) second_sin: ParameterRef,
     pub(super) arm_cos: ParameterRef,
     pub(super) arm_sin: ParameterRef,
+    /// How much more liquid is in the container than recorded, as a part of that.
+    pub(super) fill: ParameterRef,
     pub(super) transient: ParameterRef,
 }
 
@@ -89,7 +91,25 @@ pub(super) fn build(
     modes(&mut b, &mut p, &wave);
     sensor_lag(&mut b, &p);
     unlagged(&mut b, &p, &wave);
+    fill(&mut b, &mut p);
     (b.build_unchecked(), p)
+}
+
+/// A fill that is not what was recorded, in each run by another part.
+fn fill(b: &mut SpecBuilder, p: &mut Layout) {
+    p.fill = b.nuisance("fill_change", "", [-0.5, 0.5], 0.02);
+    let mechanism = b.mechanism(
+        "fill-by-run",
+        &[p.fill],
+        [
+            "a fill that differs from run to run",
+            "Liquid leaks, evaporates, is spilt or was measured roughly.",
+            "h -> h (1 + change of the run)",
+            "Ibrahim 2005, Liquid Sloshing Dynamics, doi:10.1017/CBO9780511536656, ch. 1",
+        ],
+        &["nonlinear-frequency", "surface-tension"],
+    );
+    mechanism.between_runs = true;
 }
 
 /// The surface's tension.

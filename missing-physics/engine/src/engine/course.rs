@@ -36,6 +36,12 @@ pub(super) struct Outcome {
     pub(super) contradicting: Option<Contradicting>,
 }
 
+/// Fewer runs say nothing of how runs differ.
+const FEWEST_RUNS: usize = 3;
+
+/// Mechanisms that are said to be open beside what differs from run to run.
+const MOST_OPEN: usize = 3;
+
 /// Sets of mechanisms, compared.
 struct Compared {
     ranking: Ranking,
@@ -116,7 +122,12 @@ impl Course<'_> {
 
     /// Every set worth looking at, the preferred one, and the white noise beside which they are judged.
     fn compared(&self) -> Result<Compared, DiagnoseError> {
-        let (mut ranking, unfitted) = self.compare(&self.begun.problem.spec().asked())?;
+        let Begun { problem, .. } = self.begun;
+        let mut wanted = problem.spec().asked();
+        if problem.rows.len() >= FEWEST_RUNS {
+            wanted.extend(problem.spec().between_runs());
+        }
+        let (mut ranking, unfitted) = self.compare(&wanted)?;
         let mut best = self.best(&mut ranking)?;
         let white = self.white_noise(&ranking);
         if self.explains(&ranking, best.as_ref()).is_none()
@@ -141,7 +152,7 @@ impl Course<'_> {
             }
             None => {
                 self.tell("what the closest explanation leaves", 0.0)?;
-                let judge = Judge::new(problem, rule, all, white, |_| true);
+                let judge = Judge::new(problem, rule, all, white, |c| self.alike(c));
                 let cause = judge.main_cause();
                 (judge, cause)
             }
@@ -159,7 +170,7 @@ impl Course<'_> {
         let Some(members) = members else {
             return Ok(Conclusion { judge, near: None, cause, explained, replaced: None });
         };
-        let judge = Judge::new(problem, rule, all, white, |c| c.set.len() <= members);
+        let judge = Judge::new(problem, rule, all, white, |c| c.set.len() <= members && self.alike(c));
         let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
         let cause = beside.main_cause()?.or_else(|| judge.main_cause());
         Ok(Conclusion { judge, near: None, cause, explained: None, replaced: chosen })
@@ -195,6 +206,10 @@ impl Course<'_> {
                 let mut diagnosis = self.partly(answer, adequacy, before, ranking, &cause, white)?;
                 diagnosis.remarks.extend(seen_near_by(answer, &judge, &cause));
                 (diagnosis, Some(cause.chosen.least_squares))
+            }
+            (None, Some(chosen)) if !self.alike(ranking.at(chosen.at)) => {
+                let diagnosis = self.runs_that_differ(answer, adequacy, before, compared, chosen, &judge)?;
+                (diagnosis, None)
             }
             (None, Some(chosen)) => {
                 sigma = &ranking.at(chosen.at).fit.noise.sigma;
@@ -233,7 +248,7 @@ impl Course<'_> {
         if best.p_value > self.options.alpha || chosen.set.len() < 2 {
             return None;
         }
-        let cause = Judge::new(problem, rule, ranking.all(), white, |_| true).main_cause();
+        let cause = Judge::new(problem, rule, ranking.all(), white, |c| self.alike(c)).main_cause();
         cause.filter(|cause| {
             let less = &cause.chosen.candidate;
             less.set.len() < chosen.set.len() && nested(less, chosen)
@@ -266,7 +281,7 @@ impl Course<'_> {
         if mechanisms.iter().all(|m| !m.unasked) {
             return Ok(None);
         }
-        let everything: Vec<usize> = (0..mechanisms.len()).collect();
+        let everything = problem.spec().named();
         let (ranking, _) = self.compare(&everything)?;
         let clear = clear_cases(problem, ranking.all(), white)?;
         let mut ranking = ranking.only(&clear);
@@ -327,6 +342,59 @@ impl Course<'_> {
         Ok(diagnosis)
     }
 
+    /// Whether a set takes the runs for alike.
+    fn alike(&self, candidate: &Candidate) -> bool {
+        let mechanisms = &self.begun.problem.spec().mechanisms;
+        candidate.set.iter().all(|&m| !mechanisms[m].between_runs)
+    }
+
+    /// A set explains the data with something that differs from run to run: that is left over by those of its members that have names.
+    fn runs_that_differ(
+        &self,
+        answer: &Answer<'_>,
+        adequacy: &Adequacy,
+        before: Vec<ChannelFit>,
+        Compared { ranking, best, white, .. }: &Compared,
+        chosen: &Best,
+        judge: &Judge<'_>,
+    ) -> Result<Diagnosis, DiagnoseError> {
+        let problem = &self.begun.problem;
+        let whole = ranking.at(chosen.at);
+        let (differing, named): (Vec<usize>, Vec<usize>) =
+            whole.set.iter().partition(|&&m| problem.spec().mechanisms[m].between_runs);
+        let verdict = if named.is_empty() { Verdict::Unexplained } else { Verdict::Partly };
+        let mut diagnosis = answer.skeleton(adequacy, verdict, whole, before)?;
+        diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
+        let after = predictions(problem, &whole.fit)?;
+        if let Some(score) = ranking.score_of(&whole.set) {
+            diagnosis.after = answer.errors_of(&after, score);
+        }
+        draw(&mut diagnosis, &after);
+        diagnosis.run_differences =
+            differing.iter().flat_map(|&m| answer.run_differences(whole, m)).collect();
+        if named.is_empty() {
+            let open = |more: &Candidate| {
+                let named: Vec<usize> = more.set.iter().copied().filter(|m| !differing.contains(m)).collect();
+                format!("whether {} acts as well cannot be told beside that", answer.names(&named))
+            };
+            diagnosis.undetermined.extend(ranking.as_likely_with_more(chosen.at).take(MOST_OPEN).map(open));
+            return Ok(diagnosis);
+        }
+        diagnosis.chosen = answer.ids(&named);
+        diagnosis.explained_share = judge.share_beside(&whole.set, &differing);
+        if let Some(alone) = ranking.of(&named) {
+            let fit = judge.least_squares(&named).unwrap_or(&alone.fit);
+            diagnosis.leftover = locate(problem, &alone.selection, fit, white)?;
+        }
+        let rivals = ranking.rivals(chosen).into_iter().map(|rival| answer.ids(&rival.set));
+        for rival in rivals.filter(|rival| !rival.is_empty()) {
+            if rival != diagnosis.chosen && !diagnosis.confused_with.contains(&rival) {
+                diagnosis.confused_with.push(rival);
+            }
+        }
+        Ok(diagnosis)
+    }
+
     /// A set explains the data: does another as well, and what would tell them apart?
     fn explained(
         &self,
@@ -351,7 +419,11 @@ impl Course<'_> {
         draw(&mut diagnosis, &after);
         diagnosis.undetermined.extend(answer.open_numbers(chosen));
         self.tell("telling the rivals apart", 0.0)?;
-        let rivals = ranking.rivals(best);
+        // Runs that differ are no mechanism: what they would do as well is said, and doubts no name.
+        let (rivals, differ): (Vec<&Candidate>, Vec<&Candidate>) =
+            ranking.rivals(best).into_iter().partition(|rival| !answer.ids(&rival.set).is_empty());
+        let as_well = |rival: &&Candidate| format!("{} would do as well", answer.names(&rival.set));
+        diagnosis.undetermined.extend(differ.iter().map(as_well));
         if rivals.len() == 1 {
             return Ok(diagnosis);
         }

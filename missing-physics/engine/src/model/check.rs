@@ -81,6 +81,14 @@ pub enum SpecError {
         /// `shape` or `integer`.
         role: &'static str,
     },
+    /// A parameter of what differs from run to run that all runs share.
+    #[error("mechanism {mechanism} differs from run to run, but all runs share its parameter {parameter}")]
+    SharedBetweenRuns {
+        /// Identifier of the mechanism.
+        mechanism: String,
+        /// Name of the parameter.
+        parameter: String,
+    },
     /// A shape or integer parameter whose values cannot all be equally likely.
     #[error(
         "mechanism {mechanism} lists parameter {parameter} as {role}, expected a shared one with finite bounds"
@@ -108,6 +116,7 @@ impl Spec {
                 return Err(SpecError::DuplicateMechanism { id: mechanism.id.clone() });
             }
             self.check_names(mechanism)?;
+            self.check_between_runs(mechanism)?;
             self.check_role(mechanism, &mechanism.shape_parameters, "shape")?;
             self.check_role(mechanism, &mechanism.integer_parameters, "integer")?;
         }
@@ -137,6 +146,19 @@ impl Spec {
             Some(at) => Err(SpecError::DuplicateParameter {
                 mechanism: mechanism.id.clone(),
                 parameter: names[at].to_owned(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// What differs from run to run has parameters of each run alone.
+    fn check_between_runs(&self, mechanism: &Mechanism) -> Result<(), SpecError> {
+        let shared = |p: &&usize| self.parameters[**p].scope == Scope::Shared;
+        let mut parameters = mechanism.parameters.iter().chain(&mechanism.companions);
+        match parameters.find(shared).filter(|_| mechanism.between_runs) {
+            Some(&p) => Err(SpecError::SharedBetweenRuns {
+                mechanism: mechanism.id.clone(),
+                parameter: self.parameters[p].name.clone(),
             }),
             None => Ok(()),
         }

@@ -121,6 +121,10 @@ pub struct Mechanism {
     /// Whether nobody has asked for it, since it may act in any rig (a sensor's gain): it is tried only where nothing else explains the
     /// data, and named only where the data are clear enough to tell it from causes of which nobody has thought.
     pub unasked: bool,
+    /// Whether it is no physics that the baseline lacks, but what may differ from run to run without anyone wanting it (how much liquid is
+    /// left in a container): it has parameters of [`Scope::PerRun`] alone, whose values scatter around their start. It competes with the
+    /// mechanisms that have names; where it is needed, the answer says that runs differ, as what is left over.
+    pub between_runs: bool,
 }
 
 /// A candidate term of an unknown law: a parameter of the model that no mechanism frees.
@@ -152,7 +156,17 @@ pub struct Spec {
 impl Spec {
     /// The mechanisms that somebody has asked for, by their indices.
     pub(crate) fn asked(&self) -> Vec<usize> {
-        (0..self.mechanisms.len()).filter(|&m| !self.mechanisms[m].unasked).collect()
+        self.named().into_iter().filter(|&m| !self.mechanisms[m].unasked).collect()
+    }
+
+    /// The mechanisms that an answer may name, by their indices.
+    pub(crate) fn named(&self) -> Vec<usize> {
+        (0..self.mechanisms.len()).filter(|&m| !self.mechanisms[m].between_runs).collect()
+    }
+
+    /// What may differ from run to run, by its index.
+    pub(crate) fn between_runs(&self) -> Vec<usize> {
+        (0..self.mechanisms.len()).filter(|&m| self.mechanisms[m].between_runs).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use crate::fit::optimum::{Fit, covariance};
 use crate::linalg::{SemiCholesky, rank};
 use crate::problem::{Problem, Selection};
 use crate::selection::nuisance_prior;
-use crate::selection::prior::{LOG_PRIOR_ODDS, LOG_RANGE};
+use crate::selection::prior::{LOG_PRIOR_BETWEEN, LOG_PRIOR_ODDS, LOG_RANGE};
 
 /// Standard deviation of a shared parameter's prior where unseen data are predicted, in units of its scale.
 const WIDE: f64 = 10.0;
@@ -41,6 +41,7 @@ pub(crate) fn evidence(
     for mechanism in problem.at_work(set).into_iter().map(|m| &spec.mechanisms[m]) {
         let frees: Vec<usize> = mechanism.parameters.iter().chain(&mechanism.companions).copied().collect();
         evidence.pay(&mut left, &frees, &mechanism.shape_parameters);
+        evidence.value += if mechanism.between_runs { LOG_PRIOR_BETWEEN } else { 0.0 };
     }
     for &term in terms {
         evidence.pay(&mut left, &[spec.terms[term].parameter], &[]);

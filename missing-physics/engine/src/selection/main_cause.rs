@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::adequacy::linearised::curves::Curves;
+use crate::diagnosis::NEARLY_ALL;
 use crate::fit::gauss_newton::solve;
 use crate::fit::optimum::{Fit, covariance};
 use crate::leftover::fit::{given, with_leftover};
@@ -17,8 +18,6 @@ use crate::selection::candidate::Candidate;
 use crate::selection::evidence::evidence;
 use crate::selection::share::{Cut, unseen_misfit};
 
-/// The part of the squared misfit beyond the noise that a main cause takes away on unseen data.
-const NEARLY_ALL: f64 = 0.9;
 /// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
 const NEEDED: f64 = 5.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
@@ -140,6 +139,12 @@ impl<'a> Judge<'a> {
     pub(crate) fn share(&self, set: &[usize]) -> Option<f64> {
         let misfit = self.misfit(set)?;
         Some(if self.base > 0.0 { 1.0 - misfit / self.base } else { 1.0 })
+    }
+
+    /// The part of what some members of a set leave that all of them take away.
+    pub(crate) fn share_beside(&self, set: &[usize], members: &[usize]) -> Option<f64> {
+        let (left, base) = (self.misfit(set)?, self.misfit(members).unwrap_or(self.base));
+        Some(if base > 0.0 { 1.0 - left / base } else { 1.0 })
     }
 
     /// A set's least-squares fit.

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use crate::fit::columns::nuisance_prior_width;
 use crate::fit::optimum::{Fit, covariance};
 use crate::linalg::{SemiCholesky, dot, rank};
+use crate::model::Mechanism;
 use crate::problem::{Problem, Selection};
 use crate::selection::prior::LOG_RANGE;
 
@@ -58,6 +59,11 @@ pub(crate) fn cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: u
     };
     let alike = with_mean(0.0);
     let around_nothing = widths().map(|w| law(w, false).0).fold(f64::INFINITY, f64::min) + width_cost;
+    let spec = problem.spec();
+    let differs = |m: &Mechanism| m.between_runs && m.parameters.contains(&problem.nuisance.index[slot]);
+    if spec.mechanisms.iter().any(differs) {
+        return around_nothing - taken;
+    }
     let both = widths().map(with_mean).fold(f64::INFINITY, f64::min) + width_cost;
     alike.min(around_nothing).min(both) + 3f64.ln() - taken
 }

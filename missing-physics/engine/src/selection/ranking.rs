@@ -176,6 +176,14 @@ impl Ranking {
             || likelier && self.gain(set).is_some_and(|gain| gain > 0.0)
     }
 
+    /// Sets that hold all of one and more, and are hardly less likely.
+    pub(crate) fn as_likely_with_more(&self, at: usize) -> impl Iterator<Item = &Candidate> {
+        let less = &self.all[at];
+        self.physical.iter().map(|&(i, _)| &self.all[i]).filter(|more| {
+            more.set.len() > less.set.len() && nested(less, more) && more.evidence > less.evidence - RIVAL_GAP
+        })
+    }
+
     /// The chosen set, a simpler one that is only doubted, and those that explain as well and are no more, and no less, of the same.
     pub(crate) fn rivals(&self, best: &Best) -> Vec<&Candidate> {
         let chosen = self.at(best.at);

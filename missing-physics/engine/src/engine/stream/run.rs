@@ -32,7 +32,7 @@ impl<'a> Setting<'a> {
     /// The setting, and what may change.
     pub(super) fn new(problem: Problem<'a>, fit: &Fit) -> (Self, Vec<What>, Vec<Direction>) {
         let without = problem.select(&[], &[]);
-        let all: Vec<usize> = (0..problem.spec().mechanisms.len()).collect();
+        let all = problem.spec().named();
         let freed = problem.select(&all, &[]);
         let wide = Selection { nuisance: without.nuisance, added_nuisance: without.added_nuisance, ..freed };
         let baseline =
