@@ -40,7 +40,7 @@ fn derivatives_agree_with_differences() {
         let model = IndentationModel::new(setup, &conditions, 2.1e-3, 0.2, 1.8).unwrap();
         let run = run();
         let parameters = |scope| model.spec().parameters.iter().filter(move |p| p.scope == scope);
-        let nuisance = vec![0.02e-3, 1e-3];
+        let nuisance = vec![0.02e-3, 1e-3, 0.1];
         for on in [0.0, 0.8] {
             let shared: Vec<f64> = parameters(Scope::Shared)
                 .map(|p| if on > 0.0 && p.start == 0.0 { on * p.scale } else { p.start })
@@ -49,7 +49,7 @@ fn derivatives_agree_with_differences() {
             let mut out = [0.0; ROWS];
             let columns = free.len() + nuisance.len();
             let (mut exact, mut rough) = (vec![0.0; ROWS * columns], vec![0.0; ROWS * columns]);
-            let nuisance_free = [0, 1];
+            let nuisance_free = [0, 1, 2];
             model.jacobian(&run, &shared, &nuisance, &free, &nuisance_free, &mut out, &mut exact).unwrap();
             let mut plain = [0.0; ROWS];
             model.predict(&run, &shared, &nuisance, &mut plain).unwrap();

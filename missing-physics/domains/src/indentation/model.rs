@@ -126,6 +126,7 @@ impl DualModel for IndentationModel {
             at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot))
         };
         let modulus = self.modulus(run).ok_or("no condition")?;
+        let modulus = shared[modulus.slot] * (nuisance[p.stiffer.slot] + 1.0);
         let known = self.setup.thickness_m.map_or(0.0, f64::recip);
         let law = Indentation {
             layer: self.layer.filter(|_| known > 0.0 || on(p.thickness)),
@@ -137,7 +138,7 @@ impl DualModel for IndentationModel {
             rim_depth_m: shared[p.rim_depth.slot],
             rim_stiffness_n_m: shared[p.rim_stiffness.slot],
             compliance_m_n: shared[p.compliance.slot],
-            ..Indentation::elastic(self.setup.indenter, shared[modulus.slot], self.setup.poisson_ratio)
+            ..Indentation::elastic(self.setup.indenter, modulus, self.setup.poisson_ratio)
         };
         law.check().map_err(|e| e.to_string())?;
         let relaxation =

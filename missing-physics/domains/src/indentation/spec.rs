@@ -13,6 +13,8 @@ pub(super) struct Layout {
     pub(super) moduli: Vec<ParameterRef>,
     pub(super) offset: ParameterRef,
     pub(super) lift: ParameterRef,
+    /// How much stiffer the body of a curve is, as a part of its modulus.
+    pub(super) stiffer: ParameterRef,
     pub(super) tension: ParameterRef,
     pub(super) stretching: ParameterRef,
     /// The root of the work of adhesion: the force changes with it in proportion, near zero too.
@@ -73,6 +75,19 @@ pub(super) fn build(
     if setup.radius_known && !matches!(setup.indenter, Indenter::Cone { .. }) {
         strain_stiffening(&mut b, &mut p);
     }
+    p.stiffer = b.nuisance("stiffness_change", "", [-0.9, 9.0], 0.05);
+    let by_curve = b.mechanism(
+        "stiffness-by-run",
+        &[p.stiffer],
+        [
+            "a body that differs from curve to curve",
+            "Each curve is of another body, or of another place on it.",
+            "E -> E (1 + change of the curve)",
+            "Laird and Ware 1982, doi:10.2307/2529876 (random effects)",
+        ],
+        &["contact-offset"],
+    );
+    by_curve.between_runs = true;
     (b.build_unchecked(), p)
 }
 

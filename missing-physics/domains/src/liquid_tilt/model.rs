@@ -173,10 +173,11 @@ impl LiquidTiltModel {
         };
         let cavity = self.cavity(shared[p.thickness.slot])?;
         let (mass, volume) = self.load(run, nuisance);
-        let (mass, volume) = (mass * (1.0 + off.liquid), volume * (1.0 + off.liquid));
+        let more = 1.0 + off.liquid + p.fill.map_or(0.0, |at| nuisance[at.slot]);
+        let (mass, volume) = (mass * more, volume * more);
         let volume = volume.clamp(0.0, cavity.capacity_m3());
         let mut departures = self.departures(row, shared, at);
-        departures.grasp_offset_m += off.grasp_m;
+        departures.grasp_offset_m += off.grasp_m + nuisance[p.held.slot];
         let angle = theta[at] + off.angle_rad;
         let felt =
             self.setup.grasp.wrench(&*cavity, angle, mass, volume, &departures).map_err(|e| e.to_string())?;

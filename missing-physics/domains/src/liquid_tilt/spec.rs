@@ -19,6 +19,10 @@ pub(super) struct Layout {
     pub(super) lag: ParameterRef,
     pub(super) mass: Option<ParameterRef>,
     pub(super) volume: Option<ParameterRef>,
+    /// How much higher a run is held than the others.
+    pub(super) held: ParameterRef,
+    /// How much more liquid a run has than was measured, where that was, as a part of it.
+    pub(super) fill: Option<ParameterRef>,
 }
 
 /// The specification of a set-up whose recording has the given number of rows.
@@ -34,6 +38,7 @@ pub(super) fn build(setup: &Setup, rows: usize) -> (Spec, Layout) {
     grip(&mut b, &mut p, length, rows);
     drift(&mut b, &mut p, moment, rows);
     surface(&mut b, &mut p);
+    by_run(&mut b, &mut p, setup, length);
     (b.build_unchecked(), p)
 }
 
@@ -47,6 +52,40 @@ fn liquid(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup) {
     if !setup.volumes_known && setup.density_kg_m3.is_none() {
         p.volume = Some(b.nuisance("volume_m3", "m^3", [0.0, capacity], 0.1 * capacity));
     }
+}
+
+/// What may differ from run to run: where the container is held, and how much is in it where that was measured.
+fn by_run(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup, length: f64) {
+    p.held = b.nuisance("held_higher_m", "m", [-0.25 * length, 0.25 * length], 1e-3);
+    let mechanism = b.mechanism(
+        "grasp-by-run",
+        &[p.held],
+        [
+            "a grip that differs from run to run",
+            "The container is grasped anew, or slides between runs.",
+            "L_g + change of the run",
+            "[Matl 2021], section 2.6",
+        ],
+        &["grasp-offset", "grasp-slip"],
+    );
+    mechanism.between_runs = true;
+    if !setup.volumes_known {
+        return;
+    }
+    let fill = b.nuisance("fill_change", "", [-0.9, 1.0], 0.01);
+    let mechanism = b.mechanism(
+        "fill-by-run",
+        &[fill],
+        [
+            "a fill that differs from run to run",
+            "Liquid is spilt, evaporates or was measured roughly.",
+            "V -> V (1 + change of the run)",
+            "[Matl 2021], section 2.6",
+        ],
+        &["force-gain"],
+    );
+    mechanism.between_runs = true;
+    p.fill = Some(fill);
 }
 
 /// A wall that is up to so thick, m.
