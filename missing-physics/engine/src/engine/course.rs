@@ -36,20 +36,14 @@ pub(super) struct Outcome {
     pub(super) contradicting: Option<Contradicting>,
 }
 
-/// Fewer runs say nothing of how runs differ.
-const FEWEST_RUNS: usize = 3;
-
-/// Mechanisms that are said to be open beside what differs from run to run.
-const MOST_OPEN: usize = 3;
-
 /// Sets of mechanisms, compared.
-struct Compared {
-    ranking: Ranking,
+pub(super) struct Compared {
+    pub(super) ranking: Ranking,
     /// Mechanisms that could not be fitted, with the reason.
     unfitted: Vec<(usize, PredictError)>,
-    best: Option<Best>,
+    pub(super) best: Option<Best>,
     /// Sigmas of the white noise, by channel.
-    white: Vec<f64>,
+    pub(super) white: Vec<f64>,
 }
 
 /// What sets of mechanisms say of the data.
@@ -78,7 +72,7 @@ impl Course<'_> {
     }
 
     /// Is a candidate adequate?
-    fn test(&self, candidate: &Candidate, stream: u64) -> Result<Adequacy, PredictError> {
+    pub(super) fn test(&self, candidate: &Candidate, stream: u64) -> Result<Adequacy, PredictError> {
         let Begun { problem, rule, .. } = self.begun;
         let mut rivals = problem.spec().asked();
         rivals.retain(|m| !candidate.set.contains(m));
@@ -122,12 +116,7 @@ impl Course<'_> {
 
     /// Every set worth looking at, the preferred one, and the white noise beside which they are judged.
     fn compared(&self) -> Result<Compared, DiagnoseError> {
-        let Begun { problem, .. } = self.begun;
-        let mut wanted = problem.spec().asked();
-        if problem.rows.len() >= FEWEST_RUNS {
-            wanted.extend(problem.spec().between_runs());
-        }
-        let (mut ranking, unfitted) = self.compare(&wanted)?;
+        let (mut ranking, unfitted) = self.compare(&self.wanted())?;
         let mut best = self.best(&mut ranking)?;
         let white = self.white_noise(&ranking);
         if self.explains(&ranking, best.as_ref()).is_none()
@@ -264,6 +253,7 @@ impl Course<'_> {
     fn best(&self, ranking: &mut Ranking) -> Result<Option<Best>, DiagnoseError> {
         self.tell("adequacy of the best explanation", 0.0)?;
         let best = ranking.best(self.options.alpha, |c, stream| self.test(c, stream))?;
+        let best = best.map(|best| self.around_nothing(ranking, best)).transpose()?;
         self.tell("predicting unseen data", 0.0)?;
         ranking.score(&self.begun.problem, best.as_ref());
         Ok(best)
@@ -338,59 +328,6 @@ impl Course<'_> {
             diagnosis.undetermined.push(line);
             self.tell("choosing the next experiment", 0.0)?;
             diagnosis.next_experiment = experiment::best(problem, &sets, self.experiments);
-        }
-        Ok(diagnosis)
-    }
-
-    /// Whether a set takes the runs for alike.
-    fn alike(&self, candidate: &Candidate) -> bool {
-        let mechanisms = &self.begun.problem.spec().mechanisms;
-        candidate.set.iter().all(|&m| !mechanisms[m].between_runs)
-    }
-
-    /// A set explains the data with something that differs from run to run: that is left over by those of its members that have names.
-    fn runs_that_differ(
-        &self,
-        answer: &Answer<'_>,
-        adequacy: &Adequacy,
-        before: Vec<ChannelFit>,
-        Compared { ranking, best, white, .. }: &Compared,
-        chosen: &Best,
-        judge: &Judge<'_>,
-    ) -> Result<Diagnosis, DiagnoseError> {
-        let problem = &self.begun.problem;
-        let whole = ranking.at(chosen.at);
-        let (differing, named): (Vec<usize>, Vec<usize>) =
-            whole.set.iter().partition(|&&m| problem.spec().mechanisms[m].between_runs);
-        let verdict = if named.is_empty() { Verdict::Unexplained } else { Verdict::Partly };
-        let mut diagnosis = answer.skeleton(adequacy, verdict, whole, before)?;
-        diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
-        let after = predictions(problem, &whole.fit)?;
-        if let Some(score) = ranking.score_of(&whole.set) {
-            diagnosis.after = answer.errors_of(&after, score);
-        }
-        draw(&mut diagnosis, &after);
-        diagnosis.run_differences =
-            differing.iter().flat_map(|&m| answer.run_differences(whole, m)).collect();
-        if named.is_empty() {
-            let open = |more: &Candidate| {
-                let named: Vec<usize> = more.set.iter().copied().filter(|m| !differing.contains(m)).collect();
-                format!("whether {} acts as well cannot be told beside that", answer.names(&named))
-            };
-            diagnosis.undetermined.extend(ranking.as_likely_with_more(chosen.at).take(MOST_OPEN).map(open));
-            return Ok(diagnosis);
-        }
-        diagnosis.chosen = answer.ids(&named);
-        diagnosis.explained_share = judge.share_beside(&whole.set, &differing);
-        if let Some(alone) = ranking.of(&named) {
-            let fit = judge.least_squares(&named).unwrap_or(&alone.fit);
-            diagnosis.leftover = locate(problem, &alone.selection, fit, white)?;
-        }
-        let rivals = ranking.rivals(chosen).into_iter().map(|rival| answer.ids(&rival.set));
-        for rival in rivals.filter(|rival| !rival.is_empty()) {
-            if rival != diagnosis.chosen && !diagnosis.confused_with.contains(&rival) {
-                diagnosis.confused_with.push(rival);
-            }
         }
         Ok(diagnosis)
     }
@@ -524,7 +461,7 @@ fn slow(problem: &Problem<'_>, noise: &NoiseState, white: &[f64]) -> bool {
 }
 
 /// Puts what a fit predicts into the curves.
-fn draw(diagnosis: &mut Diagnosis, predictions: &[Vec<Vec<f64>>]) {
+pub(super) fn draw(diagnosis: &mut Diagnosis, predictions: &[Vec<Vec<f64>>]) {
     for (curves, after) in diagnosis.curves.iter_mut().zip(predictions) {
         curves.after.clone_from(after);
     }

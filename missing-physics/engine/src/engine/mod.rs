@@ -1,6 +1,7 @@
 //! The diagnosis from end to end.
 
 pub(crate) mod begin;
+mod between_runs;
 mod course;
 mod input;
 mod local;

@@ -176,10 +176,11 @@ impl Ranking {
             || likelier && self.gain(set).is_some_and(|gain| gain > 0.0)
     }
 
-    /// Sets that hold all of one and more, and are hardly less likely.
-    pub(crate) fn as_likely_with_more(&self, at: usize) -> impl Iterator<Item = &Candidate> {
+    /// Where sets stand that hold all of one and more, and are hardly less likely: the likeliest first.
+    pub(crate) fn as_likely_with_more(&self, at: usize) -> impl Iterator<Item = usize> {
         let less = &self.all[at];
-        self.physical.iter().map(|&(i, _)| &self.all[i]).filter(|more| {
+        self.physical.iter().map(|p| p.0).filter(move |&i| {
+            let more = &self.all[i];
             more.set.len() > less.set.len() && nested(less, more) && more.evidence > less.evidence - RIVAL_GAP
         })
     }
