@@ -7,6 +7,8 @@
 //! cargo run --release -p granular-infer --example pours -- cloths 1684 0 1 c.txt
 //! cargo run --release -p granular-infer --example series -- granular-infer/cloths.json.gz c.txt
 //! ```
+//! `--grains 2000` in front: of pours of so many grains each, and not of 600.
+//!
 //! Every fifth series is held out; the posterior that is shipped for velvet is measured on those too. A campaign of single pours (`grains`) is taken for series of one.
 //! From fewer than 500 series nothing is held out: a trial of the command.
 #![allow(clippy::print_stdout, reason = "prints what it measures")]
@@ -34,13 +36,25 @@ const LEAST: usize = 500;
 const DRAWS: usize = 500;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut scene = Scene::default();
+    if let [option, grains, ..] = &arguments[..]
+        && option == "--grains"
+    {
+        scene.rig.count = grains.parse()?;
+        arguments.drain(..2);
+    }
     let [out, files @ ..] = arguments.as_slice() else {
-        return Err("expected OUT.json.gz FILE...".into());
+        return Err("expected [--grains GRAINS] OUT.json.gz FILE...".into());
     };
     let shards = files.iter().map(|f| Results::read(Path::new(f))).collect::<Result<Vec<_>, _>>()?;
     let results = Results::merge(shards)?;
-    let all = seen(&results, &Scene::default(), &View::default(), 1)?;
+    let (coordinates, of_pour) = (results.campaign.x_dim, 3 * scene.rig.count);
+    if ![of_pour, SERIES_M.len() * of_pour].contains(&coordinates) {
+        let of = format!("one pour or {} of {} grains", SERIES_M.len(), scene.rig.count);
+        return Err(format!("{coordinates} coordinates in a draw, expected those of {of} (--grains)").into());
+    }
+    let all = seen(&results, &scene, &View::default(), 1)?;
     let (simulations, prior) = (&all.simulations, &results.campaign.prior);
     let pours = simulations.x().dim() / COUNT;
     println!(
