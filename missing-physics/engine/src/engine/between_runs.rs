@@ -8,12 +8,11 @@ use crate::engine::input::DiagnoseError;
 use crate::fit::prediction::predictions;
 use crate::locate::locations::locate;
 use crate::model::PredictError;
+use crate::runs::spread::FEWEST_RUNS;
 use crate::selection::candidate::Candidate;
 use crate::selection::main_cause::Judge;
 use crate::selection::ranking::{Best, Ranking, clearly};
 
-/// Fewer runs say nothing of how runs differ.
-const FEWEST_RUNS: usize = 3;
 /// Mechanisms that are said to be open beside what differs from run to run.
 const MOST_OPEN: usize = 3;
 

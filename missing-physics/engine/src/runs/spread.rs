@@ -13,7 +13,7 @@ use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
 
 /// Fewer runs say nothing of how runs differ.
-const FEWEST_RUNS: usize = 3;
+pub(crate) const FEWEST_RUNS: usize = 3;
 /// Chance, over all parameters, that runs which do not differ are said to.
 const BY_CHANCE: f64 = 0.01;
 
