@@ -76,9 +76,9 @@ pub(super) fn build(
         strain_stiffening(&mut b, &mut p);
     }
     p.stiffer = b.nuisance("stiffness_change", "", [-0.9, 9.0], 0.05);
-    let by_curve = b.mechanism(
+    b.between_runs(
         "stiffness-by-run",
-        &[p.stiffer],
+        p.stiffer,
         [
             "a body that differs from curve to curve",
             "Each curve is of another body, or of another place on it.",
@@ -87,7 +87,6 @@ pub(super) fn build(
         ],
         &["contact-offset"],
     );
-    by_curve.between_runs = true;
     (b.build_unchecked(), p)
 }
 

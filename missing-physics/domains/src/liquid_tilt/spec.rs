@@ -57,9 +57,9 @@ fn liquid(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup) {
 /// What may differ from run to run: where the container is held, and how much is in it where that was measured.
 fn by_run(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup, length: f64) {
     p.held = b.nuisance("held_higher_m", "m", [-0.25 * length, 0.25 * length], 1e-3);
-    let mechanism = b.mechanism(
+    b.between_runs(
         "grasp-by-run",
-        &[p.held],
+        p.held,
         [
             "a grip that differs from run to run",
             "The container is grasped anew, or slides between runs.",
@@ -68,14 +68,13 @@ fn by_run(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup, length: f64) {
         ],
         &["grasp-offset", "grasp-slip"],
     );
-    mechanism.between_runs = true;
     if !setup.volumes_known {
         return;
     }
     let fill = b.nuisance("fill_change", "", [-0.9, 1.0], 0.01);
-    let mechanism = b.mechanism(
+    b.between_runs(
         "fill-by-run",
-        &[fill],
+        fill,
         [
             "a fill that differs from run to run",
             "Liquid is spilt, evaporates or was measured roughly.",
@@ -84,7 +83,6 @@ fn by_run(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup, length: f64) {
         ],
         &["force-gain"],
     );
-    mechanism.between_runs = true;
     p.fill = Some(fill);
 }
 

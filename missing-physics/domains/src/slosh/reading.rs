@@ -130,25 +130,20 @@ impl Reading<'_> {
                 }
             } else {
                 // Modes of which each depends on it add up.
-                let mut derived = 0;
+                column.fill(0.0);
+                let mut derived = false;
                 for known in &known {
                     if self.derive(known, parameters, by, &mut more) {
-                        column
-                            .iter_mut()
-                            .zip(&more)
-                            .for_each(|(d, m)| *d = if derived > 0 { *d + m } else { *m });
-                        derived += 1;
+                        add(column, 1.0, &more);
+                        derived = true;
                     }
                 }
                 let of_first = by.is_nuisance(p.fill) && known.first().is_none_or(|k| k.0 != Mode::First);
-                if derived == 0 || of_first {
+                if !derived || of_first {
                     let [shared, nuisance] = by.moved(parameters);
                     self.read(Mode::First, [&shared, &nuisance], &mut more)?;
-                    let change = more.iter().zip(&first).map(|(m, y)| (m - y) / by.step);
-                    column
-                        .iter_mut()
-                        .zip(change)
-                        .for_each(|(d, c)| *d = if derived > 0 { *d + c } else { c });
+                    add(&mut more, -1.0, &first);
+                    add(column, by.step.recip(), &more);
                 }
             }
         }

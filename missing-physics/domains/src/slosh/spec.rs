@@ -98,9 +98,9 @@ pub(super) fn build(
 /// A fill that is not what was recorded, in each run by another part.
 fn fill(b: &mut SpecBuilder, p: &mut Layout) {
     p.fill = b.nuisance("fill_change", "", [-0.5, 0.5], 0.02);
-    let mechanism = b.mechanism(
+    b.between_runs(
         "fill-by-run",
-        &[p.fill],
+        p.fill,
         [
             "a fill that differs from run to run",
             "Liquid leaks, evaporates, is spilt or was measured roughly.",
@@ -109,7 +109,6 @@ fn fill(b: &mut SpecBuilder, p: &mut Layout) {
         ],
         &["nonlinear-frequency", "surface-tension"],
     );
-    mechanism.between_runs = true;
 }
 
 /// The surface's tension.

@@ -39,7 +39,7 @@ impl Course<'_> {
         answer: &Answer<'_>,
         adequacy: &Adequacy,
         before: Vec<ChannelFit>,
-        Compared { ranking, best, white, .. }: &Compared,
+        Compared { ranking, white, .. }: &Compared,
         chosen: &Best,
         judge: &Judge<'_>,
     ) -> Result<Diagnosis, DiagnoseError> {
@@ -49,7 +49,7 @@ impl Course<'_> {
             whole.set.iter().partition(|&&m| problem.spec().mechanisms[m].between_runs);
         let verdict = if named.is_empty() { Verdict::Unexplained } else { Verdict::Partly };
         let mut diagnosis = answer.skeleton(adequacy, verdict, whole, before)?;
-        diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
+        diagnosis.mechanisms = answer.mechanisms(ranking, Some(chosen))?;
         let after = predictions(problem, &whole.fit)?;
         if let Some(score) = ranking.score_of(&whole.set) {
             diagnosis.after = answer.errors_of(&after, score);
@@ -72,8 +72,7 @@ impl Course<'_> {
             let fit = judge.least_squares(&named).unwrap_or(&alone.fit);
             diagnosis.leftover = locate(problem, &alone.selection, fit, white)?;
         }
-        let alone = |set: &[usize]| ranking.of(set).is_some_and(|alone| alone.evidence > whole.evidence);
-        if alone(&differing) {
+        if ranking.of(&differing).is_some_and(|alone| alone.evidence > whole.evidence) {
             let names = answer.names(&differing);
             diagnosis
                 .undetermined

@@ -41,7 +41,7 @@ pub(super) struct Compared {
     pub(super) ranking: Ranking,
     /// Mechanisms that could not be fitted, with the reason.
     unfitted: Vec<(usize, PredictError)>,
-    pub(super) best: Option<Best>,
+    best: Option<Best>,
     /// Sigmas of the white noise, by channel.
     pub(super) white: Vec<f64>,
 }

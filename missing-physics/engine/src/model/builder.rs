@@ -111,6 +111,17 @@ impl SpecBuilder {
         &mut self.spec.mechanisms[at]
     }
 
+    /// What may differ from run to run ([`Mechanism::between_runs`]) by a parameter of each run, with the texts of [`Self::mechanism`].
+    pub fn between_runs(
+        &mut self,
+        id: &str,
+        parameter: ParameterRef,
+        text: [&str; 4],
+        confused_with: &[&str],
+    ) {
+        self.mechanism(id, &[parameter], text, confused_with).between_runs = true;
+    }
+
     /// The mechanism of an identifier, to be added to.
     pub fn mechanism_mut(&mut self, id: &str) -> Option<&mut Mechanism> {
         self.spec.mechanisms.iter_mut().find(|m| m.id == id)

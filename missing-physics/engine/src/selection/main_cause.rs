@@ -137,8 +137,7 @@ impl<'a> Judge<'a> {
 
     /// The part of the squared misfit beyond the noise that a set takes away on unseen data.
     pub(crate) fn share(&self, set: &[usize]) -> Option<f64> {
-        let misfit = self.misfit(set)?;
-        Some(if self.base > 0.0 { 1.0 - misfit / self.base } else { 1.0 })
+        self.share_beside(set, &[])
     }
 
     /// The part of what some members of a set leave that all of them take away.

@@ -57,13 +57,13 @@ pub(crate) fn cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: u
         let prior = (2.0 * (mean * mean + error * error).sqrt() * LOG_RANGE).ln();
         cost + prior - (std::f64::consts::TAU.sqrt() * error).ln()
     };
-    let alike = with_mean(0.0);
     let around_nothing = widths().map(|w| law(w, false).0).fold(f64::INFINITY, f64::min) + width_cost;
     let spec = problem.spec();
     let differs = |m: &Mechanism| m.between_runs && m.parameters.contains(&problem.nuisance.index[slot]);
     if spec.mechanisms.iter().any(differs) {
         return around_nothing - taken;
     }
+    let alike = with_mean(0.0);
     let both = widths().map(with_mean).fold(f64::INFINITY, f64::min) + width_cost;
     alike.min(around_nothing).min(both) + 3f64.ln() - taken
 }
