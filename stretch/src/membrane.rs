@@ -1,9 +1,9 @@
 //! A membrane's own law: `F = a delta + b delta^3`, pre-tension and stretching, with `a(R, x)` and `b(R, x)` quadratic in the logarithm of the
-//! ball's radius R and in the stretch x.
+//! ball's radius R and in `ln(1 + x/x_max)` of the stretch x.
 //!
 //! The linear term is the tension that is there, the cubic one what the deflection adds (the large-deflection plate's: Timoshenko and
 //! Woinowsky-Krieger 1959, section 97). How both depend on radius and stretch is empirical, so that the model interpolates and says nothing beyond
-//! its calibration.
+//! its calibration. A rubber's tension rises ever less with its stretch, which is why a logarithm of it is bent less than the stretch itself.
 
 use hertz_contact::calibrated::Calibrated;
 use hertz_contact::law::{Law, Membrane};
@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::{CalibrationError, ForceModel, LeftOut, Press, SLACK, check, left_out};
 
-/// Terms over radius and over stretch: 1, x, x^2.
+/// Terms over radius and over stretch: 1, u, u^2 of a logarithm u.
 const TERMS: usize = 3;
 /// Coefficients of `a`, and of `b`.
 const PER_POWER: usize = TERMS * TERMS;
@@ -85,9 +85,9 @@ impl MembraneModel {
     }
 }
 
-/// Powers of the radius's logarithm and of the stretch, each with each.
+/// Powers of the radius's logarithm and of the stretch's, each with each.
 fn over_states([radius, stretch, _]: [f64; 3], radius_m: f64, stretch_m: f64) -> [f64; PER_POWER] {
-    let (u, s) = ((radius_m / radius).ln(), stretch_m / stretch);
+    let (u, s) = ((radius_m / radius).ln(), (stretch_m / stretch).ln_1p());
     std::array::from_fn(|k| u.powi((k / TERMS) as i32) * s.powi((k % TERMS) as i32))
 }
 
