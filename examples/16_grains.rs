@@ -39,11 +39,11 @@ fn dice(seed: u64) -> ChaCha8Rng {
 }
 
 /// One pour, one picture, one posterior; then the same again with what was inferred.
-fn one_picture(
-    posterior: &GrainPosterior,
+fn one_picture<'p>(
+    posterior: &'p GrainPosterior,
     hidden: Grain,
     svg: &mut String,
-) -> Result<Inferred, Box<dyn Error + Send + Sync>> {
+) -> Result<Inferred<'p>, Box<dyn Error + Send + Sync>> {
     let (scene, view) = (Scene::default(), View::default());
     let kind = Kind { grain: hidden, shape: None, size_variation: 0.0, work_of_adhesion_j_m2: 0.0 };
     let mut rig = FakeRig::new(scene, kind, view, 11);
@@ -51,7 +51,7 @@ fn one_picture(
     let map = look(&mut rig)?;
     let statistics = view.statistics(&map, &[], scene.rig.diameter_m)?;
     let inferred = posterior.infer(&statistics)?;
-    let estimate = inferred.estimate();
+    let estimate = inferred.estimate()?;
     let again = scene.grains(&estimate, 0.12, 5)?;
     let second = view.features(&again, &scene.rig, &mut dice(5))?;
     println!("The 16 statistics of a picture, and of a pour with what was inferred from it:");
@@ -69,7 +69,7 @@ fn one_picture(
             .collect();
         println!("  {name:5} {:.3}, 90 %: {}; hidden {truth:.3}", estimate.theta()[j], spans.join(", "));
     }
-    let draws = inferred.posterior.sample(1500, &mut dice(2)).theta;
+    let draws = inferred.posterior.sample(1500, &mut dice(2))?;
     let bounds = prior()?.bounds();
     let pairs = |a: usize, b: usize| -> Vec<[f64; 2]> {
         let u = |t: &[f64], k: usize| if k == 1 { t[k].ln() } else { t[k] };
@@ -100,7 +100,7 @@ fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error + Send + Sync>
             view.features(&grains, &scene.rig, &mut dice(seed)).ok()
         };
         let first = seen(&truth, 100 + i)?;
-        let estimate = posterior.infer(&first).ok()?.estimate();
+        let estimate = posterior.infer(&first).ok()?.estimate().ok()?;
         Some([
             estimate.sliding_friction - truth.sliding_friction,
             (estimate.rolling_friction / truth.rolling_friction).ln(),
@@ -109,13 +109,18 @@ fn unseen(posterior: &GrainPosterior) -> Result<(), Box<dyn Error + Send + Sync>
         ])
     };
     let errors: Vec<[f64; 4]> = (0..heaps).into_par_iter().filter_map(one).collect();
-    println!("\nErrors over {} unseen heaps (section 3.6)      here          [Matl 2021]", errors.len());
+    println!(
+        "\nErrors over {} unseen heaps (section 3.6): mean, its 95 % interval, spread; here and in [Matl 2021]",
+        errors.len()
+    );
     let published = [(0.0380, 0.0646), (-1.1695, 0.7032), (-0.0008, 0.0148), (1.582, 0.336)];
     for (k, (name, (m, s))) in ["mu_s", "ln mu_r", "e", "L2 of statistics"].iter().zip(published).enumerate()
     {
         let of = || errors.iter().map(|e| e[k]);
-        let (mean, sd) = (of().mean(), of().std_dev());
-        println!("  {name:30} {mean:+8.4} +- {sd:.4}   {m:+8.4} +- {s:.4}");
+        // 95 % intervals of a mean are what [Matl 2021] prints behind +-.
+        let (mean, sd, to_mean) = (of().mean(), of().std_dev(), 1.96 / (errors.len() as f64).sqrt());
+        let theirs = s * 50_f64.sqrt() / 1.96;
+        println!("  {name:18} {mean:+8.4} +- {:.4}, {sd:.3}   {m:+8.4} +- {s:.4}, {theirs:.3}", sd * to_mean);
     }
     Ok(())
 }
@@ -171,11 +176,11 @@ fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error 
 }
 
 /// Spilled grains, foretold from the posterior and poured with the hidden grain.
-fn bowl(hidden: Grain, inferred: &Inferred) -> Result<(), Box<dyn Error + Send + Sync>> {
+fn bowl(hidden: Grain, inferred: &Inferred<'_>) -> Result<(), Box<dyn Error + Send + Sync>> {
     let (count, pours) = if examples::small() { (40, 2) } else { (250, 8) };
     let scene = Scene { rig: Rig { count, ..Scene::default().rig }, ..Scene::default() };
     let bowl = Bowl::round(0.03, 0.05, 0.025)?;
-    let draws = inferred.posterior.sample(pours, &mut dice(3)).theta;
+    let draws = inferred.posterior.sample(pours, &mut dice(3))?;
     println!(
         "\nGrains of {count} that a bowl of 10 cm spills       foretold (of {pours} draws)   hidden grain"
     );

@@ -8,7 +8,7 @@ use crate::component::Component;
 use crate::error::Error;
 use crate::mixture::{Mixture, cumulative, draw, pick};
 use crate::normal::ln_sum_exp;
-use crate::points::{Points, check_length};
+use crate::points::{Points, check_length, check_row};
 use crate::prior::Prior;
 use crate::truncation::{BoxMass, Boxed, CLOSE};
 
@@ -223,43 +223,116 @@ impl Posterior {
         level: f64,
         rng: &mut R,
     ) -> Result<Vec<[f64; 2]>, Error> {
-        const BINS: usize = 400;
-        const DRAWS: usize = 20_000;
-        if parameter >= self.prior.dim() {
-            return Err(Error::Indices { indices: vec![parameter], dim: self.prior.dim() });
-        }
-        if !(level > 0.0 && level < 1.0) {
-            return Err(Error::Setting { name: "level", value: level, rule: "between 0 and 1" });
-        }
-        let marginal = self.prior.marginals()[parameter];
-        let mut u: Vec<f64> =
-            self.sample(DRAWS, rng).theta.rows().map(|t| marginal.coordinate(t[parameter])).collect();
-        u.sort_by(f64::total_cmp);
-        // A mixture cut in other dimensions has no closed marginal; a kernel estimate with the mixture's own smoothness does.
-        let (low, high) = (u[0], u[DRAWS - 1]);
-        let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
-        let mut bins = [0.0_f64; BINS];
-        u.iter().for_each(|v| bins[(((v - low) / width) as usize).min(BINS - 1)] += 1.0);
-        let smooth: Vec<f64> = (0..BINS)
-            .map(|b| {
-                let near = b.saturating_sub(4)..(b + 5).min(BINS);
-                near.clone().map(|i| bins[i]).sum::<f64>() / near.len() as f64
-            })
-            .collect();
-        let mut order: Vec<usize> = (0..BINS).collect();
-        order.sort_by(|&a, &b| smooth[b].total_cmp(&smooth[a]));
-        let (mut inside, mut held) = ([false; BINS], 0.0);
-        for b in order {
-            if held >= level * DRAWS as f64 {
-                break;
-            }
-            inside[b] = true;
-            held += bins[b];
-        }
-        let edge = |b: usize| marginal.value(low + b as f64 * width);
-        let starts = (0..BINS).filter(|&b| inside[b] && (b == 0 || !inside[b - 1]));
-        Ok(starts.map(|b| [edge(b), edge((b..BINS).find(|&e| !inside[e]).unwrap_or(BINS))]).collect())
+        check_interval(&self.prior, parameter, level)?;
+        Ok(highest_density(&self.prior, &self.sample(INTERVAL_DRAWS, rng).theta, parameter, level))
     }
+}
+
+/// A learned density at one observation.
+#[derive(Debug)]
+pub struct Given<'d, D> {
+    density: &'d D,
+    x: Vec<f64>,
+}
+
+impl<D> Clone for Given<'_, D> {
+    fn clone(&self) -> Self {
+        Self { density: self.density, x: self.x.clone() }
+    }
+}
+
+impl<'d, D: ConditionalDensity> Given<'d, D> {
+    /// q(theta | x) at the observation x.
+    ///
+    /// # Errors
+    /// [`Error::Length`], [`Error::NotFinite`] for an observation of another length or with NaN.
+    pub fn new(density: &'d D, x: &[f64]) -> Result<Self, Error> {
+        check_row("observation", x, density.x_dim())?;
+        Ok(Self { density, x: x.to_vec() })
+    }
+
+    /// The prior.
+    pub fn prior(&self) -> &'d Prior {
+        self.density.prior()
+    }
+
+    /// Log density of a parameter vector; minus infinity outside the prior.
+    ///
+    /// # Errors
+    /// [`Error::Length`].
+    pub fn ln_density(&self, theta: &[f64]) -> Result<f64, Error> {
+        self.density.ln_density(theta, &self.x)
+    }
+
+    /// Log densities of many parameter vectors.
+    ///
+    /// # Errors
+    /// [`Error::Length`].
+    pub fn ln_densities(&self, theta: &Points) -> Result<Vec<f64>, Error> {
+        self.density.ln_densities(theta, &self.x)
+    }
+
+    /// Draws `count` parameter vectors.
+    ///
+    /// # Errors
+    /// Those of the density.
+    pub fn sample(&self, count: usize, rng: &mut dyn Rng) -> Result<Points, Error> {
+        self.density.sample(&self.x, count, rng)
+    }
+
+    /// Intervals of highest density of one parameter, as [`Posterior::intervals`].
+    ///
+    /// # Errors
+    /// [`Error::Indices`] for a parameter that does not exist; [`Error::Setting`] for a level not between 0 and 1.
+    pub fn intervals(&self, parameter: usize, level: f64, rng: &mut dyn Rng) -> Result<Vec<[f64; 2]>, Error> {
+        check_interval(self.prior(), parameter, level)?;
+        Ok(highest_density(self.prior(), &self.sample(INTERVAL_DRAWS, rng)?, parameter, level))
+    }
+}
+
+/// Draws behind intervals of one parameter.
+const INTERVAL_DRAWS: usize = 20_000;
+
+fn check_interval(prior: &Prior, parameter: usize, level: f64) -> Result<(), Error> {
+    if parameter >= prior.dim() {
+        return Err(Error::Indices { indices: vec![parameter], dim: prior.dim() });
+    }
+    if !(level > 0.0 && level < 1.0) {
+        return Err(Error::Setting { name: "level", value: level, rule: "between 0 and 1" });
+    }
+    Ok(())
+}
+
+/// Intervals of highest density of one parameter of [`INTERVAL_DRAWS`] draws.
+fn highest_density(prior: &Prior, draws: &Points, parameter: usize, level: f64) -> Vec<[f64; 2]> {
+    const BINS: usize = 400;
+    let marginal = prior.marginals()[parameter];
+    let mut u: Vec<f64> = draws.rows().map(|t| marginal.coordinate(t[parameter])).collect();
+    u.sort_by(f64::total_cmp);
+    // A density cut in other dimensions has no closed marginal; a kernel estimate as smooth as a mixture does.
+    let (low, high) = (u[0], u[u.len() - 1]);
+    let width = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
+    let mut bins = [0.0_f64; BINS];
+    u.iter().for_each(|v| bins[(((v - low) / width) as usize).min(BINS - 1)] += 1.0);
+    let smooth: Vec<f64> = (0..BINS)
+        .map(|b| {
+            let near = b.saturating_sub(4)..(b + 5).min(BINS);
+            near.clone().map(|i| bins[i]).sum::<f64>() / near.len() as f64
+        })
+        .collect();
+    let mut order: Vec<usize> = (0..BINS).collect();
+    order.sort_by(|&a, &b| smooth[b].total_cmp(&smooth[a]));
+    let (mut inside, mut held) = ([false; BINS], 0.0);
+    for b in order {
+        if held >= level * u.len() as f64 {
+            break;
+        }
+        inside[b] = true;
+        held += bins[b];
+    }
+    let edge = |b: usize| marginal.value(low + b as f64 * width);
+    let starts = (0..BINS).filter(|&b| inside[b] && (b == 0 || !inside[b - 1]));
+    starts.map(|b| [edge(b), edge((b..BINS).find(|&e| !inside[e]).unwrap_or(BINS))]).collect()
 }
 
 /// A share in `0..1` that is never exactly 0.

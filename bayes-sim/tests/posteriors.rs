@@ -15,7 +15,7 @@ use bayes_sim::error::Error;
 use bayes_sim::mdn::{Mdn, MdnSettings, MixtureDensity};
 use bayes_sim::mdrff::{Mdrff, MdrffSettings};
 use bayes_sim::points::Points;
-use bayes_sim::posterior::ConditionalDensity;
+use bayes_sim::posterior::{ConditionalDensity, Given};
 use bayes_sim::prior::{Marginal, Prior};
 use bayes_sim::rounds::Rounds;
 use bayes_sim::save::Saved;
@@ -143,6 +143,28 @@ fn the_number_of_threads_changes_no_bit_and_neither_does_a_file() {
     assert!(Mdrff::load(&path).unwrap_err().to_string().contains("version 99"));
     std::fs::write(&path, &text[..text.len() / 2]).unwrap();
     assert!(matches!(Mdrff::load(&path), Err(Error::Format { .. })));
+}
+
+/// Intervals at an observation hold as many draws as they say, within the prior; an observation of another length or with NaN is refused.
+#[test]
+fn a_density_at_an_observation_has_intervals_of_its_draws() {
+    let task = common::gaussian_linear_uniform();
+    let density = Autoregressive::train(&task.prior, &task.simulations(300, 3), &quick().1, 1).unwrap();
+    let x = vec![0.2; task.x_dim];
+    let given = Given::new(&density, &x).unwrap();
+    let draws = given.sample(4000, &mut dice(2)).unwrap();
+    for level in [0.5, 0.9] {
+        let intervals = given.intervals(1, level, &mut dice(3)).unwrap();
+        let inside =
+            draws.rows().filter(|t| intervals.iter().any(|[a, b]| (*a..=*b).contains(&t[1]))).count();
+        assert!((inside as f64 / 4000.0 - level).abs() < 0.03, "{level}: {inside} in {intervals:?}");
+        let [low, high] = task.prior.bounds()[1];
+        assert!(intervals.iter().all(|[a, b]| *a >= low && *b <= high), "{intervals:?}");
+    }
+    assert!(given.intervals(task.prior.dim(), 0.9, &mut dice(3)).is_err());
+    assert!(given.intervals(0, 1.0, &mut dice(3)).is_err());
+    assert!(matches!(Given::new(&density, &x[1..]), Err(Error::Length { .. })));
+    assert!(matches!(Given::new(&density, &vec![f64::NAN; x.len()]), Err(Error::NotFinite { .. })));
 }
 
 /// Under a log-uniform prior the density of parameters in their own units integrates to one; single and batched values agree.

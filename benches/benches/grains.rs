@@ -28,10 +28,10 @@ fn grains(c: &mut Criterion) {
         .bench_function("distance correlation/10000", |b| b.iter(|| distance_correlation(black_box(&x), &y)));
     if let (Ok(posterior), Ok(statistics)) = (GrainPosterior::shipped(), statistics()) {
         group.bench_function("posterior/draws of 4000", |b| {
-            b.iter(|| posterior.infer(black_box(&statistics)).map(|i| i.estimate()));
+            b.iter(|| posterior.infer(black_box(&statistics)).and_then(|i| i.estimate()));
         });
-        if let Ok(inferred) = posterior.infer(&statistics) {
-            println!("grains/posterior: {:?} of {COUSCOUS:?}", inferred.estimate());
+        if let Ok(estimate) = posterior.infer(&statistics).and_then(|i| i.estimate()) {
+            println!("grains/posterior: {estimate:?} of {COUSCOUS:?}");
         }
     }
     group.sample_size(10);

@@ -1,6 +1,6 @@
-use bayes_sim::mdn::MixtureDensity as _;
-use bayes_sim::mdrff::Mdrff;
+use bayes_sim::autoregressive::Autoregressive;
 use bayes_sim::points::Points;
+use bayes_sim::posterior::ConditionalDensity as _;
 use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
 use granular_infer::posterior::settings;
@@ -44,10 +44,10 @@ pub(crate) fn print(bench: &Bench) -> Outcome<()> {
             x.push(picture)?;
         }
         let training = Simulations::new(theta, x)?;
-        let density = Mdrff::train(&prior, &training, &settings(1), 1)?;
+        let density = Autoregressive::train(&prior, &training, &settings(), 1)?;
         let error = |(mu, picture): &&(f64, [f64; COUNT])| -> Outcome<f64> {
-            let draws = density.posterior(picture)?.sample(DRAWS, &mut ChaCha8Rng::seed_from_u64(0));
-            Ok(draws.theta.column(0).mean() - mu)
+            let draws = density.sample(picture, DRAWS, &mut ChaCha8Rng::seed_from_u64(0))?;
+            Ok(draws.column(0).mean() - mu)
         };
         let errors = tests.iter().map(error).collect::<Outcome<Vec<f64>>>()?;
         let published = match count {

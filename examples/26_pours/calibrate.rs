@@ -55,7 +55,7 @@ pub(crate) fn print(bench: &Bench) -> Outcome<()> {
             .collect::<Outcome<Vec<Poured>>>()?;
         let mut tried = Vec::new();
         for (seed, poured) in (0_u64..).zip(&real) {
-            let grain = bench.posterior.infer(&poured.statistics)?.estimate();
+            let grain = bench.posterior.infer(&poured.statistics)?.estimate()?;
             let again = bench.pour(&grain, None, HEIGHT_M, 50_000 + seed).ok_or("it leaves the picture")?;
             tried.push((bench.posterior.distance(&poured.statistics, &again), grain, poured));
         }

@@ -24,10 +24,11 @@ pub(crate) fn print(bench: &Bench) -> Outcome<()> {
             let seed = 30_000 + i as u64;
             let picture = bench.pour(&truth, shape.as_ref(), HEIGHT_M, seed)?;
             let inferred = bench.posterior.infer(&picture).ok()?;
-            let again = bench.pour(&inferred.estimate(), None, HEIGHT_M, seed + 1_000)?;
+            let estimate = inferred.estimate().ok()?;
+            let again = bench.pour(&estimate, None, HEIGHT_M, seed + 1_000)?;
             Some((
                 bench.posterior.distance(&picture, &again),
-                inferred.estimate().sliding_friction - sliding_friction,
+                estimate.sliding_friction - sliding_friction,
                 inferred.resemblance.is_doubtful(),
             ))
         };

@@ -9,19 +9,18 @@
 //! ```
 //! `--grains 2000` in front: of pours of so many grains each, and not of 600.
 //!
-//! Every fifth series is held out; the posterior that is shipped for velvet is measured on those too. A campaign of single pours (`grains`) is taken for series of one.
+//! Every tenth series is held out; the posterior that is shipped for velvet is measured on those too. A campaign of single pours (`grains`) is taken for series of one.
 //! From fewer than 500 series nothing is held out: a trial of the command.
 #![allow(clippy::print_stdout, reason = "prints what it measures")]
 
 use std::error::Error;
 use std::path::Path;
 
-use bayes_sim::calibration::expected_coverage;
+use bayes_sim::calibration::{expected_coverage, sbc_ranks};
 use bayes_sim::campaign::Results;
 use bayes_sim::points::Points;
-use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
-use granular_infer::posterior::{GrainPosterior, Inferred, settings};
+use granular_infer::posterior::{GrainPosterior, settings};
 use granular_infer::scene::{SERIES_M, Scene};
 use granular_infer::summary::COUNT;
 use granular_infer::view::{View, seen};
@@ -29,7 +28,7 @@ use rayon::prelude::*;
 use statrs::statistics::Statistics as _;
 
 /// One series in so many is held out.
-const HELD_OUT: usize = 5;
+const HELD_OUT: usize = 10;
 /// Series from which some are held out.
 const LEAST: usize = 500;
 /// Draws behind a posterior's coverage.
@@ -64,34 +63,24 @@ fn main() -> Result<(), Box<dyn Error>> {
         all.left_out.len()
     );
     let enough = simulations.len() >= LEAST;
-    let part = |held_out: bool, half: usize| -> Result<Simulations, bayes_sim::error::Error> {
-        let of_half = |i: &usize| !held_out || i / HELD_OUT % 2 == half;
-        let mine = |i: &usize| !enough || i.is_multiple_of(HELD_OUT) == held_out && of_half(i);
+    let part = |held_out: bool| -> Result<Simulations, bayes_sim::error::Error> {
+        let mine = |i: &usize| !enough || i.is_multiple_of(HELD_OUT) == held_out;
         let rows: Vec<usize> = (0..simulations.len()).filter(mine).collect();
         Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))
     };
-    // One half of what is held out says how wide intervals have to be, the other whether they are.
-    let (training, calibrating, tests) = (part(false, 0)?, part(true, 1)?, part(true, 0)?);
+    let (training, tests) = (part(false)?, part(true)?);
     if !enough {
         println!("too few to hold any out");
     }
-    println!(
-        "learned from {}, widened by {}, measured on {}",
-        training.len(),
-        calibrating.len(),
-        tests.len()
-    );
+    println!("learned from {}, measured on {}", training.len(), tests.len());
 
     let sets = [vec![0], vec![1], vec![2], vec![0, 2], vec![0, 1, 2]];
     for heights in sets.iter().filter(|set| set.iter().all(|height| *height < pours)) {
-        let learned = learn(prior, [&training, &calibrating], heights)?;
-        let of_tests = pictures(&tests, heights)?;
-        let coverage = expected_coverage(&learned, &of_tests, DRAWS, 3)?.mean_error();
-        let infer = |i: usize| learned.infer_series(&statistics(&of_tests, i));
+        let learned = GrainPosterior::train(prior, &pictures(&training, heights)?, &settings(), 1)?;
         let of =
             |h: &usize| if pours == 1 { "one".into() } else { format!("{:.0} cm", 100.0 * SERIES_M[*h]) };
-        print(&heights.iter().map(of).collect::<Vec<_>>().join(", "), &errors(&tests, infer)?, tests.len());
-        println!("{:24} widened by {}, coverage less level {coverage:+.3}", "", learned.widening());
+        let name = heights.iter().map(of).collect::<Vec<_>>().join(", ");
+        measure(&name, &learned, &pictures(&tests, heights)?)?;
         if heights.len() == pours {
             let bytes = learned.to_bytes()?;
             std::fs::write(out, &bytes)?;
@@ -99,26 +88,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     if pours == SERIES_M.len() {
-        let shipped = GrainPosterior::shipped_series()?;
-        print(
-            "as shipped for velvet",
-            &errors(&tests, |i| shipped.infer_series(&statistics(&tests, i)))?,
-            tests.len(),
-        );
-        let coverage = expected_coverage(&shipped, &tests, DRAWS, 3)?.mean_error();
-        println!("{:24} coverage less level {coverage:+.3}", "");
+        measure("as shipped for velvet", &GrainPosterior::shipped_series()?, &tests)?;
     }
     Ok(())
-}
-
-/// A posterior of the pictures from some of the heights.
-fn learn(
-    prior: &Prior,
-    [training, calibrating]: [&Simulations; 2],
-    heights: &[usize],
-) -> Result<GrainPosterior, Box<dyn Error>> {
-    let learned = GrainPosterior::train(prior, &pictures(training, heights)?, &settings(heights.len()), 1)?;
-    Ok(learned.widened(&pictures(calibrating, heights)?)?)
 }
 
 /// The same pours with the pictures from some of the heights alone.
@@ -136,13 +108,11 @@ fn statistics(tests: &Simulations, i: usize) -> Vec<[f64; COUNT]> {
     tests.x().row(i).chunks_exact(COUNT).map(|x| std::array::from_fn(|j| x[j])).collect()
 }
 
-/// Errors of `mu_s`, `ln mu_r` and e: mean and spread.
-fn errors(
-    tests: &Simulations,
-    infer: impl Fn(usize) -> Result<Inferred, bayes_sim::error::Error> + Sync,
-) -> Result<[(f64, f64); 3], Box<dyn Error>> {
+/// Errors of `mu_s`, `ln mu_r` and e, mean and spread; how often regions hold the truth, and whether its ranks are flat.
+fn measure(name: &str, posterior: &GrainPosterior, tests: &Simulations) -> Result<(), Box<dyn Error>> {
     let one = |i: usize| -> Result<[f64; 3], bayes_sim::error::Error> {
-        let (inferred, truth) = (infer(i)?.estimate(), tests.theta().row(i));
+        let (inferred, truth) =
+            (posterior.infer_series(&statistics(tests, i))?.estimate()?, tests.theta().row(i));
         Ok([
             inferred.sliding_friction - truth[0],
             (inferred.rolling_friction / truth[1]).ln(),
@@ -150,16 +120,16 @@ fn errors(
         ])
     };
     let all = (0..tests.len()).into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
-    Ok(std::array::from_fn(|j| {
+    let of = |(j, name): (usize, &str)| {
         let errors = || all.iter().map(|e| e[j]);
-        (errors().mean(), errors().std_dev())
-    }))
-}
-
-fn print(name: &str, errors: &[(f64, f64); 3], count: usize) {
-    let of = |(name, (mean, sd)): (&str, &(f64, f64))| {
-        format!("{name} {mean:+.3} ± {sd:.3} (± {:.3})", 1.96 * sd / (count as f64).sqrt())
+        let (mean, sd) = (errors().mean(), errors().std_dev());
+        format!("{name} {mean:+.3} ± {sd:.3} (± {:.3})", 1.96 * sd / (tests.len() as f64).sqrt())
     };
-    let text: Vec<String> = ["mu_s", "ln mu_r", "e"].into_iter().zip(errors).map(of).collect();
+    let text: Vec<String> = ["mu_s", "ln mu_r", "e"].into_iter().enumerate().map(of).collect();
     println!("{name:24} {}", text.join("   "));
+    let coverage = expected_coverage(posterior, tests, DRAWS, 3)?.mean_error();
+    let flat: Vec<String> =
+        sbc_ranks(posterior, tests, DRAWS, 3)?.p_values().iter().map(|p| format!("{p:.3}")).collect();
+    println!("{:24} coverage less level {coverage:+.3}, p of flat ranks {}", "", flat.join(", "));
+    Ok(())
 }

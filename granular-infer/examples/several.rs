@@ -11,13 +11,16 @@
 
 use std::error::Error;
 
-use bayes_sim::posterior::Posterior;
-use granular_infer::posterior::{GrainPosterior, Inferred};
+use bayes_sim::points::Points;
+use bayes_sim::prior::Prior;
+use granular_infer::posterior::GrainPosterior;
 use granular_infer::scene::{CLOTHS, Grain, SERIES_M, Scene, prior};
 use granular_infer::summary::COUNT;
 use granular_infer::view::View;
 use rand::{RngExt as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::Distribution as _;
+use rand_distr::weighted::WeightedIndex;
 use rayon::prelude::*;
 use statrs::statistics::Statistics as _;
 
@@ -25,7 +28,10 @@ const HEIGHT_M: f64 = 0.12;
 /// Draws from which intervals are read.
 const DRAWS: usize = 2000;
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Errors that cross threads.
+type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
+
+fn main() -> Outcome<()> {
     let arguments: Vec<usize> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
     let [grains, pours] = arguments[..] else { return Err("expected GRAINS POURS".into()) };
     let (posterior, prior) = (GrainPosterior::shipped()?, prior()?);
@@ -35,15 +41,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{} grains, {} of which left the picture once", grains, grains - whole.len());
     let counts = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n <= pours);
     for count in counts {
-        let infer = |pictures: &[[f64; COUNT]]| product(&posterior, &pictures[..count]);
-        println!("{count} pictures: {}", measured(&whole, infer)?);
+        let draws = |pictures: &[[f64; COUNT]]| product(&posterior, &pictures[..count]);
+        println!("{count} pictures: {}", measured(&prior, &whole, draws)?);
     }
     let (velvet, cloths) = (GrainPosterior::shipped_series()?, GrainPosterior::shipped_cloths()?);
     for (on, of) in [("velvet", None), ("a cloth of its own each", Some(CLOTHS))] {
         let whole = poured(&drawn, &SERIES_M, of);
         println!("once from each of {SERIES_M:?} m on {on}; {} left the picture", grains - whole.len());
         for (learned, posterior) in [("velvet", &velvet), ("any cloth", &cloths)] {
-            println!("  learned on {learned:9}: {}", measured(&whole, |p| posterior.infer_series(p))?);
+            let draws = |pictures: &[[f64; COUNT]]| {
+                Ok(posterior.infer_series(pictures)?.posterior.sample(DRAWS, &mut dice())?)
+            };
+            println!("  learned on {learned:9}: {}", measured(&prior, &whole, draws)?);
         }
     }
     Ok(())
@@ -65,13 +74,14 @@ fn poured(drawn: &[(Vec<f64>, u64)], heights_m: &[f64], cloths: Option<[f64; 2]>
 
 /// Mean and spread of the errors over all grains, and how many 95 % intervals hold.
 fn measured(
+    prior: &Prior,
     poured: &[Poured],
-    infer: impl Fn(&[[f64; COUNT]]) -> Result<Inferred, bayes_sim::error::Error> + Sync,
-) -> Result<String, bayes_sim::error::Error> {
+    draws: impl Fn(&[[f64; COUNT]]) -> Outcome<Points> + Sync,
+) -> Outcome<String> {
     let all: Vec<[(f64, bool); 3]> = poured
         .par_iter()
-        .map(|(theta, pictures)| Ok(errors(&infer(pictures)?, theta)))
-        .collect::<Result<_, bayes_sim::error::Error>>()?;
+        .map(|(theta, pictures)| Ok(errors(prior, &draws(pictures)?, theta)))
+        .collect::<Outcome<_>>()?;
     let n = all.len() as f64;
     let of = |j: usize, name: &str| {
         let errors = || all.iter().map(|e| e[j].0);
@@ -82,15 +92,32 @@ fn measured(
     Ok([of(0, "mu_s"), of(1, "ln mu_r"), of(2, "e")].join("   "))
 }
 
-/// The product of the posteriors of some pictures.
-fn product(
-    posterior: &GrainPosterior,
-    pictures: &[[f64; COUNT]],
-) -> Result<Inferred, bayes_sim::error::Error> {
+/// Draws of the product of the posteriors of some pictures, the prior counted once: those of each picture, weighted and drawn again.
+fn product(posterior: &GrainPosterior, pictures: &[[f64; COUNT]]) -> Outcome<Points> {
     let each = pictures.iter().map(|p| posterior.infer(p)).collect::<Result<Vec<_>, _>>()?;
-    let posteriors: Vec<Posterior> = each.iter().map(|i| i.posterior.clone()).collect();
-    let resemblance = posterior.infer(&pictures[0])?.resemblance;
-    Ok(Inferred { posterior: Posterior::product(&posteriors)?, resemblance })
+    let mut pool = Points::new(3);
+    for inferred in &each {
+        for row in inferred.posterior.sample(DRAWS / each.len(), &mut dice())?.rows() {
+            pool.push(row)?;
+        }
+    }
+    let ln: Vec<Vec<f64>> = each.iter().map(|i| i.posterior.ln_densities(&pool)).collect::<Result<_, _>>()?;
+    let prior = each[0].posterior.prior();
+    let ln_weight = |(k, theta): (usize, &[f64])| -> Outcome<f64> {
+        let of_each = || ln.iter().map(|l| l[k]);
+        let largest = of_each().fold(f64::NEG_INFINITY, f64::max);
+        let drawn_from = largest + of_each().map(|l| (l - largest).exp()).sum::<f64>().ln();
+        Ok(of_each().sum::<f64>() - (each.len() as f64 - 1.0) * prior.ln_density(theta)? - drawn_from)
+    };
+    let ln_weights: Vec<f64> = pool.rows().enumerate().map(ln_weight).collect::<Outcome<_>>()?;
+    let largest = ln_weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let choice = WeightedIndex::new(ln_weights.iter().map(|l| (l - largest).exp()))?;
+    let mut rng = dice();
+    Ok(pool.select(&(0..DRAWS).map(|_| choice.sample(&mut rng)).collect::<Vec<_>>()))
+}
+
+fn dice() -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(7)
 }
 
 /// The statistics of the pours of one kind of grains that stay in the picture.
@@ -105,14 +132,13 @@ fn pictures(scene: &Scene, theta: &[f64], heights_m: &[f64], seed: u64) -> Vec<[
 }
 
 /// Errors of `mu_s`, `ln mu_r` and e, and whether their 95 % intervals hold the truth.
-fn errors(inferred: &Inferred, theta: &[f64]) -> [(f64, bool); 3] {
-    let prior = inferred.posterior.prior();
-    let (truth, found) = (prior.coordinates(theta), prior.coordinates(&inferred.estimate().theta()));
-    let draws = inferred.posterior.sample(DRAWS, &mut ChaCha8Rng::seed_from_u64(7)).theta;
+fn errors(prior: &Prior, draws: &Points, theta: &[f64]) -> [(f64, bool); 3] {
+    let truth = prior.coordinates(theta);
     std::array::from_fn(|j| {
         let mut column: Vec<f64> = draws.rows().map(|row| prior.coordinates(row)[j]).collect();
         column.sort_by(f64::total_cmp);
-        let [low, high] = [column[DRAWS / 40], column[DRAWS - 1 - DRAWS / 40]];
-        (found[j] - truth[j], (low..=high).contains(&truth[j]))
+        let n = column.len();
+        let [low, high] = [column[n / 40], column[n - 1 - n / 40]];
+        (column.iter().mean() - truth[j], (low..=high).contains(&truth[j]))
     })
 }

@@ -73,27 +73,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let simulations = seen(&training, &scene, &view, 1)?.simulations;
     let prior = &results.campaign.prior;
-    let learned = GrainPosterior::train(prior, &simulations, &settings(1), 1)?;
-    if unseen.records.len() < 2 * LEAST {
-        println!("fewer than {} unseen pours: nothing is measured, nothing widened", 2 * LEAST);
-        return ship(&learned, out);
+    let posterior = GrainPosterior::train(prior, &simulations, &settings(), 1)?;
+    if unseen.records.len() < LEAST {
+        println!("fewer than {} unseen pours: nothing is measured", LEAST);
+        return ship(&posterior, out);
     }
-    let held_out = seen(&unseen, &scene, &view, 1)?.simulations;
-    // One half says how wide intervals have to be, the other whether they are.
-    let half = |odd: usize| {
-        let rows: Vec<usize> = (odd..held_out.len()).step_by(2).collect();
-        Simulations::new(held_out.theta().select(&rows), held_out.x().select(&rows))
-    };
-    let (calibrating, tests) = (half(1)?, half(0)?);
-    println!("as learned:");
-    calibration(&learned, &tests)?;
-    let posterior = learned.widened(&calibrating)?;
-    println!(
-        "variances times {}, as {} unseen pours ask for; over {} others:",
-        posterior.widening(),
-        calibrating.len(),
-        tests.len()
-    );
+    let tests = seen(&unseen, &scene, &view, 1)?.simulations;
     calibration(&posterior, &tests)?;
     ship(&posterior, out)?;
     println!(
@@ -117,7 +102,7 @@ fn fewer(prior: &Prior, simulations: &Simulations, tests: &Simulations) -> Resul
     for share in [8, 2] {
         let rows: Vec<usize> = (0..simulations.len() / share).collect();
         let few = Simulations::new(simulations.theta().select(&rows), simulations.x().select(&rows))?;
-        let less = GrainPosterior::train(prior, &few, &settings(1), 1)?;
+        let less = GrainPosterior::train(prior, &few, &settings(), 1)?;
         row(&format!("{}", few.len()), &errors(&less, tests)?, tests.len());
     }
     Ok(())
@@ -140,7 +125,7 @@ fn flawed(
             GrainPosterior::train(
                 &training.campaign.prior,
                 &seen(training, scene, &base, 1)?.simulations,
-                &settings(1),
+                &settings(),
                 1,
             )?
         } else {
@@ -217,7 +202,7 @@ fn python(all: &Simulations, results: &Results) -> Result<Vec<u8>, Box<dyn Error
 /// Mean and spread of each coordinate's error.
 fn errors(posterior: &GrainPosterior, tests: &Simulations) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
     let one = |i: usize| -> Result<[f64; 3], bayes_sim::error::Error> {
-        let inferred = posterior.infer(&statistics(tests, i))?.estimate();
+        let inferred = posterior.infer(&statistics(tests, i))?.estimate()?;
         let truth = tests.theta().row(i);
         Ok([
             inferred.sliding_friction - truth[0],
@@ -294,7 +279,7 @@ fn again(
     let both: Vec<Option<(f64, f64)>> = (0..AGAIN.min(tests.len()))
         .into_par_iter()
         .map(|i| {
-            let inferred = posterior.infer(&statistics(tests, i)).ok()?.estimate();
+            let inferred = posterior.infer(&statistics(tests, i)).ok()?.estimate().ok()?;
             Some((distance(i, &inferred)?, distance(i, &Grain::from_theta(tests.theta().row(i))?)?))
         })
         .collect();

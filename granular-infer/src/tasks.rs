@@ -8,13 +8,13 @@ use bayes_sim::points::Points;
 use bayes_sim::posterior::Posterior;
 use bayes_sim::prior::Prior;
 use bayes_sim::simulations::Simulations;
+use bayes_sim::training::TrainingSettings;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use statrs::statistics::Statistics as _;
 
 use crate::dem::{DemError, Mesh, Shape, Wall};
-use crate::posterior::settings;
 use crate::scene::{Grain, Scene};
 use crate::shipped::{self, ShippedError};
 use crate::summary::{COUNT, summary};
@@ -102,9 +102,12 @@ impl RingHeights {
     /// Those of [`Mdrff::train`].
     pub fn train(prior: &Prior, poured: &Heights, seed: u64) -> Result<Self, Error> {
         let few = MdrffSettings { frequencies: 50, components: 2, ..MdrffSettings::default() };
+        // A few hundred pictures of 16 numbers are soon learned by heart.
+        let training = TrainingSettings { weight_decay: 0.05, max_epochs: 200, ..few.training.clone() };
+        let fewer = MdrffSettings { frequencies: 40, training, ..few.clone() };
         Ok(Self {
             of_radii: Mdrff::train(prior, &poured.radii, &few, seed)?,
-            of_pictures: Mdrff::train(prior, &poured.pictures, &settings(1), seed)?,
+            of_pictures: Mdrff::train(prior, &poured.pictures, &fewer, seed)?,
         })
     }
 
