@@ -39,11 +39,11 @@ fn dice(seed: u64) -> ChaCha8Rng {
 }
 
 /// One pour, one picture, one posterior; then the same again with what was inferred.
-fn one_picture<'p>(
-    posterior: &'p GrainPosterior,
+fn one_picture(
+    posterior: &GrainPosterior,
     hidden: Grain,
     svg: &mut String,
-) -> Result<Inferred<'p>, Box<dyn Error + Send + Sync>> {
+) -> Result<Inferred, Box<dyn Error + Send + Sync>> {
     let (scene, view) = (Scene::default(), View::default());
     let kind = Kind { grain: hidden, shape: None, size_variation: 0.0, work_of_adhesion_j_m2: 0.0 };
     let mut rig = FakeRig::new(scene, kind, view, 11);
@@ -176,7 +176,7 @@ fn pattern(heights: &RingHeights, svg: &mut String) -> Result<(), Box<dyn Error 
 }
 
 /// Spilled grains, foretold from the posterior and poured with the hidden grain.
-fn bowl(hidden: Grain, inferred: &Inferred<'_>) -> Result<(), Box<dyn Error + Send + Sync>> {
+fn bowl(hidden: Grain, inferred: &Inferred) -> Result<(), Box<dyn Error + Send + Sync>> {
     let (count, pours) = if examples::small() { (40, 2) } else { (250, 8) };
     let scene = Scene { rig: Rig { count, ..Scene::default().rig }, ..Scene::default() };
     let bowl = Bowl::round(0.03, 0.05, 0.025)?;

@@ -229,30 +229,24 @@ impl Posterior {
 }
 
 /// A learned density at one observation.
-#[derive(Debug)]
-pub struct Given<'d, D> {
-    density: &'d D,
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given<D> {
+    density: D,
     x: Vec<f64>,
 }
 
-impl<D> Clone for Given<'_, D> {
-    fn clone(&self) -> Self {
-        Self { density: self.density, x: self.x.clone() }
-    }
-}
-
-impl<'d, D: ConditionalDensity> Given<'d, D> {
+impl<D: ConditionalDensity> Given<D> {
     /// q(theta | x) at the observation x.
     ///
     /// # Errors
     /// [`Error::Length`], [`Error::NotFinite`] for an observation of another length or with NaN.
-    pub fn new(density: &'d D, x: &[f64]) -> Result<Self, Error> {
+    pub fn new(density: D, x: &[f64]) -> Result<Self, Error> {
         check_row("observation", x, density.x_dim())?;
         Ok(Self { density, x: x.to_vec() })
     }
 
     /// The prior.
-    pub fn prior(&self) -> &'d Prior {
+    pub fn prior(&self) -> &Prior {
         self.density.prior()
     }
 

@@ -151,7 +151,7 @@ fn a_density_at_an_observation_has_intervals_of_its_draws() {
     let task = common::gaussian_linear_uniform();
     let density = Autoregressive::train(&task.prior, &task.simulations(300, 3), &quick().1, 1).unwrap();
     let x = vec![0.2; task.x_dim];
-    let given = Given::new(&density, &x).unwrap();
+    let given = Given::new(density.clone(), &x).unwrap();
     let draws = given.sample(4000, &mut dice(2)).unwrap();
     for level in [0.5, 0.9] {
         let intervals = given.intervals(1, level, &mut dice(3)).unwrap();
@@ -163,8 +163,8 @@ fn a_density_at_an_observation_has_intervals_of_its_draws() {
     }
     assert!(given.intervals(task.prior.dim(), 0.9, &mut dice(3)).is_err());
     assert!(given.intervals(0, 1.0, &mut dice(3)).is_err());
-    assert!(matches!(Given::new(&density, &x[1..]), Err(Error::Length { .. })));
-    assert!(matches!(Given::new(&density, &vec![f64::NAN; x.len()]), Err(Error::NotFinite { .. })));
+    assert!(matches!(Given::new(density.clone(), &x[1..]), Err(Error::Length { .. })));
+    assert!(matches!(Given::new(density, &vec![f64::NAN; x.len()]), Err(Error::NotFinite { .. })));
 }
 
 /// Under a log-uniform prior the density of parameters in their own units integrates to one; single and batched values agree.

@@ -37,9 +37,9 @@ pub struct GrainPosterior {
 
 /// What a picture tells of its grains.
 #[derive(Debug, Clone)]
-pub struct Inferred<'p> {
+pub struct Inferred {
     /// The posterior over `[mu_s, mu_r, e]`; its coordinates are `mu_s`, `ln mu_r` and e.
-    pub posterior: Given<'p, GrainPosterior>,
+    pub posterior: Given<Autoregressive>,
     /// Whether the picture is like those that were learned from.
     pub resemblance: Resemblance,
 }
@@ -133,7 +133,7 @@ impl GrainPosterior {
     ///
     /// # Errors
     /// [`Error::NotFinite`]; [`Error::Length`] where a series was learned.
-    pub fn infer(&self, statistics: &[f64; COUNT]) -> Result<Inferred<'_>, Error> {
+    pub fn infer(&self, statistics: &[f64; COUNT]) -> Result<Inferred, Error> {
         self.infer_series(&[*statistics])
     }
 
@@ -142,10 +142,10 @@ impl GrainPosterior {
     ///
     /// # Errors
     /// [`Error::NotFinite`]; [`Error::Length`] for another number of pictures than [`Self::pictures`].
-    pub fn infer_series(&self, pictures: &[[f64; COUNT]]) -> Result<Inferred<'_>, Error> {
+    pub fn infer_series(&self, pictures: &[[f64; COUNT]]) -> Result<Inferred, Error> {
         let statistics = pictures.as_flattened();
         Ok(Inferred {
-            posterior: Given::new(self, statistics)?,
+            posterior: Given::new(self.density.clone(), statistics)?,
             resemblance: self.novelty.compare(statistics)?,
         })
     }
@@ -178,7 +178,7 @@ impl ConditionalDensity for GrainPosterior {
     }
 }
 
-impl Inferred<'_> {
+impl Inferred {
     /// The posterior's mean in `(mu_s, ln mu_r, e)`, from 4,000 draws of a separate generator: the estimate whose squared
     /// error is expected to be least.
     ///

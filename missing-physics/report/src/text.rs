@@ -177,6 +177,7 @@ pub(super) fn law_kind(kind: &str) -> &str {
     match kind {
         "sparse" => "a few terms",
         "power" => "another power",
+        "reading" => "a scale that is curved",
         "periodic" => "an oscillation",
         _ => "a smooth curve without a formula",
     }

@@ -1,6 +1,6 @@
 //! Wild readings: set aside before anything is judged, and listed.
 
-use crate::adequacy::linearised::Linearised;
+use crate::adequacy::linearised::{JUMP, LAPSE, Linearised};
 use crate::data::Recording;
 use crate::diagnosis::Outlier;
 use crate::fit::alternate::fit;
@@ -13,7 +13,7 @@ use crate::problem::Problem;
 const ROW_LIMIT: f64 = 5.5;
 /// Rows are set aside in rounds, the wildest first: they hide one another.
 const ROUNDS: usize = 5;
-/// As many wild rows one after the other are no accident.
+/// As many wild rows one after the other are no accident, unless they are a lapse of the sensor.
 const NEIGHBOURS: usize = 3;
 
 /// The recording without its wild rows (NaN in their place), and the list of them, by run, channel and row.
@@ -91,12 +91,20 @@ fn wild_rows(problem: &Problem<'_>) -> Result<Vec<Wild>, PredictError> {
     Ok(found)
 }
 
+/// Whether a series of wild rows is a lapse of the sensor: short, far away, and within its run.
+fn is_lapse(recording: &Recording, series: &[Place]) -> bool {
+    let (Some(first), Some(last)) = (series.first(), series.last()) else { return false };
+    let rows = recording.runs[first.0].len();
+    let far = series.iter().all(|(.., z)| z.abs() > JUMP);
+    far && series.len() * LAPSE <= rows && first.2 > 0 && last.2 + 1 < rows
+}
+
 /// Rows that stand in a series: what lasts is an effect, not an accident.
 fn put_back_series(recording: &Recording, cleaned: &Recording, outliers: &[Place]) -> Vec<Place> {
     let mut series = Vec::new();
     let mut current: Vec<Place> = Vec::new();
     let close = |current: &mut Vec<Place>, series: &mut Vec<Place>| {
-        if current.len() >= NEIGHBOURS {
+        if current.len() >= NEIGHBOURS && !is_lapse(recording, current) {
             series.append(current);
         }
         current.clear();

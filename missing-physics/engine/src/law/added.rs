@@ -22,6 +22,13 @@ pub enum AddedLaw {
         /// The variable's largest value where the law was found.
         largest: f64,
     },
+    /// A curved scale: a polynomial c1 x + c2 x^2 + c3 x^3 added to a channel, x = (its simulated value) / largest.
+    Reading {
+        /// Name of the channel.
+        channel: String,
+        /// The simulated value's largest size where the law was found.
+        largest: f64,
+    },
     /// A polynomial c1 x + c2 x^2 + ... added to a channel, x = (variable - centre) / half_width.
     Smooth {
         /// Name of the channel.

@@ -41,6 +41,7 @@ pub(crate) fn extended(
         heldout_log_score_gain: gain,
         ..match &model.term {
             Added::Periodic => periodic(problem, model, &fitted.fit, coefficients),
+            Added::Reading { channel, largest } => reading(problem, *channel, *largest, coefficients),
             Added::Smooth { channel, variable, centre, half_width } => {
                 smooth(problem, *channel, *variable, [*centre, *half_width], coefficients)
             }
@@ -105,6 +106,35 @@ fn power(
         beside: Vec::new(),
         adds_to: (quantity.name.clone(), quantity.unit.clone()),
         variables: vec![(v.name.clone(), v.unit.clone())],
+        coefficients,
+        heldout_rmse: Vec::new(),
+        heldout_log_score_gain: 0.0,
+    }
+}
+
+/// A curved scale in words.
+fn reading(problem: &Problem<'_>, channel: usize, largest: f64, coefficients: Vec<Estimate>) -> Law {
+    let quantity = &problem.recording.channels[channel];
+    let sum: Vec<String> = coefficients
+        .iter()
+        .enumerate()
+        .map(|(k, c)| match k {
+            0 => format!("{:.3} x", c.value),
+            _ => format!("{:.3} x^{}", c.value, k + 1),
+        })
+        .collect();
+    Law {
+        formula: format!(
+            "{} += {} {}, x = (its simulated value) / {largest:.4} {}",
+            quantity.name,
+            sum.join(" + ").replace("+ -", "- "),
+            quantity.unit,
+            quantity.unit
+        ),
+        kind: "reading",
+        beside: Vec::new(),
+        adds_to: (quantity.name.clone(), quantity.unit.clone()),
+        variables: vec![(quantity.name.clone(), quantity.unit.clone())],
         coefficients,
         heldout_rmse: Vec::new(),
         heldout_log_score_gain: 0.0,

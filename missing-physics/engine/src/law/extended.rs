@@ -11,6 +11,11 @@ use crate::linalg::dot;
 use crate::model::{Model, Parameter, PredictError, Quantity, Scope, Spec};
 use crate::problem::Problem;
 
+/// Degree of a curved scale.
+const CURVED: usize = 3;
+/// Values that differ by less than this part of the largest have no scale that could be curved.
+const LEAST_SPAN: f64 = 0.1;
+
 /// A model with an empirical term added to its channels.
 pub(crate) struct Extended<'a> {
     inner: &'a dyn Model,
@@ -26,6 +31,8 @@ pub(crate) struct Extended<'a> {
 pub(crate) enum Added {
     /// `a cos(omega s) + b sin(omega s)` with amplitudes of each run and channel; omega shared.
     Periodic,
+    /// A polynomial of what is simulated (over its largest size) added to it: a scale that is curved.
+    Reading { channel: usize, largest: f64 },
     /// A polynomial of a variable (scaled to [-1, 1] by centre and half-width) on one channel.
     Smooth { channel: usize, variable: usize, centre: f64, half_width: f64 },
     /// A power of a variable (over its largest value) by which a channel is multiplied: another exponent than the model has.
@@ -56,8 +63,8 @@ impl<'a> Extended<'a> {
         law: &AddedLaw,
         sigma: &[f64],
     ) -> Option<Self> {
+        let at = |list: &[Quantity], name: &str| list.iter().position(|q| q.name == name);
         let place = |channel: &str, variable: &str| {
-            let at = |list: &[Quantity], name: &str| list.iter().position(|q| q.name == name);
             Some((at(&recording.channels, channel)?, at(&recording.variables, variable)?))
         };
         let (parameters, term) = match law {
@@ -66,11 +73,18 @@ impl<'a> Extended<'a> {
                 let (channel, variable) = place(channel, variable)?;
                 (vec![exponent()], Added::Power { channel, variable, largest: *largest })
             }
+            AddedLaw::Reading { channel, largest } => {
+                let channel = at(&recording.channels, channel)?;
+                (
+                    powers(&recording.channels[channel].unit, CURVED),
+                    Added::Reading { channel, largest: *largest },
+                )
+            }
             AddedLaw::Smooth { channel, variable, centre, half_width } => {
                 let (channel, variable) = place(channel, variable)?;
                 let (centre, half_width) = (*centre, *half_width);
                 let term = Added::Smooth { channel, variable, centre, half_width };
-                (powers(&recording.channels[channel].unit), term)
+                (powers(&recording.channels[channel].unit, DEGREE + 1), term)
             }
             AddedLaw::Periodic => {
                 (oscillation(recording, sigma, [0.0, f64::INFINITY], 1.0, 1.0), Added::Periodic)
@@ -86,6 +100,9 @@ impl<'a> Extended<'a> {
         };
         match self.term {
             Added::Periodic => AddedLaw::Periodic,
+            Added::Reading { channel, largest } => {
+                AddedLaw::Reading { channel: recording.channels[channel].name.clone(), largest }
+            }
             Added::Smooth { channel, variable, centre, half_width } => {
                 let (channel, variable) = names(channel, variable);
                 AddedLaw::Smooth { channel, variable, centre, half_width }
@@ -139,6 +156,23 @@ impl<'a> Extended<'a> {
         Some(Self::new(problem.model, &problem.recording, vec![exponent()], term))
     }
 
+    /// A curved scale of one channel, whose values a fit has simulated; none where these hardly differ.
+    pub(crate) fn reading(
+        problem: &Problem<'a>,
+        channel: usize,
+        simulated: &[Vec<Vec<f64>>],
+    ) -> Option<Self> {
+        let values = simulated.iter().flat_map(|run| &run[channel]).filter(|v| v.is_finite());
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let largest = high.abs().max(low.abs());
+        if !(high - low > LEAST_SPAN * largest) {
+            return None;
+        }
+        let parameters = powers(&problem.recording.channels[channel].unit, CURVED);
+        let term = Added::Reading { channel, largest };
+        Some(Self::new(problem.model, &problem.recording, parameters, term))
+    }
+
     /// A smooth curve over a variable on one channel; none where the variable does not vary.
     pub(crate) fn smooth(problem: &Problem<'a>, channel: usize, variable: usize) -> Option<Self> {
         let (low, high) = problem
@@ -151,7 +185,7 @@ impl<'a> Extended<'a> {
         if !(half_width > 1e-12 * high.abs().max(low.abs())) {
             return None;
         }
-        let parameters = powers(&problem.recording.channels[channel].unit);
+        let parameters = powers(&problem.recording.channels[channel].unit, DEGREE + 1);
         let term = Added::Smooth { channel, variable, centre: 0.5 * (low + high), half_width };
         Some(Self::new(problem.model, &problem.recording, parameters, term))
     }
@@ -187,9 +221,9 @@ fn exponent() -> Parameter {
     free("exponent".into(), "", 0.3, 3.0)
 }
 
-/// Coefficients of a polynomial without its constant.
-fn powers(unit: &str) -> Vec<Parameter> {
-    (1..=DEGREE + 1).map(|d| free(format!("c{d}"), unit, 1.0, f64::INFINITY)).collect()
+/// Coefficients of a polynomial of a degree, without its constant.
+fn powers(unit: &str, degree: usize) -> Vec<Parameter> {
+    (1..=degree).map(|d| free(format!("c{d}"), unit, 1.0, f64::INFINITY)).collect()
 }
 
 impl Model for Extended<'_> {
@@ -226,14 +260,15 @@ impl Model for Extended<'_> {
                     out[channel * n + i] *= (v / largest).powf(exponent);
                 }
             }
+            Added::Reading { channel, largest } => {
+                for value in &mut out[channel * n..(channel + 1) * n] {
+                    *value += polynomial(&shared[self.inner_shared..], *value / largest);
+                }
+            }
             Added::Smooth { channel, variable, centre, half_width } => {
                 for (i, v) in run.inputs[*variable].iter().enumerate() {
-                    let x = (v - centre) / half_width;
-                    let mut power = 1.0;
-                    for c in &shared[self.inner_shared..] {
-                        power *= x;
-                        out[channel * n + i] += c * power;
-                    }
+                    out[channel * n + i] +=
+                        polynomial(&shared[self.inner_shared..], (v - centre) / half_width);
                 }
             }
         }
@@ -247,6 +282,11 @@ impl Model for Extended<'_> {
     fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
         self.inner.nuisance_start(run, &mut nuisance[..self.inner_nuisance]);
     }
+}
+
+/// `c1 x + c2 x^2 + ...`.
+fn polynomial(coefficients: &[f64], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| (sum + c) * x)
 }
 
 /// The sum of squares, in units of the noise, that an oscillation of a frequency takes from a residual; amplitude and phase are of each

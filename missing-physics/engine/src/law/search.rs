@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::fit::prediction::predictions;
 use crate::law::describe::extended;
 use crate::law::extended::Extended;
 use crate::law::found::{Found, LEAST_GAIN};
@@ -26,6 +27,10 @@ pub(crate) fn find(
     };
     let mut terms: Vec<Extended<'_>> =
         places().filter_map(|(channel, variable)| Extended::power(problem, channel, variable)).collect();
+    let simulated = predictions(problem, &start.fit)?;
+    terms.extend(
+        (0..problem.channels()).filter_map(|channel| Extended::reading(problem, channel, &simulated)),
+    );
     terms.extend(Extended::periodic(problem, &start.fit)?);
     terms.extend(places().filter_map(|(channel, variable)| Extended::smooth(problem, channel, variable)));
     let (of_terms, extended) = rayon::join(

@@ -1,5 +1,5 @@
 //! A law that was found is kept in the model, and predicts runs that were not there.
-#![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
 use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
@@ -117,6 +117,22 @@ fn another_power_predicts() {
     assert!(matches!(kept.law, Some(AddedLaw::Power { .. })), "{:?}", kept.law);
     let exponent = kept.parameters.last().unwrap();
     assert!(exponent.name == "exponent" && (exponent.value - 0.4).abs() < 0.02, "{exponent:?}");
+}
+
+/// A reading whose scale is curved, of a wave: in time it is an oscillation at three times the frequency.
+#[test]
+fn a_curved_scale_predicts() {
+    let parameters = [("amplitude", 1.0), ("rate", 1.3), ("kink", 0.0)];
+    let parameters = parameters.map(|(name, start)| parameter(name, start, ANY)).into();
+    let law = |s: &[f64], _: &[f64], x: f64| s[0] * (s[1] * x).sin() + s[2] * (x - 3.0).clamp(0.0, 0.1);
+    let wave = Curve::new(parameters, vec![mechanism("kink", vec![2])], law);
+    let curved = |x: f64| {
+        let y = 1.2 * (1.4 * x).sin();
+        y + 0.4 * y.powi(3)
+    };
+    let kept = kept(&wave, curved);
+    let Some(AddedLaw::Reading { channel, largest }) = &kept.law else { panic!("{:?}", kept.law) };
+    assert!(channel == "y" && *largest > 1.0, "{:?}", kept.law);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use crate::common::{Ball, World};
 use missing_physics::data::Recording;
-use missing_physics::diagnosis::{NoiseSource, Verdict};
+use missing_physics::diagnosis::{Diagnosis, NoiseSource, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
 use rand::SeedableRng;
@@ -65,6 +65,34 @@ fn wild_readings_are_listed_wherever_they_stand_and_change_nothing() {
         assert_eq!(listed, wanted, "seed {seed}");
         assert_eq!((before.verdict, before.chosen), (after.verdict, after.chosen), "seed {seed}");
     }
+}
+
+/// A camera that follows something else for three frames of 400; the same of 40 is an effect.
+#[test]
+fn a_lapse_of_the_sensor_is_set_aside() {
+    let model = Ball::default();
+    let options = Options { replicates: 199, ..Options::default() };
+    for (seed, linear_drag) in [(2, 0.25), (3, 0.0)] {
+        let clean = World { linear_drag, rows: 400, ..World::NULL }.draw(seed);
+        let mut recording = clean.clone();
+        for row in 200..203 {
+            recording.runs[1].outputs[0][row] += 1.0 + 0.01 * row as f64;
+        }
+        let before = diagnose(&model, &clean, &[], &options, &Silent).unwrap();
+        let after = diagnose(&model, &recording, &[], &options, &Silent).unwrap();
+        let listed = |of: &Diagnosis| -> Vec<(String, usize)> {
+            of.outliers.iter().map(|o| (o.run.clone(), o.row)).collect()
+        };
+        let mut wanted = listed(&before);
+        wanted.extend([200, 201, 202].map(|row| (clean.runs[1].label.clone(), row)));
+        wanted.sort();
+        assert_eq!(listed(&after), wanted, "seed {seed}");
+        assert_eq!((before.verdict, before.chosen), (after.verdict, after.chosen), "seed {seed}");
+    }
+    let mut short = World::NULL.draw(3);
+    short.runs[1].outputs[0][20..23].iter_mut().for_each(|v| *v += 3.0);
+    let answer = diagnose(&model, &short, &[], &options, &Silent).unwrap();
+    assert!(answer.verdict != Verdict::Adequate && answer.outliers.is_empty(), "{:?}", answer.outliers);
 }
 
 /// A step at the end of the runs is no wild reading: it lasts.

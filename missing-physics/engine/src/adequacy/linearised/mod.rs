@@ -17,4 +17,5 @@ mod shapes;
 mod solve;
 
 pub(crate) use curves::DEGREE;
+pub(crate) use outliers::{JUMP, LAPSE};
 pub(crate) use plane::Linearised;

@@ -4,6 +4,8 @@
 //! (the mean-shift test, Cook and Weisberg 1982, Residuals and Influence in Regression, section 2.2). Unlike a look at a row's neighbours, this sees a wild reading at
 //! the end of a run, and one among few rows.
 
+use std::ops::Range;
+
 use super::plane::Linearised;
 use super::solve::normal;
 use crate::fit::bordered::BorderedNormal;
@@ -18,6 +20,13 @@ const FREEDOM: f64 = 0.05;
 const STEPS: f64 = 2.0;
 /// A channel with fewer measured rows has no scale of its own to judge a row by.
 const FEWEST_ROWS: usize = 24;
+
+/// A lapse of a sensor (a camera that followed something else, a contact that was lost) is at most one row in so many of its run.
+pub(crate) const LAPSE: usize = 100;
+/// It begins and ends with jumps of so many robust sigmas of the steps from row to row,
+pub(crate) const JUMP: f64 = 25.0;
+/// and stays away by at least this part of the first jump; where it is over, the readings are back to within the rest.
+const AWAY: f64 = 0.5;
 
 /// How far a row lies from what all others say of it, in sigmas, and whether it stands alone.
 type RowScore = (f64, bool);
@@ -49,7 +58,21 @@ impl Linearised<'_> {
         let judged = |(column, scale): (Vec<RowScore>, &f64)| -> Vec<f64> {
             column.into_iter().map(|(z, alone)| if alone { z / scale } else { 0.0 }).collect()
         };
-        scores.into_iter().map(|row| row.into_iter().zip(&scales).map(judged).collect()).collect()
+        let mut scores: Vec<Vec<Vec<f64>>> =
+            scores.into_iter().map(|row| row.into_iter().zip(&scales).map(judged).collect()).collect();
+        for (run, of_run) in scores.iter_mut().enumerate() {
+            for (channel, of_rows) in of_run.iter_mut().enumerate() {
+                let left = fitted.left(run, channel, &data[run][channel]);
+                for (rows, z) in lapses(&left, self.resolution(channel)) {
+                    of_rows[rows].fill(z);
+                }
+            }
+        }
+        scores
+    }
+
+    fn resolution(&self, channel: usize) -> f64 {
+        self.problem.recording.resolution.get(channel).copied().unwrap_or(0.0)
     }
 }
 
@@ -70,17 +93,24 @@ impl<'a> Fitted<'a> {
         Self { linearised, ids, n_nuisance: nuisance.len(), noise, coefficients, bordered, factor }
     }
 
+    /// What the model leaves of a channel's rows.
+    fn left(&self, run: usize, channel: usize, column: &[f64]) -> Vec<f64> {
+        let block = &self.linearised.blocks[run][channel];
+        let mut left = column.to_vec();
+        for (&id, x) in self.ids.iter().zip(&self.coefficients[run]) {
+            left.iter_mut().zip(&block.raw[id]).for_each(|(r, c)| *r -= x * c);
+        }
+        left
+    }
+
     /// The scores of a channel's rows.
     fn scores(&self, run: usize, channel: usize, column: &[f64]) -> Vec<RowScore> {
         let Self { linearised, ids, .. } = self;
         let (shape, sigma) = self.noise[channel];
         let whitener = linearised.problem.whitener(run, channel, linearised.in_play[shape]);
         let block = &linearised.blocks[run][channel];
-        let step = linearised.problem.recording.resolution.get(channel).copied().unwrap_or(0.0);
-        let mut left = column.to_vec();
-        for (&id, x) in ids.iter().zip(&self.coefficients[run]) {
-            left.iter_mut().zip(&block.raw[id]).for_each(|(r, c)| *r -= x * c);
-        }
+        let step = linearised.resolution(channel);
+        let left = self.left(run, channel, column);
         let mut residual = left.clone();
         whitener.whiten(&mut residual);
         (0..residual.len())
@@ -111,6 +141,31 @@ impl<'a> Fitted<'a> {
 fn stands_alone(left: &[f64], row: usize, shift: f64) -> bool {
     let around = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
     around.filter_map(|k| left.get(k)).all(|other| (left[row] - other) * shift > 0.5 * shift * shift)
+}
+
+/// Series of rows that leave at once by far and come back at once, and by how many sigmas of the steps from row to row.
+fn lapses(left: &[f64], resolution: f64) -> Vec<(Range<usize>, f64)> {
+    let jumps: Vec<f64> = left.windows(2).map(|w| w[1] - w[0]).collect();
+    let Some(usual) = median(&mut jumps.iter().map(|j| j.abs()).collect::<Vec<f64>>()) else {
+        return Vec::new();
+    };
+    let sigma = (usual / 0.6745).max(STEPS * resolution);
+    let (limit, longest) = (JUMP * sigma, left.len() / LAPSE);
+    let mut found = Vec::new();
+    let mut first = 1;
+    while first < left.len() {
+        let (before, jump) = (left[first - 1], jumps[first - 1]);
+        let is_back = |k: &usize| (left[*k] - before).abs() < AWAY * jump.abs();
+        let over = (first + 1..left.len()).take(longest).find(is_back);
+        match over.filter(|&k| sigma > 0.0 && jump.abs() > limit && -jumps[k - 1] * jump.signum() > limit) {
+            Some(over) => {
+                found.push((first..over, jump.abs() / sigma));
+                first = over;
+            }
+            None => first += 1,
+        }
+    }
+    found
 }
 
 /// The sigma of a channel's scores, whatever is wild among them.
