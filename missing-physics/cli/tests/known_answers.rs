@@ -311,7 +311,7 @@ fn the_author_s_times_of_the_same_ball() {
 #[test]
 #[ignore = "needs ../shared, long: .ci/run --long"]
 fn shared_long_leftovers_are_said_beside_the_main_cause() {
-    let (mut leftovers, mut imitated, mut named) = (0, 0, Vec::new());
+    let (mut leftovers, mut imitated, mut curved, mut named) = (0, 0, 0, Vec::new());
     for domain in ["indentation", "liquid-tilt", "slosh", "trajectory", "dough-roll"] {
         for entry in std::fs::read_dir(shared("practice/leftover").join(domain)).unwrap() {
             let folder = entry.unwrap().path();
@@ -330,10 +330,22 @@ fn shared_long_leftovers_are_said_beside_the_main_cause() {
                 imitated += 1;
                 assert_eq!(answer["verdict"], "unexplained", "{}", folder.display());
                 named.extend(ids(&answer["chosen"]));
+                curved += usize::from(says_the_curved_scale(&key, &answer));
             }
         }
     }
     assert!(leftovers >= 9 && imitated >= 5 && named.is_empty(), "{leftovers} {imitated} {named:?}");
+    assert_eq!(curved, 2, "scales that are curved");
+}
+
+/// Whether the law is the curved scale that a case hides: of the torque, a quadratic gain of its sensor; of a force that bends over.
+fn says_the_curved_scale(key: &Value, answer: &Value) -> bool {
+    let channel = match key["what"].as_str() {
+        Some("the torque sensor has a quadratic gain") => "tau_z_nm",
+        Some("the force bends over beyond a force of its own") => "force_n",
+        _ => return false,
+    };
+    answer["law"]["kind"] == "reading" && answer["law"]["adds_to"]["name"] == channel
 }
 
 fn text(value: &Value) -> String {

@@ -115,14 +115,12 @@ fn power(
 /// A curved scale in words.
 fn reading(problem: &Problem<'_>, channel: usize, largest: f64, coefficients: Vec<Estimate>) -> Law {
     let quantity = &problem.recording.channels[channel];
-    let sum: Vec<String> = coefficients
-        .iter()
-        .enumerate()
-        .map(|(k, c)| match k {
-            0 => format!("{:.3} x", c.value),
-            _ => format!("{:.3} x^{}", c.value, k + 1),
-        })
-        .collect();
+    // Three digits of the largest; each coefficient is what its term adds to the largest reading.
+    let most = coefficients.iter().map(|c| c.value.abs()).fold(f64::MIN_POSITIVE, f64::max);
+    let digits = (2.0 - most.log10().floor()).clamp(0.0, 15.0) as usize;
+    let power = |k: usize| if k == 0 { "x".to_owned() } else { format!("x^{}", k + 1) };
+    let sum: Vec<String> =
+        coefficients.iter().enumerate().map(|(k, c)| format!("{:.digits$} {}", c.value, power(k))).collect();
     Law {
         formula: format!(
             "{} += {} {}, x = (its simulated value) / {largest:.4} {}",
