@@ -81,3 +81,38 @@ fn runs_may_differ_in_their_rates() {
     let (output, written) = diagnosed(EQUATION, "angle_rad", &rows([0.05, 0.02]));
     assert!(output.status.success() && written, "{output:?}");
 }
+
+/// A pendulum that is let go of after so many rows, from 1 rad; steps of a hundredth of the time between rows.
+fn let_go(after: usize) -> String {
+    let (mut q, mut w) = (1.0_f64, 0.0);
+    let mut text = String::from("run,t_s,encoder_rad\n");
+    for i in 0..200 {
+        let noise = ((i * 7919) % 13) as f64 - 6.0;
+        text += &format!("1,{:.3},{:.5}\n", 0.02 * f64::from(i as u32), q + 2e-4 * noise);
+        for _ in 0..if i < after { 0 } else { 100 } {
+            w -= 2e-4 * 24.0 * q.sin();
+            q += 2e-4 * w;
+        }
+    }
+    text
+}
+
+#[test]
+fn rows_in_which_a_hand_held_a_machine_are_said() {
+    for (after, said) in [(25, true), (0, false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let header = "format = 1\ndomain = \"motion\"\ndata = \"data.csv\"\n[model]\n\
+             states = { angle_rad = \"rate_rad_s\", rate_rad_s = \"-g_per_l*sin(angle_rad)\" }\n\
+             outputs = { encoder_rad = \"angle_rad\" }\n\
+             [[parameter]]\nname = \"g_per_l\"\nunit = \"1/s^2\"\nstart = 20.0\n";
+        std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+        std::fs::write(folder.path().join("data.csv"), let_go(after)).unwrap();
+        let tool = env!("CARGO_BIN_EXE_missing-physics");
+        let output = Command::new(tool).arg("diagnose").arg(folder.path()).output().unwrap();
+        // Lines of the report are broken anywhere.
+        let text = String::from_utf8(output.stdout).unwrap();
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let found = words.join(" ").contains("rests in its first 2");
+        assert_eq!(found, said, "{text}");
+    }
+}

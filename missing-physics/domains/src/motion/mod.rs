@@ -5,6 +5,7 @@ mod equations;
 mod experiments;
 mod expression;
 mod growth;
+mod held;
 mod knots;
 mod local;
 mod machine;

@@ -10,6 +10,7 @@ use missing_physics::noise::rough_sigma;
 use super::equations::Equations;
 use super::experiments::experiments;
 use super::growth::too_long;
+use super::held;
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range};
 use super::windows::{Thinned, cut, rows, thin};
@@ -134,6 +135,7 @@ fn followed(equations: Equations, recording: Recording, steps: bool) -> Result<T
             );
         }
     }
+    remarks.extend(held::remarks(&model, &recording, &fitted));
     let stated = model.stated(&fitted);
     let Some(length) = followed else {
         let scales = sizes(&model, &recording, &fitted)?;
