@@ -36,3 +36,30 @@ fn a_restitution_that_scatters_is_noise() {
     println!("{alarms} of {}", p.len());
     assert!(alarms < 7, "{alarms} of {}", p.len());
 }
+
+/// What a sheet of paper falls like, by the closed form of quadratic drag: its terminal speed is half a metre a second.
+#[test]
+fn a_light_thing_that_falls_has_its_drag() {
+    let (g, k) = (9.80665_f64, 40.0);
+    let mut data = String::from("run,t_s,z_m\n");
+    for run in 1..=3 {
+        for i in 0..40 {
+            let (t, noise) = (0.02 * f64::from(i), f64::from((i * 7919 + run * 104_729) % 13) - 6.0);
+            let z = 1.0 - ((g * k).sqrt() * t).cosh().ln() / k + 1e-4 * noise;
+            data += &format!("{run},{t:.3},{z:.6}\n");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("recording.toml"),
+        "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n",
+    )
+    .unwrap();
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    let (_, loaded) = missing_physics_domains::load(folder.path()).unwrap();
+    let options = Options { replicates: 199, ..Options::default() };
+    let answer = diagnose(&*loaded.model, &loaded.recording, &[], &options, &Silent).unwrap();
+    assert_eq!(answer.chosen, ["quadratic-drag"]);
+    let drag = &answer.mechanisms.iter().find(|m| m.id == "quadratic-drag").unwrap().parameters[0];
+    assert!((drag.value - k).abs() < 0.05 * k, "{drag:?}");
+}

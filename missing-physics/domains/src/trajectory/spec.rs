@@ -100,7 +100,7 @@ fn drags(b: &mut Flying, setup: &Setup, drag_unit: f64) -> ParameterRef {
     let drag = if sized {
         b.shared(Role::Quadratic, "drag_coefficient", "", [0.0, 10.0], 0.5)
     } else {
-        b.shared(Role::Quadratic, "k_per_m", "1/m", [0.0, 20.0], 0.02)
+        b.shared(Role::Quadratic, "k_per_m", "1/m", [0.0, 200.0], 0.02)
     };
     let text = [
         "air drag, quadratic",
@@ -117,7 +117,7 @@ fn drags(b: &mut Flying, setup: &Setup, drag_unit: f64) -> ParameterRef {
             value: Arc::new(move |shared| drag_unit * shared[drag.slot]),
         });
     }
-    let rate = b.shared(Role::Linear, "rate_per_s", "1/s", [0.0, 20.0], 0.1);
+    let rate = b.shared(Role::Linear, "rate_per_s", "1/s", [0.0, 200.0], 0.1);
     let text = [
         "air drag, linear",
         "The air slows the ball in proportion to its speed.",
