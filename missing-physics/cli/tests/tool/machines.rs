@@ -3,6 +3,10 @@
 
 use std::process::{Command, Output};
 
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, Normal};
+
 const EQUATION: &str = "-g_per_l*sin(angle_rad) + gain*command_v";
 
 /// A pendulum with a motor: its equation, what its encoder should read, and its rows.
@@ -82,37 +86,51 @@ fn runs_may_differ_in_their_rates() {
     assert!(output.status.success() && written, "{output:?}");
 }
 
-/// A pendulum that is let go of after so many rows, from 1 rad; steps of a hundredth of the time between rows.
-fn let_go(after: usize) -> String {
-    let (mut q, mut w) = (1.0_f64, 0.0);
-    let mut text = String::from("run,t_s,encoder_rad\n");
+/// Rows of a pendulum that is let go of after so many of them, from 0.8 rad; steps of a hundredth of the time between rows.
+fn let_go(run: &str, after: usize, g_per_l: f64) -> String {
+    let (mut q, mut w) = (0.8_f64, 0.0);
+    let (mut text, noise) = (String::new(), Normal::new(0.0, 1e-3).unwrap());
+    let mut rng = ChaCha8Rng::seed_from_u64(g_per_l.to_bits());
     for i in 0..200 {
-        let noise = ((i * 7919) % 13) as f64 - 6.0;
-        text += &format!("1,{:.3},{:.5}\n", 0.02 * f64::from(i as u32), q + 2e-4 * noise);
+        let reading = q + noise.sample(&mut rng);
+        text += &format!("{run},{:.3},{reading:.5}\n", 0.02 * f64::from(i as u32));
         for _ in 0..if i < after { 0 } else { 100 } {
-            w -= 2e-4 * 24.0 * q.sin();
+            w -= 2e-4 * g_per_l * q.sin();
             q += 2e-4 * w;
         }
     }
     text
 }
 
+/// The report on such rows, its words with one space between them.
+fn report_on(rows: &str, more: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let header = format!(
+        "format = 1\ndomain = \"motion\"\ndata = \"data.csv\"\n[model]\n\
+         states = {{ angle_rad = \"rate_rad_s\", rate_rad_s = \"-g_per_l*sin(angle_rad)\" }}\n\
+         outputs = {{ encoder_rad = \"angle_rad\" }}\n\
+         [[parameter]]\nname = \"g_per_l\"\nunit = \"1/s^2\"\nstart = 20.0\n{more}"
+    );
+    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+    std::fs::write(folder.path().join("data.csv"), format!("run,t_s,encoder_rad\n{rows}")).unwrap();
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output = Command::new(tool).arg("diagnose").arg(folder.path()).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.split_whitespace().collect::<Vec<&str>>().join(" ")
+}
+
 #[test]
 fn rows_in_which_a_hand_held_a_machine_are_said() {
-    for (after, said) in [(25, true), (0, false)] {
-        let folder = tempfile::tempdir().unwrap();
-        let header = "format = 1\ndomain = \"motion\"\ndata = \"data.csv\"\n[model]\n\
-             states = { angle_rad = \"rate_rad_s\", rate_rad_s = \"-g_per_l*sin(angle_rad)\" }\n\
-             outputs = { encoder_rad = \"angle_rad\" }\n\
-             [[parameter]]\nname = \"g_per_l\"\nunit = \"1/s^2\"\nstart = 20.0\n";
-        std::fs::write(folder.path().join("recording.toml"), header).unwrap();
-        std::fs::write(folder.path().join("data.csv"), let_go(after)).unwrap();
-        let tool = env!("CARGO_BIN_EXE_missing-physics");
-        let output = Command::new(tool).arg("diagnose").arg(folder.path()).output().unwrap();
-        // Lines of the report are broken anywhere.
-        let text = String::from_utf8(output.stdout).unwrap();
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let found = words.join(" ").contains("rests in its first 2");
-        assert_eq!(found, said, "{text}");
-    }
+    let held = report_on(&let_go("1", 25, 24.0), "");
+    assert!(held.contains("run 1 rests in its first 2"), "{held}");
+    let free = report_on(&let_go("1", 0, 24.0), "");
+    assert!(!free.contains("rests in its first"), "{free}");
+}
+
+/// Pendulums of 10 cm, 40 cm and 1 m, all of which begin at 49 cm.
+#[test]
+fn a_value_of_each_run_is_found_from_far_off() {
+    let rows: String = [("a", 98.0), ("b", 24.5), ("c", 9.8)].map(|(run, of)| let_go(run, 0, of)).concat();
+    let report = report_on(&rows, "per_run = true\n");
+    assert!(report.starts_with("The simulation explains this recording"), "{report}");
 }

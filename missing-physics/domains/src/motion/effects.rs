@@ -70,7 +70,8 @@ impl<'a> Effects<'a> {
             if let (true, Some(labels)) = (p.per_run, cut) {
                 for (run, label) in labels.iter().enumerate() {
                     let name = format!("{} of run {label}", p.name);
-                    self.add(Role::OfRun(k, run), &name, &p.unit, starts[k], p.bounds, p.scale);
+                    let start = p.start_of(label).unwrap_or(starts[k]);
+                    self.add(Role::OfRun(k, run), &name, &p.unit, start, p.bounds, p.scale);
                 }
             } else if p.per_run {
                 self.builder.nuisance_from(&p.name, &p.unit, starts[k], p.bounds, p.scale);

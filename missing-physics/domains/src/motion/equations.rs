@@ -53,6 +53,15 @@ pub(super) struct Parameter {
     pub(super) scale: f64,
     pub(super) known: bool,
     pub(super) per_run: bool,
+    /// Where fits begin in each run by its label, of a parameter that has a value in each; as `value` in a run that is not listed.
+    pub(super) of_runs: Vec<(String, f64)>,
+}
+
+impl Parameter {
+    /// Where fits begin in a run, if that is known better than for all.
+    pub(super) fn start_of(&self, label: &str) -> Option<f64> {
+        self.of_runs.iter().find(|(run, _)| run == label).map(|(_, value)| *value)
+    }
 }
 
 /// Where a joint's effects may act.
@@ -334,6 +343,7 @@ fn read_parameter(section: &Section<'_>) -> Result<Parameter, ReadError> {
         scale: scale.unwrap_or(usual),
         known: known.is_some(),
         per_run,
+        of_runs: Vec::new(),
     })
 }
 

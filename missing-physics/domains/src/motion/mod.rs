@@ -10,6 +10,7 @@ mod knots;
 mod local;
 mod machine;
 mod model;
+mod of_runs;
 mod read;
 mod scales;
 mod setting;

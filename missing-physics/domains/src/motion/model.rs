@@ -508,6 +508,11 @@ impl Model for MotionModel {
     }
 
     fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
+        for (parameter, slot) in self.equations.parameters.iter().zip(&self.per_run) {
+            if let (Some(slot), Some(start)) = (slot, parameter.start_of(&run.label)) {
+                nuisance[*slot] = start;
+            }
+        }
         let knows = self.cut.is_none() || !windows::continues(run);
         super::start::states(&self.equations, run, knows, &self.free_states, nuisance);
     }

@@ -12,6 +12,7 @@ use super::experiments::experiments;
 use super::growth::too_long;
 use super::held;
 use super::model::{MotionModel, Pace};
+use super::of_runs;
 use super::scales::{Range, Scales, range};
 use super::windows::{Thinned, cut, rows, thin};
 use crate::mechanics::Clock;
@@ -113,8 +114,9 @@ fn same_motion(equations: &Equations, tuned: &Tuned, exact: &Recording) -> bool 
 
 /// The full model, and the recording as it can be followed, all of its rows; `steps`: whether a simulator may have made it, one step a
 /// row.
-fn followed(equations: Equations, recording: Recording, steps: bool) -> Result<Tuned, String> {
+fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Result<Tuned, String> {
     let mut remarks = Vec::new();
+    of_runs::find(&mut equations, &recording);
     let mut model = MotionModel::baseline(equations, first_pace(&recording));
     let starts: Vec<f64> = model.spec().starts(Scope::Shared);
     resolve(&mut model, &recording, &starts)?;
@@ -192,7 +194,7 @@ fn median_step(recording: &Recording) -> f64 {
 }
 
 /// The coarsest pace that is worth a try: long steps where inputs do not end them.
-fn first_pace(recording: &Recording) -> Pace {
+pub(super) fn first_pace(recording: &Recording) -> Pace {
     let rows = median_step(recording);
     let changes = |column: &Vec<f64>| column.windows(2).filter(|w| w[0] != w[1]).count();
     let (mut all, mut changing) = (0, 0);
@@ -211,7 +213,7 @@ fn first_pace(recording: &Recording) -> Pace {
 /// Halves the step of the integration until what predictions of the liveliest rows change by can be told from the noise in no test: an
 /// error of the integration is the same in all rows, and what is far below the noise in each shows in all of them together. Of a motion
 /// that cannot be followed so far only the beginning is looked at.
-fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Result<(), String> {
+pub(super) fn resolve(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Result<(), String> {
     let Some(mut run) = liveliest(recording) else { return Ok(()) };
     loop {
         let Err(why) = resolve_by(model, recording, &run, shared) else { return Ok(()) };
@@ -298,7 +300,7 @@ fn sigma(recording: &Recording, run: &Run, channel: usize) -> f64 {
 
 /// Fits the equations in short windows, then in longer ones: a fit over a whole run from far off would lose the phase and settle in a
 /// wrong place. The second is the number of rows of the longest windows that can be followed, where whole runs cannot.
-fn windows(
+pub(super) fn windows(
     model: &MotionModel,
     recording: &Recording,
     mut shared: Vec<f64>,

@@ -76,7 +76,7 @@ impl<'a> Extended<'a> {
             AddedLaw::Reading { channel, largest } => {
                 let channel = at(&recording.channels, channel)?;
                 (
-                    powers(&recording.channels[channel].unit, CURVED),
+                    curve(&recording.channels[channel].unit, *largest),
                     Added::Reading { channel, largest: *largest },
                 )
             }
@@ -84,7 +84,7 @@ impl<'a> Extended<'a> {
                 let (channel, variable) = place(channel, variable)?;
                 let (centre, half_width) = (*centre, *half_width);
                 let term = Added::Smooth { channel, variable, centre, half_width };
-                (powers(&recording.channels[channel].unit, DEGREE + 1), term)
+                (powers(&recording.channels[channel].unit), term)
             }
             AddedLaw::Periodic => {
                 (oscillation(recording, sigma, [0.0, f64::INFINITY], 1.0, 1.0), Added::Periodic)
@@ -168,7 +168,7 @@ impl<'a> Extended<'a> {
         if !(high - low > LEAST_SPAN * largest) {
             return None;
         }
-        let parameters = powers(&problem.recording.channels[channel].unit, CURVED);
+        let parameters = curve(&problem.recording.channels[channel].unit, largest);
         let term = Added::Reading { channel, largest };
         Some(Self::new(problem.model, &problem.recording, parameters, term))
     }
@@ -185,7 +185,7 @@ impl<'a> Extended<'a> {
         if !(half_width > 1e-12 * high.abs().max(low.abs())) {
             return None;
         }
-        let parameters = powers(&problem.recording.channels[channel].unit, DEGREE + 1);
+        let parameters = powers(&problem.recording.channels[channel].unit);
         let term = Added::Smooth { channel, variable, centre: 0.5 * (low + high), half_width };
         Some(Self::new(problem.model, &problem.recording, parameters, term))
     }
@@ -221,9 +221,14 @@ fn exponent() -> Parameter {
     free("exponent".into(), "", 0.3, 3.0)
 }
 
-/// Coefficients of a polynomial of a degree, without its constant.
-fn powers(unit: &str, degree: usize) -> Vec<Parameter> {
-    (1..=degree).map(|d| free(format!("c{d}"), unit, 1.0, f64::INFINITY)).collect()
+/// Coefficients of a curved scale: none changes the largest reading by more than half.
+fn curve(unit: &str, largest: f64) -> Vec<Parameter> {
+    (1..=CURVED).map(|d| free(format!("c{d}"), unit, 0.1 * largest, 0.5 * largest)).collect()
+}
+
+/// Coefficients of a polynomial without its constant.
+fn powers(unit: &str) -> Vec<Parameter> {
+    (1..=DEGREE + 1).map(|d| free(format!("c{d}"), unit, 1.0, f64::INFINITY)).collect()
 }
 
 impl Model for Extended<'_> {
