@@ -4,6 +4,7 @@ mod effects;
 mod equations;
 mod experiments;
 mod expression;
+mod follow;
 mod growth;
 mod held;
 mod knots;

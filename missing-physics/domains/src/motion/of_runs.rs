@@ -6,8 +6,8 @@ use missing_physics::fit::least_squares;
 use missing_physics::model::{Model as _, Scope};
 
 use super::equations::Equations;
+use super::follow::{first_pace, resolve, windows};
 use super::model::MotionModel;
-use super::tune::{first_pace, resolve, windows};
 use super::windows::cut;
 
 /// What a start is multiplied by, one parameter at a time, until a run is followed.
