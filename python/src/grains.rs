@@ -68,9 +68,14 @@ pub(crate) fn infer_grains<'py>(
         }
     };
     let inferred = learned.map_err(refused)?.infer_series(pictures).map_err(refused)?;
-    let drawn: Points = inferred.posterior.sample(count, &mut ChaCha8Rng::seed_from_u64(seed)).map_err(refused)?;
+    let drawn: Points =
+        inferred.posterior.sample(count, &mut ChaCha8Rng::seed_from_u64(seed)).map_err(refused)?;
     let draws: Vec<Vec<f64>> = drawn.rows().map(<[f64]>::to_vec).collect();
-    Ok((PyArray2::from_vec2(py, &draws)?, inferred.estimate().map_err(refused)?.theta(), inferred.resemblance.p_value))
+    Ok((
+        PyArray2::from_vec2(py, &draws)?,
+        inferred.estimate().map_err(refused)?.theta(),
+        inferred.resemblance.p_value,
+    ))
 }
 
 /// Heights from which the grains of a series are poured, m.
