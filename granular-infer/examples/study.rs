@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let prior = &results.campaign.prior;
     let posterior = GrainPosterior::train(prior, &simulations, &settings(), 1)?;
     if unseen.records.len() < LEAST {
-        println!("fewer than {} unseen pours: nothing is measured", LEAST);
+        println!("fewer than {LEAST} unseen pours: nothing is measured");
         return ship(&posterior, out);
     }
     let tests = seen(&unseen, &scene, &view, 1)?.simulations;

@@ -19,13 +19,13 @@ pub(super) fn remarks(model: &MotionModel, recording: &Recording, shared: &[f64]
     if !model.equations().inputs.is_empty() {
         return Vec::new();
     }
-    let still: Vec<f64> = (0..recording.channels.len())
+    let ranges: Vec<f64> = (0..recording.channels.len())
         .map(|c| {
             let [low, high] = range(recording.runs.iter().flat_map(|r| r.outputs[c].iter().copied()));
             high - low
         })
         .collect();
-    recording.runs.iter().filter_map(|run| held(model, run, shared, &still)).collect()
+    recording.runs.iter().filter_map(|run| held(model, run, shared, &ranges)).collect()
 }
 
 /// The same of one run, of channels with these ranges.

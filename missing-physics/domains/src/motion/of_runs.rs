@@ -1,7 +1,7 @@
 //! Where fits of a parameter that has a value in each run begin: at a fit to that run alone. From one start for all runs, a run whose value is
 //! another by a half loses the phase and settles in a wrong place.
 
-use missing_physics::data::{Recording, Run};
+use missing_physics::data::Recording;
 use missing_physics::fit::least_squares;
 use missing_physics::model::{Model as _, Scope};
 
@@ -22,18 +22,20 @@ pub(super) fn find(equations: &mut Equations, recording: &Recording) {
     if places.is_empty() {
         return;
     }
+    let mut alone = recording.clone();
     for run in &recording.runs {
-        let Some(values) = of_one(equations, recording, run, &places) else { continue };
+        alone.runs = vec![run.clone()];
+        let Some(values) = of_one(equations, &alone, &places) else { continue };
         for (&place, value) in places.iter().zip(values) {
             equations.parameters[place].of_runs.push((run.label.clone(), value));
         }
     }
 }
 
-/// Values of the parameters at these places, fitted to one run with all others.
-fn of_one(equations: &Equations, recording: &Recording, run: &Run, places: &[usize]) -> Option<Vec<f64>> {
-    let alone = Recording { runs: vec![run.clone()], ..recording.clone() };
-    let measured = run.outputs.iter().flatten().filter(|v| v.is_finite()).count().max(1);
+/// Values of the parameters at these places, fitted with all others to a run that is alone.
+fn of_one(equations: &Equations, alone: &Recording, places: &[usize]) -> Option<Vec<f64>> {
+    let values = alone.runs.iter().flat_map(|run| run.outputs.iter().flatten());
+    let measured = values.filter(|v| v.is_finite()).count().max(1);
     let mut best: Option<(f64, Vec<f64>)> = None;
     let others = places.iter().flat_map(|place| FACTORS[1..].iter().map(|factor| (*place, *factor)));
     for (place, factor) in std::iter::once((places[0], FACTORS[0])).chain(others) {
@@ -43,7 +45,7 @@ fn of_one(equations: &Equations, recording: &Recording, run: &Run, places: &[usi
         }
         let parameter = &mut shared.parameters[place];
         parameter.value = (factor * parameter.value).clamp(parameter.bounds[0], parameter.bounds[1]);
-        let Some((chi2, values)) = fitted(shared, &alone, places) else { continue };
+        let Some((chi2, values)) = fitted(shared, alone, places) else { continue };
         if best.as_ref().is_none_or(|(least, _)| chi2 < *least) {
             best = Some((chi2, values));
         }
