@@ -9,6 +9,7 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
+use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use missing_physics::engine::Options;
@@ -18,8 +19,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-/// Writes a recording of joints side by side, each a drive with dry friction under a command of its own at 1 kHz.
-fn write(folder: &Path, joints: usize, runs: usize, rows: usize) {
+/// Writes a recording of joints side by side, each a drive with dry friction under a command of its own at 1 kHz, and where something is to
+/// be left over with a spring that no mechanism is.
+fn write(folder: &Path, joints: usize, runs: usize, rows: usize, left: bool) {
     let mut header = String::from("format = 1\ndomain = \"motion\"\ndata = \"data.csv\"\n[model]\n");
     let list = |each: &dyn Fn(usize) -> String| (0..joints).map(each).collect::<Vec<_>>().join(", ");
     let states = list(&|j| {
@@ -52,7 +54,8 @@ fn write(folder: &Path, joints: usize, runs: usize, rows: usize) {
             for (j, [x, v]) in motion.iter_mut().enumerate() {
                 let u = 2.0 * ((3.0 + j as f64 + 0.3 * run as f64) * t).sin();
                 let _ = write!(data, ",{:.6},{u:.4}", *x + noise.sample(&mut rng));
-                let force = 12.0 * u - 1.5 * *v - 6.0 * *x;
+                let left = if left { 0.6 * ((4.0 * *x).tanh() + 0.5 * (5.0 * *x).sin()) } else { 0.0 };
+                let force = 12.0 * u - 1.5 * *v - 6.0 * *x - left;
                 let held = *v == 0.0 && force.abs() <= 1.0;
                 let way = if *v == 0.0 { force } else { *v };
                 let next = if held { 0.0 } else { *v + dt * (force - way.signum()) };
@@ -68,20 +71,30 @@ fn write(folder: &Path, joints: usize, runs: usize, rows: usize) {
 fn machine(c: &mut Criterion) {
     let mut group = c.benchmark_group("machine");
     group.sample_size(10);
-    let all = [(1, 4, 500), (1, 10, 2000), (2, 4, 500), (1, 10, 10_000)];
+    let all = [
+        (1, 4, 500, false),
+        (1, 4, 500, true),
+        (1, 10, 2000, false),
+        (1, 10, 2000, true),
+        (2, 4, 500, false),
+        (1, 10, 10_000, false),
+    ];
     // With `--test` nothing is timed, and the others take minutes.
     let asked = if std::env::args().any(|a| a == "--test") { &all[..1] } else { &all[..] };
-    for &(joints, runs, rows) in asked {
+    for &(joints, runs, rows, left) in asked {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), joints, runs, rows);
-        let id = format!("{joints} joints, {} rows", runs * rows);
+        write(folder.path(), joints, runs, rows, left);
+        let beside = if left { ", a spring left over" } else { "" };
+        let id = format!("{joints} joints, {} rows{beside}", runs * rows);
         group.bench_with_input(BenchmarkId::new("read", &id), &rows, |b, _| {
             b.iter(|| load(folder.path()).unwrap());
         });
         let (_, loaded) = load(folder.path()).unwrap();
         let diagnose = || loaded.diagnose(&Options::default(), &Silent).unwrap();
+        let begin = Instant::now();
         let answer = diagnose();
-        println!("machine/diagnose/{id}: {} {:?}", answer.verdict.word(), answer.chosen);
+        let took = begin.elapsed().as_secs_f64();
+        println!("machine/diagnose/{id}: {} {:?}, once in {took:.1} s", answer.verdict.word(), answer.chosen);
         if runs * rows <= 2000 {
             group.bench_with_input(BenchmarkId::new("diagnose", &id), &rows, |b, _| b.iter(diagnose));
         }

@@ -133,6 +133,8 @@ pub struct Integrator<T> {
     /// Largest step, s.
     step_s: f64,
     control: Option<Control>,
+    /// Trial steps made.
+    tried: usize,
     modes: Vec<Mode>,
     full: Vec<bool>,
     beyond: Vec<bool>,
@@ -156,6 +158,7 @@ impl<T: Number> Integrator<T> {
             scheme,
             step_s,
             control: None,
+            tried: 0,
             modes: Vec::new(),
             full: Vec::new(),
             beyond: Vec::new(),
@@ -179,6 +182,11 @@ impl<T: Number> Integrator<T> {
             self.control = Some(Control { finest_s, errors, next_s: finest_s });
         }
         self
+    }
+
+    /// Evaluations of the states' derivatives so far in steps, those included that were made again shorter: what an integration costs.
+    pub fn evaluations(&self) -> usize {
+        self.tried * (self.scheme.nodes.len() - usize::from(self.scheme.last_is_end))
     }
 
     /// Finds out which joints rest, which levels are full and which edges are passed: at the beginning, and wherever an input jumps.
@@ -325,6 +333,7 @@ impl<T: Number> Integrator<T> {
 
     /// One step, whatever happens in it, into `trial`.
     fn step(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], h: f64) {
+        self.tried += 1;
         let mut rates = std::mem::take(&mut self.rates);
         let mut stage = std::mem::take(&mut self.stage);
         if !self.fresh {

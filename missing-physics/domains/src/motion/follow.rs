@@ -8,7 +8,7 @@ use missing_physics::noise::rough_sigma;
 
 use super::growth::too_long;
 use super::model::{MotionModel, Pace};
-use super::scales::{Range, Scales, range};
+use super::scales::{Range, Scales, range, rms};
 use super::windows::{cut, rows};
 use crate::mechanics::Clock;
 
@@ -46,9 +46,9 @@ pub(super) fn first_pace(recording: &Recording) -> Pace {
     }
     let spacing = all as f64 / (changing + recording.runs.len()) as f64;
     if spacing < OFTEN {
-        Pace { method: Method::Kutta, step_s: rows }
+        Pace::fixed(Method::Kutta, rows)
     } else {
-        Pace { method: Method::DormandPrince, step_s: rows * COARSEST.min(spacing) }
+        Pace::fixed(Method::DormandPrince, rows * COARSEST.min(spacing))
     }
 }
 
@@ -73,7 +73,7 @@ fn resolve_by(
     run: &Run,
     shared: &[f64],
 ) -> Result<(), String> {
-    let mut pace = first_pace(recording);
+    let first = first_pace(recording);
     let start = model.nuisance(run);
     let n = run.len();
     let rows: usize = recording.runs.iter().map(Run::len).sum();
@@ -82,27 +82,47 @@ fn resolve_by(
         let mut out = vec![0.0; n * recording.channels.len()];
         model.predict(run, shared, &start, &mut out).map(|()| out).map_err(|e| e.reason)
     };
-    model.set_pace(pace);
+    // Whether two predictions are the same to all tests.
+    let alike = |a: &[f64], b: &[f64]| {
+        let columns = a.chunks(n).zip(b.chunks(n)).zip(&sigmas);
+        let seen: f64 = columns
+            .map(|((a, b), sigma)| a.iter().zip(b).map(|(a, b)| ((a - b) / sigma).powi(2)).sum::<f64>())
+            .sum();
+        seen * rows as f64 / n as f64 <= UNSEEN.powi(2)
+    };
+    model.set_pace(first);
     let mut before = predict(model);
     let finest = median_step(recording) / FINEST;
-    while pace.step_s > finest {
-        let coarser = pace;
-        pace.step_s *= 0.5;
-        model.set_pace(pace);
+    let mut step_s = first.step_s;
+    while step_s > finest {
+        let coarser = step_s;
+        step_s *= 0.5;
+        model.set_pace(Pace::fixed(first.method, step_s));
         let now = predict(model);
-        if let (Ok(before), Ok(now)) = (&before, &now) {
-            let columns = before.chunks(n).zip(now.chunks(n)).zip(&sigmas);
-            let seen: f64 = columns
-                .map(|((a, b), sigma)| a.iter().zip(b).map(|(a, b)| ((a - b) / sigma).powi(2)).sum::<f64>())
-                .sum();
-            if seen * rows as f64 / n as f64 <= UNSEEN.powi(2) {
-                model.set_pace(coarser);
-                return Ok(());
+        if let (Ok(before), Ok(now)) = (&before, &now)
+            && alike(before, now)
+        {
+            model.set_pace(Pace::fixed(first.method, coarser));
+            let fixed = evaluations(model, run, shared, &start);
+            // Where few places ask for short steps, only those get them.
+            if let Ok(course) = model.course(run, shared, &start) {
+                model.set_state_sizes(course.states.iter().map(|state| rms(state)).collect());
             }
+            model.set_pace(Pace { finest_s: step_s, ..first });
+            let cheaper = evaluations(model, run, shared, &start) < fixed;
+            if !(cheaper && predict(model).is_ok_and(|cut| alike(&cut, now))) {
+                model.set_pace(Pace::fixed(first.method, coarser));
+            }
+            return Ok(());
         }
         before = now;
     }
     before.map(|_| ())
+}
+
+/// How many evaluations of the equations a run takes.
+fn evaluations(model: &MotionModel, run: &Run, shared: &[f64], nuisance: &[f64]) -> usize {
+    model.along(run, shared, nuisance, |_, _, _| {}).unwrap_or(usize::MAX)
 }
 
 /// From which states and by which parameters a motion was followed, in words.
@@ -147,7 +167,7 @@ pub(super) fn windows(
     recording: &Recording,
     mut shared: Vec<f64>,
 ) -> Result<(Vec<f64>, Option<usize>), String> {
-    let free = MotionModel::baseline(model.equations().free(), model.pace());
+    let free = model.freed();
     let longest = recording.runs.iter().map(Run::len).max().unwrap_or(0);
     let mut length = FIRST_WINDOW;
     let mut followed = FIRST_WINDOW;
@@ -209,4 +229,68 @@ pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) 
         ..Scales::default()
     };
     Ok(scales.measure(model.equations(), &all, &rates))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use missing_physics::data::Recording;
+    use missing_physics::model::{Quantity, Scope};
+
+    use super::super::equations::Equations;
+    use super::*;
+    use crate::recording::{Header, Memory, Source};
+
+    const CLIPPED: &str = r#"
+format = 1
+[model]
+states = { angle_rad = "rate_rad_s", rate_rad_s = "300*min(max(gain*(goal_rad - angle_rad), -1), 1) - 8*rate_rad_s" }
+outputs = { encoder_rad = "angle_rad" }
+inputs = { goal_rad = "linear" }
+[start]
+angle_rad = 0.0
+rate_rad_s = 0.0
+[[parameter]]
+name = "gain"
+start = 2.0
+"#;
+
+    /// A servo whose command is clipped now and then: only the rows in which that begins or ends ask for short steps, and what is predicted
+    /// is the motion of steps that are all shorter still.
+    #[test]
+    fn steps_are_short_only_where_an_expression_has_a_kink() {
+        let header = Header::parse(Source::Memory(Memory::new("a servo")), CLIPPED, false).unwrap();
+        let equations = Equations::read(&header).unwrap();
+        let times: Vec<f64> = (0..800).map(|k| 0.01 * f64::from(k)).collect();
+        let goal: Vec<f64> = times.iter().map(|t| (1.5 * t).sin() + 0.4 * (7.0 * t).sin()).collect();
+        // Readings in steps of a tenth of a milliradian.
+        let encoder = goal.iter().map(|g| (1e4 * g).round() * 1e-4).collect();
+        let run = Run { label: "1".into(), inputs: vec![times, goal], outputs: vec![encoder], kind: 0 };
+        let recording = Recording {
+            channels: vec![Quantity::new("encoder_rad", "rad")],
+            variables: vec![Quantity::new("t_s", "s"), Quantity::new("goal_rad", "rad")],
+            runs: vec![run],
+            noise_along: Some(0),
+            calibration: vec![None],
+            resolution: vec![1e-4],
+        };
+        let mut model = MotionModel::baseline(equations, first_pace(&recording));
+        let shared = model.spec().starts(Scope::Shared);
+        resolve(&mut model, &recording, &shared).unwrap();
+        let found = model.pace();
+        assert!(found.finest_s < found.step_s, "{found:?}");
+        let run = &recording.runs[0];
+        let all = |model: &MotionModel| {
+            let mut out = vec![0.0; run.len()];
+            model.predict(run, &shared, &[], &mut out).unwrap();
+            (out, evaluations(model, run, &shared, &[]))
+        };
+        let (cut, cost) = all(&model);
+        model.set_pace(Pace::fixed(Method::Kutta, 0.01 / 256.0));
+        let (fine, _) = all(&model);
+        let worst = cut.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 2e-5, "{worst}");
+        // As many steps as rows, and a few more.
+        assert!(cost < 9 * run.len(), "{cost}");
+    }
 }

@@ -21,6 +21,71 @@ struct Linear {
     outputs: DMatrix<f64>,
     /// How what may be acted on changes the derivatives.
     pushes: Vec<DVector<f64>>,
+    /// The states.
+    states: Vec<f64>,
+}
+
+/// How a deviation of the states goes on from row to row, and what it does to the outputs.
+struct Propagation {
+    states: usize,
+    /// Row by row, for each half of the time since the row before: what a deviation becomes, state by state, and last what a unit of the
+    /// amount adds.
+    halves: Vec<[Vec<f64>; 2]>,
+    /// Row by row, what the outputs read of a deviation, output by output.
+    outputs: Vec<Vec<f64>>,
+}
+
+impl Propagation {
+    /// Under a unit of what may be acted on.
+    fn new(run: &Run, linear: &[Linear], acted_on: usize) -> Self {
+        let states = linear.first().map_or(0, |first| first.states.len());
+        let half = |at: &Linear, time_s: f64| -> Vec<f64> {
+            let (mut all, mut push) = (DMatrix::identity(states, states), DVector::zeros(states));
+            let mut term = DMatrix::identity(states, states) * time_s;
+            for k in 1..=TERMS {
+                push += &term * &at.pushes[acted_on];
+                let next = &at.rates * &term;
+                all += &next;
+                term = next * (time_s / (k + 1) as f64);
+            }
+            (0..states)
+                .flat_map(|i| all.row(i).iter().copied().chain([push[i]]).collect::<Vec<_>>())
+                .collect()
+        };
+        let halves = |row: usize| {
+            let half_s = 0.5 * (run.inputs[0][row] - run.inputs[0][row - 1]);
+            [half(&linear[row - 1], half_s), half(&linear[row], half_s)]
+        };
+        let outputs =
+            |at: &Linear| at.outputs.row_iter().flat_map(|r| r.iter().copied().collect::<Vec<_>>()).collect();
+        Self {
+            states,
+            halves: (1..linear.len()).map(halves).collect(),
+            outputs: linear.iter().map(outputs).collect(),
+        }
+    }
+
+    /// What an amount at each row does to each of so many outputs, channel after channel.
+    fn deviation(&self, amounts: &[f64], outputs: usize) -> Vec<f64> {
+        let n = amounts.len();
+        let mut out = vec![0.0; outputs * n];
+        let Some(first) = amounts.iter().position(|a| *a != 0.0) else { return out };
+        let (mut deviation, mut before) = (vec![0.0; self.states], vec![0.0; self.states]);
+        for row in first.max(1)..n {
+            for (half, amount) in self.halves[row - 1].iter().zip([amounts[row - 1], amounts[row]]) {
+                before.copy_from_slice(&deviation);
+                for (to, weights) in deviation.iter_mut().zip(half.chunks(self.states + 1)) {
+                    let (of_states, of_amount) = weights.split_at(self.states);
+                    *to = of_states.iter().zip(&before).map(|(w, d)| w * d).sum::<f64>()
+                        + of_amount[0] * amount;
+                }
+            }
+            for (c, weights) in self.outputs[row].chunks(self.states).enumerate() {
+                out[c * n + row] = weights.iter().zip(&deviation).map(|(w, d)| w * d).sum();
+            }
+        }
+        out
+    }
 }
 
 impl MotionModel {
@@ -64,6 +129,7 @@ impl MotionModel {
                 rates: DMatrix::zeros(states, states),
                 outputs: DMatrix::zeros(outputs, states),
                 pushes: vec![DVector::zeros(states); joints + levels.len()],
+                states: x[..states].to_vec(),
             };
             let mut direction = vec![0.0; x.len()];
             for (k, push) in here.pushes.iter_mut().enumerate() {
@@ -98,44 +164,6 @@ impl MotionModel {
         })
         .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
         Ok(all)
-    }
-
-    /// What an amount at each row, of what may be acted on, does to the outputs, channel after channel.
-    fn deviation(&self, run: &Run, linear: &[Linear], acted_on: usize, amounts: &[f64]) -> Vec<f64> {
-        let (states, outputs) = (self.equations().states.len(), self.equations().outputs.len());
-        let n = run.len();
-        let mut out = vec![0.0; outputs * n];
-        let Some(first) = amounts.iter().position(|a| *a != 0.0) else { return out };
-        let mut deviation = DVector::zeros(states);
-        for row in first.max(1)..linear.len() {
-            let half_s = 0.5 * (run.inputs[0][row] - run.inputs[0][row - 1]);
-            for k in [row - 1, row] {
-                let push = (&linear[k].pushes[acted_on], amounts[k]);
-                moved(&mut deviation, &linear[k].rates, push, half_s);
-            }
-            let read = &linear[row].outputs * &deviation;
-            for (c, value) in read.iter().enumerate() {
-                out[c * n + row] = *value;
-            }
-        }
-        out
-    }
-}
-
-/// How a deviation moves on over a time under constant rates of change of it.
-fn moved(
-    deviation: &mut DVector<f64>,
-    rates: &DMatrix<f64>,
-    (push, amount): (&DVector<f64>, f64),
-    time_s: f64,
-) {
-    let mut term = rates * &*deviation;
-    term.axpy(amount, push, 1.0);
-    term *= time_s;
-    *deviation += &term;
-    for k in 2..=TERMS {
-        term = rates * term * (time_s / k as f64);
-        *deviation += &term;
     }
 }
 
@@ -210,19 +238,15 @@ impl LocalCauses for MotionModel {
         let state = all_acted_on[acted_on].1;
         let mut all = vec![Vec::with_capacity(runs.len()); amounts.len()];
         for (k, (run, nuisance)) in runs.iter().zip(nuisance).enumerate() {
-            let of_run: Vec<&Vec<f64>> = amounts.iter().map(|choice| &choice[k]).collect();
-            let acts = of_run.iter().any(|amounts| amounts.iter().any(|a| *a != 0.0));
+            let acts = amounts.iter().any(|choice| choice[k].iter().any(|a| *a != 0.0));
             let linear = if acts { self.linear(run, shared, nuisance)? } else { Vec::new() };
-            let against: Option<Vec<f64>> = (acts && resists)
-                .then(|| self.course(run, shared, nuisance))
-                .transpose()
-                .map_err(|reason| PredictError { run: run.label.clone(), reason })?
-                .map(|course| course.states[state].iter().map(|v| -v).collect());
-            for (all, amounts) in all.iter_mut().zip(of_run) {
-                let force: Option<Vec<f64>> = against
-                    .as_ref()
-                    .map(|against| amounts.iter().zip(against).map(|(a, by)| a * by).collect());
-                all.push(self.deviation(run, &linear, acted_on, force.as_ref().unwrap_or(amounts)));
+            let propagation = Propagation::new(run, &linear, acted_on);
+            for (all, choice) in all.iter_mut().zip(amounts) {
+                let mut force = choice[k].clone();
+                if resists {
+                    force.iter_mut().zip(&linear).for_each(|(a, at)| *a *= -at.states[state]);
+                }
+                all.push(propagation.deviation(&force, run.outputs.len()));
             }
         }
         Ok(all)

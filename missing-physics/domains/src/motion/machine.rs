@@ -84,14 +84,24 @@ pub(super) struct Driven<'a, T> {
     /// Registers of the rates' tape and of the outputs': states, inputs, parameters and time first, as expressions name them.
     pub(super) values: Vec<T>,
     pub(super) seen: Vec<T>,
-    /// Room for derivatives under another command.
+    /// Registers of the rates' tape under another command, and the derivatives there.
+    pub(super) idle: Vec<T>,
     pub(super) other: Vec<T>,
+    /// By joint: operations of the rates' tape that its drive enters.
+    pub(super) driven: Vec<Vec<usize>>,
+    /// Time and pieces of inputs for which the rates' registers hold.
+    pub(super) looked: (f64, Vec<usize>),
 }
 
 impl<T: Number> Driven<'_, T> {
-    /// Puts states, inputs and time where expressions find them, and computes the equations' derivatives.
+    /// Puts states, inputs and time where expressions find them, and computes the equations' derivatives, unless they are there.
     fn look(&mut self, t: f64, x: &[T]) {
         let states = self.equations.states.len();
+        if self.looked.0 == t && self.looked.1 == self.begun && self.values[..states] == x[..states] {
+            return;
+        }
+        self.looked.0 = t;
+        self.looked.1.clone_from(&self.begun);
         self.values[..states].copy_from_slice(&x[..states]);
         for (k, signal) in self.signals.iter().enumerate() {
             self.values[states + k] = signal.value(self.begun[k], t);
@@ -126,33 +136,34 @@ impl<T: Number> Driven<'_, T> {
         }
     }
 
-    /// The equations' derivatives where an input has another value, into `other`.
-    fn under(&mut self, input: usize, value: T) {
-        let place = self.equations.input_name(input);
-        let before = std::mem::replace(&mut self.values[place], value);
-        self.equations.rates.run(&mut self.values);
-        for (state, other) in self.other.iter_mut().enumerate().take(self.equations.states.len()) {
-            *other = self.equations.rates.result(&self.values, state);
+    /// The equations' derivatives where a joint's drive has another value, into `other`.
+    fn under(&mut self, joint: usize, drive: usize, value: T) {
+        let equations = self.equations;
+        self.idle.copy_from_slice(&self.values);
+        self.idle[equations.input_name(drive)] = value;
+        equations.rates.again(&self.driven[joint], &mut self.idle);
+        for (state, other) in self.other.iter_mut().enumerate().take(equations.states.len()) {
+            *other = equations.rates.result(&self.idle, state);
         }
-        self.values[place] = before;
-        self.equations.rates.run(&mut self.values);
     }
 
     /// The force by which its drive moves a joint: the derivative of its velocity less what it were without the drive (a command of
     /// zero, or of the position where the joint is).
-    fn load(&mut self, joint: &Joint) -> T {
-        let Some(drive) = joint.drive else { return T::from(0.0) };
-        let idle = if joint.follows { self.values[joint.position] } else { T::from(0.0) };
-        self.under(drive, idle);
-        self.rate(joint.velocity) - self.other[joint.velocity]
+    fn load(&mut self, joint: usize) -> T {
+        let Joint { drive, follows, position, velocity, .. } = self.equations.joints[joint];
+        let Some(drive) = drive else { return T::from(0.0) };
+        let idle = if follows { self.values[position] } else { T::from(0.0) };
+        self.under(joint, drive, idle);
+        self.rate(velocity) - self.other[velocity]
     }
 
     /// By how much a unit of a joint's force changes other states' derivatives: in proportion to what its drive does there. The shares
     /// stand in `other` for the states that the drive acts on.
-    fn shares(&mut self, joint: &Joint) {
+    fn shares(&mut self, number: usize) {
+        let joint = &self.equations.joints[number];
         let Some(drive) = joint.drive else { return };
         let now = self.values[self.equations.input_name(drive)];
-        self.under(drive, now + 1.0);
+        self.under(number, drive, now + 1.0);
         let own = self.other[joint.velocity] - self.rate(joint.velocity);
         for &state in &joint.reacts {
             let change = self.other[state] - self.rate(state);
@@ -163,12 +174,12 @@ impl<T: Number> Driven<'_, T> {
 
 impl<T: Number> Driven<'_, T> {
     /// By how much each state's derivative changes with a force on a joint, whose velocity's changes by one.
-    pub(super) fn pushed(&mut self, joint: usize, t: f64, x: &[T], direction: &mut [T]) {
-        let joint = &self.equations.joints[joint];
+    pub(super) fn pushed(&mut self, number: usize, t: f64, x: &[T], direction: &mut [T]) {
+        let joint = &self.equations.joints[number];
         direction.fill(T::from(0.0));
         if !joint.reacts.is_empty() {
             self.look(t, x);
-            self.shares(joint);
+            self.shares(number);
             joint.reacts.iter().for_each(|&state| direction[state] = self.other[state]);
         }
         direction[joint.velocity] = T::from(1.0);
@@ -204,7 +215,7 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
                 let force = self.laws[k].force(x[joint.position], v, x, &self.beyond);
                 rates[joint.velocity] += force;
                 if !joint.reacts.is_empty() {
-                    self.shares(joint);
+                    self.shares(k);
                     joint.reacts.iter().for_each(|&state| rates[state] += self.other[state] * force);
                 }
                 for law in &self.laws[k].forces {
@@ -240,7 +251,7 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
             T::from(0.0)
         } else {
             self.look(t, x);
-            self.load(joint)
+            self.load(k)
         };
         let mut resistance = dry.resistance(forward, x[joint.velocity], load);
         if let Some(inertia) = self.laws[k].inertia {

@@ -9,7 +9,7 @@ use missing_physics::model::{
 };
 
 use super::effects::{Effects, Role};
-use super::equations::{Equations, Start};
+use super::equations::{Equations, Joint, Start};
 use super::machine::{Driven, Force};
 use super::scales::Scales;
 use super::setting::{Setting, Shared};
@@ -35,15 +35,25 @@ const RUBS: f64 = 0.1;
 /// How the motion is followed: by which method, in which steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pace {
+    /// The method of steps that are all as long.
     pub(super) method: Method,
     /// Largest step, s.
     pub(super) step_s: f64,
+    /// Steps are cut to this where they err by more than the states' sizes allow; as long as the largest, where none is cut.
+    pub(super) finest_s: f64,
+}
+
+impl Pace {
+    /// Steps that are all as long.
+    pub(super) fn fixed(method: Method, step_s: f64) -> Self {
+        Self { method, step_s, finest_s: step_s }
+    }
 }
 
 impl Default for Pace {
     /// For a model that predicts nothing yet.
     fn default() -> Self {
-        Self { method: Method::Kutta, step_s: 0.01 }
+        Self::fixed(Method::Kutta, 0.01)
     }
 }
 
@@ -178,6 +188,18 @@ impl MotionModel {
         self.pace = pace;
     }
 
+    /// Sets the sizes of the states by which the errors of steps are judged.
+    pub(super) fn set_state_sizes(&mut self, sizes: Vec<f64>) {
+        self.scales.states = sizes;
+    }
+
+    /// The equations alone with every state free at a run's start, followed as this model is.
+    pub(super) fn freed(&self) -> Self {
+        let mut free = Self::baseline(self.equations.free(), self.pace);
+        free.scales.states.clone_from(&self.scales.states);
+        free
+    }
+
     /// How the motion is followed.
     pub(super) fn pace(&self) -> Pace {
         self.pace
@@ -199,14 +221,15 @@ impl MotionModel {
         self.start(run, nuisance, self.equations.states.len())
     }
 
-    /// Leads the machine through a run: `at_row` gets it at each row, the time and the states.
+    /// Leads the machine through a run: `at_row` gets it at each row, the time and the states. How many evaluations of the equations
+    /// that took.
     pub(super) fn along(
         &self,
         run: &Run,
         shared: &[f64],
         nuisance: &[f64],
         mut at_row: impl FnMut(&mut Driven<'_, f64>, f64, &[f64]),
-    ) -> Result<(), String> {
+    ) -> Result<usize, String> {
         let mut setting = self.setting(run, shared, nuisance, &[]);
         // A row is where the machine is then, whatever its sensors are late by.
         setting.delays.fill(None);
@@ -258,14 +281,14 @@ impl MotionModel {
     /// The finest step under these laws, s: the model's, halved until it resolves them.
     fn step_s<T>(&self, setting: &Setting<T>) -> f64 {
         let wanted = (setting.shortest_s / STEPS_IN_SHORTEST).max(FINEST_FOR_LAWS * self.scales.step_s);
-        let halvings = (self.pace.step_s / wanted).log2().ceil();
-        self.pace.step_s * 0.5_f64.powi(halvings.max(0.0) as i32)
+        let halvings = (self.pace.finest_s / wanted).log2().ceil();
+        self.pace.finest_s * 0.5_f64.powi(halvings.max(0.0) as i32)
     }
 
-    /// What follows the motion under these laws: steps of the model's pace, and where laws change faster than these, as short as the error
-    /// of each asks for.
+    /// What follows the motion under these laws: steps of the model's pace, and where laws change faster than these or the pace cuts
+    /// steps, as short as the error of each asks for.
     fn integrator<T: Number>(&self, setting: &Setting<T>, states: usize) -> Integrator<T> {
-        let Pace { method, step_s } = self.pace;
+        let Pace { method, step_s, .. } = self.pace;
         let finest_s = self.step_s(setting);
         if finest_s >= step_s {
             return Integrator::new(method, states, step_s);
@@ -281,16 +304,16 @@ impl MotionModel {
     }
 
     /// Leads a machine through a run; `at_row` is called wherever a row is read: of all outputs without a delay (shift 0), or of one
-    /// output (its number is one less than the shift).
+    /// output (its number is one less than the shift). How many evaluations of the equations that took.
     fn follow<T: Number>(
         &self,
         run: &Run,
         setting: Setting<T>,
         nuisance: &[T],
         mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading, &[T]),
-    ) -> Result<(), String> {
+    ) -> Result<usize, String> {
         let times = &run.inputs[0];
-        let Some(&begin) = times.first() else { return Ok(()) };
+        let Some(&begin) = times.first() else { return Ok(0) };
         let states = self.equations.states.len() + setting.further_states;
         let mut integrator = self.integrator(&setting, states);
         let mut x = self.start(run, nuisance, states);
@@ -332,7 +355,7 @@ impl MotionModel {
                 integrator.nudge(&mut machine, t, &mut x, -late);
             }
         }
-        Ok(())
+        Ok(integrator.evaluations())
     }
 
     /// The same in any numbers, with room for as many states.
@@ -376,10 +399,14 @@ impl MotionModel {
         seen[..equations.names()].copy_from_slice(&values[..equations.names()]);
         equations.rates.prepare(&mut values);
         equations.readings.prepare(&mut seen);
+        let rates = &equations.rates;
+        let of_drive = |joint: &Joint| joint.drive.map(|drive| rates.behind(equations.input_name(drive)));
         Driven {
             equations,
             laws: setting.laws,
             leaks: setting.leaks,
+            looked: (f64::NAN, Vec::new()),
+            driven: equations.joints.iter().map(|joint| of_drive(joint).unwrap_or_default()).collect(),
             begun: vec![0; signals.len()],
             signals,
             pace: setting.pace,
@@ -388,6 +415,7 @@ impl MotionModel {
             ceilings: setting.ceilings,
             beyond: vec![false; setting.edges.len()],
             edges: setting.edges,
+            idle: values.clone(),
             values,
             seen,
             other: vec![T::from(0.0); equations.states.len()],

@@ -67,7 +67,7 @@ fn fitted(equations: Equations, alone: &Recording, places: &[usize]) -> Option<(
     let fit = match length {
         None => least_squares(&model, alone, &shared),
         Some(length) => {
-            let free = MotionModel::baseline(model.equations().free(), model.pace());
+            let free = model.freed();
             least_squares(&free, &cut(alone, length), &shared)
         }
     };

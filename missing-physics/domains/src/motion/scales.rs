@@ -39,7 +39,7 @@ pub(super) fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// Root mean square, at least a little above zero.
-fn rms(values: &[f64]) -> f64 {
+pub(super) fn rms(values: &[f64]) -> f64 {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let mean = finite.iter().map(|v| v * v).sum::<f64>() / finite.len().max(1) as f64;
     if mean > 0.0 { mean.sqrt() } else { 1.0 }

@@ -219,7 +219,7 @@ mod tests {
         };
         let mut scales = Scales::of_example(&all);
         (scales.step_s, scales.joints[0].force) = (0.005, 20.0);
-        let pace = |step_s| Pace { method: Method::Kutta, step_s };
+        let pace = |step_s| Pace::fixed(Method::Kutta, step_s);
         let mut model = MotionModel::baseline(all, pace(0.005)).full(scales, &starts, None);
         let spec = model.spec();
         let (mut shared, nuisance) = (spec.starts(Scope::Shared), spec.starts(Scope::PerRun));

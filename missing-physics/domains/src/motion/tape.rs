@@ -28,6 +28,19 @@ enum Op {
     Two(Two, usize, usize),
 }
 
+impl Op {
+    /// The registers that it reads.
+    fn operands(self) -> impl Iterator<Item = usize> {
+        let (first, second) = match self {
+            Self::Constant(_) => (None, None),
+            Self::Negate(a) | Self::Shift(a, _) | Self::Scale(a, _) | Self::Over(_, a) => (Some(a), None),
+            Self::Whole(a, _) | Self::One(_, a) => (Some(a), None),
+            Self::Two(_, a, b) => (Some(a), Some(b)),
+        };
+        first.into_iter().chain(second)
+    }
+}
+
 /// Expressions as a list of operations on registers: the first of these hold what names stand for.
 #[derive(Debug, Clone)]
 pub(super) struct Tape {
@@ -59,12 +72,7 @@ impl Tape {
         }
         let mut same: Vec<bool> = stays.to_vec();
         for (k, op) in tape.ops.iter().enumerate() {
-            let stays = match *op {
-                Op::Constant(_) => true,
-                Op::Negate(a) | Op::Shift(a, _) | Op::Scale(a, _) | Op::Over(_, a) => same[a],
-                Op::Whole(a, _) | Op::One(_, a) => same[a],
-                Op::Two(_, a, b) => same[a] && same[b],
-            };
+            let stays = op.operands().all(|a| same[a]);
             same.push(stays);
             if stays { &mut tape.still } else { &mut tape.moving }.push(k);
         }
@@ -148,6 +156,22 @@ impl Tape {
     /// Computes all else.
     pub(super) fn run<T: Number>(&self, registers: &mut [T]) {
         self.moving.iter().for_each(|&k| self.compute(k, registers));
+    }
+
+    /// The operations that a name enters, in order.
+    pub(super) fn behind(&self, name: usize) -> Vec<usize> {
+        let mut enters = vec![false; self.names];
+        enters[name] = true;
+        for op in &self.ops {
+            let behind = op.operands().any(|a| enters[a]);
+            enters.push(behind);
+        }
+        (0..self.ops.len()).filter(|k| enters[self.names + k]).collect()
+    }
+
+    /// Computes some operations, where all others are.
+    pub(super) fn again<T: Number>(&self, operations: &[usize], registers: &mut [T]) {
+        operations.iter().for_each(|&k| self.compute(k, registers));
     }
 
     #[inline]

@@ -102,9 +102,10 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
     resolve(&mut model, &recording, &starts)?;
     let (mut fitted, followed) = windows(&model, &recording, starts)?;
     if let Some(length) = followed {
-        let mut free = MotionModel::baseline(model.equations().free(), model.pace());
+        let mut free = model.freed();
         resolve(&mut free, &cut(&recording, length), &fitted)?;
         model.set_pace(free.pace());
+        model.set_state_sizes(free.state_sizes().to_vec());
     } else {
         resolve(&mut model, &recording, &fitted)?;
         let by_the_rows = steps.then(|| by_the_rows(&mut model, &recording, &fitted)).flatten();
@@ -126,7 +127,7 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
         let experiments = experiments(&model, &recording, times);
         return Ok(Tuned { model, recording, experiments, remarks });
     };
-    let free = MotionModel::baseline(model.equations().free(), model.pace());
+    let free = model.freed();
     let whole = recording;
     let recording = cut(&whole, length);
     let scales = sizes(&free, &recording, &fitted)?;
@@ -145,7 +146,7 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
 /// The parameters fitted then.
 fn by_the_rows(model: &mut MotionModel, recording: &Recording, shared: &[f64]) -> Option<Vec<f64>> {
     let exact = model.pace();
-    let rows = Pace { method: Method::Kutta, step_s: median_step(recording) };
+    let rows = Pace::fixed(Method::Kutta, median_step(recording));
     if exact == rows {
         return None;
     }

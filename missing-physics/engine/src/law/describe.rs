@@ -27,7 +27,8 @@ pub(crate) fn extended(
     for nuisance in &mut near.nuisance {
         nuisance.extend_from_slice(&wide.nuisance.start[model.inner_nuisance..]);
     }
-    let Ok(fitted) = candidate(&wide, rule, &start.set, &[], &near, &[]) else { return Ok(None) };
+    // What is added is off at first, and the rest where it was without it.
+    let Ok(fitted) = candidate(&wide, rule, &start.set, &[], &near, &[vec![]]) else { return Ok(None) };
     let Ok(score) = held_out(&wide, &fitted) else { return Ok(None) };
     if !improves(seen, &score) {
         return Ok(None);

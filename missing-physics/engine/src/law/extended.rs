@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::adequacy::linearised::DEGREE;
-use crate::data::{Recording, Run};
+use crate::data::Recording;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
 use crate::law::added::AddedLaw;
@@ -18,8 +18,8 @@ const LEAST_SPAN: f64 = 0.1;
 
 /// A model with an empirical term added to its channels.
 pub(crate) struct Extended<'a> {
-    inner: &'a dyn Model,
-    spec: Spec,
+    pub(super) inner: &'a dyn Model,
+    pub(super) spec: Spec,
     pub(crate) inner_shared: usize,
     pub(crate) inner_nuisance: usize,
     pub(crate) channels: usize,
@@ -229,69 +229,6 @@ fn curve(unit: &str, largest: f64) -> Vec<Parameter> {
 /// Coefficients of a polynomial without its constant.
 fn powers(unit: &str) -> Vec<Parameter> {
     (1..=DEGREE + 1).map(|d| free(format!("c{d}"), unit, 1.0, f64::INFINITY)).collect()
-}
-
-impl Model for Extended<'_> {
-    fn spec(&self) -> &Spec {
-        &self.spec
-    }
-
-    fn predict(
-        &self,
-        run: &Run,
-        shared: &[f64],
-        nuisance: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), PredictError> {
-        self.inner.predict(run, &shared[..self.inner_shared], &nuisance[..self.inner_nuisance], out)?;
-        let n = run.len();
-        match &self.term {
-            Added::Periodic => {
-                let rows: Vec<f64> = match self.noise_along.and_then(|v| run.inputs.get(v)) {
-                    Some(column) => column.clone(),
-                    None => (0..n).map(|i| i as f64).collect(),
-                };
-                for (i, position) in rows.iter().enumerate() {
-                    let (sin, cos) = (shared[self.inner_shared] * position).sin_cos();
-                    for c in 0..self.channels {
-                        let at = self.inner_nuisance + 2 * c;
-                        out[c * n + i] += nuisance[at] * cos + nuisance[at + 1] * sin;
-                    }
-                }
-            }
-            Added::Power { channel, variable, largest } => {
-                let exponent = shared[self.inner_shared];
-                for (i, v) in run.inputs[*variable].iter().enumerate().filter(|(_, v)| **v > 0.0) {
-                    out[channel * n + i] *= (v / largest).powf(exponent);
-                }
-            }
-            Added::Reading { channel, largest } => {
-                for value in &mut out[channel * n..(channel + 1) * n] {
-                    *value += polynomial(&shared[self.inner_shared..], *value / largest);
-                }
-            }
-            Added::Smooth { channel, variable, centre, half_width } => {
-                for (i, v) in run.inputs[*variable].iter().enumerate() {
-                    out[channel * n + i] +=
-                        polynomial(&shared[self.inner_shared..], (v - centre) / half_width);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn relative_step(&self) -> f64 {
-        self.inner.relative_step()
-    }
-
-    fn nuisance_start(&self, run: &Run, nuisance: &mut [f64]) {
-        self.inner.nuisance_start(run, &mut nuisance[..self.inner_nuisance]);
-    }
-}
-
-/// `c1 x + c2 x^2 + ...`.
-fn polynomial(coefficients: &[f64], x: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, c| (sum + c) * x)
 }
 
 /// The sum of squares, in units of the noise, that an oscillation of a frequency takes from a residual; amplitude and phase are of each

@@ -7,5 +7,6 @@ pub(crate) mod added;
 mod describe;
 pub(crate) mod extended;
 pub(crate) mod found;
+mod prediction;
 pub(crate) mod search;
 mod sparse;

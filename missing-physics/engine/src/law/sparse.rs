@@ -87,7 +87,7 @@ fn selected(
             .filter_map(|t| {
                 let terms: Vec<usize> = chosen.iter().copied().chain([t]).collect();
                 let near = current.as_ref().map_or(&start.fit, |c| &c.0.fit);
-                let fitted = candidate(problem, rule, &start.set, &terms, near, &[]).ok()?;
+                let fitted = candidate(problem, rule, &start.set, &terms, near, &[vec![]]).ok()?;
                 let score = held_out(problem, &fitted).ok()?;
                 (fitted.ruled_out.is_none() && fitted.evidence.is_finite()).then_some((t, fitted, score))
             })

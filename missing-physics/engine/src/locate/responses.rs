@@ -192,13 +192,15 @@ impl Responses {
         let edges = bins.len() + 1;
         let runs = problem.rows.len();
         let mut columns: Vec<Vec<Vec<f64>>> = vec![Vec::with_capacity(POWERS * edges); runs];
-        for power in 0..POWERS {
+        let only = |power: usize, bin: usize| amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
+        let all_bins: Vec<Vec<Vec<f64>>> =
+            (0..POWERS).flat_map(|power| (0..bins.len()).map(move |bin| only(power, bin))).collect();
+        let mut by_bin = unknown.responses(problem, fit, sigma, component, &all_bins)?.into_iter();
+        drop(all_bins);
+        for _ in 0..POWERS {
             let mut sums: Vec<Vec<f64>> = projection.residual.iter().map(|r| vec![0.0; r.len()]).collect();
-            let only = |bin: usize| amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
-            let all_bins: Vec<Vec<Vec<f64>>> = (0..bins.len()).map(only).collect();
-            let by_bin = unknown.responses(problem, fit, sigma, component, &all_bins)?;
             columns.iter_mut().zip(&sums).for_each(|(all, sum)| all.push(sum.clone()));
-            for moved in by_bin {
+            for moved in by_bin.by_ref().take(bins.len()) {
                 for (run, (sum, mut moved)) in sums.iter_mut().zip(moved).enumerate() {
                     projection.beside_nuisance(run, &mut moved);
                     sum.iter_mut().zip(moved).for_each(|(s, m)| *s += m);
