@@ -33,8 +33,8 @@ impl Extended<'_> {
                     columns.simulated.push(first + k);
                     inner_free[list].push(slot);
                 } else {
-                    let own = if list == 0 { &mut columns.shared } else { &mut columns.nuisance };
-                    own.push((first + k, slot - inner));
+                    let of_term = if list == 0 { &mut columns.shared } else { &mut columns.nuisance };
+                    of_term.push((first + k, slot - inner));
                 }
             }
         }
@@ -70,40 +70,10 @@ impl Model for Extended<'_> {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.inner.predict(run, &shared[..self.inner_shared], &nuisance[..self.inner_nuisance], out)?;
-        let n = run.len();
-        match &self.term {
-            Added::Periodic => {
-                for (i, position) in self.positions(run).iter().enumerate() {
-                    let (sin, cos) = (shared[self.inner_shared] * position).sin_cos();
-                    for c in 0..self.channels {
-                        let at = self.inner_nuisance + 2 * c;
-                        out[c * n + i] += nuisance[at] * cos + nuisance[at + 1] * sin;
-                    }
-                }
-            }
-            Added::Power { channel, variable, largest } => {
-                let exponent = shared[self.inner_shared];
-                for (i, v) in run.inputs[*variable].iter().enumerate().filter(|(_, v)| **v > 0.0) {
-                    out[channel * n + i] *= (v / largest).powf(exponent);
-                }
-            }
-            Added::Reading { channel, largest } => {
-                for value in &mut out[channel * n..(channel + 1) * n] {
-                    *value += polynomial(&shared[self.inner_shared..], *value / largest);
-                }
-            }
-            Added::Smooth { channel, variable, centre, half_width } => {
-                for (i, v) in run.inputs[*variable].iter().enumerate() {
-                    out[channel * n + i] +=
-                        polynomial(&shared[self.inner_shared..], (v - centre) / half_width);
-                }
-            }
-        }
-        Ok(())
+        self.jacobian(run, shared, nuisance, &[], &[], out, &mut [])
     }
 
-    /// The derivatives of the simulation, and by the chain rule those of what is added.
+    /// The simulation with the term added, the derivatives of the simulation, and by the chain rule those of the term.
     fn jacobian(
         &self,
         run: &Run,
