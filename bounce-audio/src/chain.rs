@@ -1,4 +1,5 @@
-//! The chain that the impacts of a drop form: flights shorten by a steady ratio. A sound that does not fit it is none of the ball's.
+//! The chain that the impacts of a drop form: flights shorten by a steady ratio. A sound that does not fit it is none of the ball's, but a
+//! ratio may change once (a softer place of the table, another ball) where the chain goes on behind it.
 
 use crate::missed::parts;
 
@@ -15,7 +16,13 @@ pub struct Candidate {
 /// errors of times.
 const SPREAD: f64 = 0.04;
 /// A flight that is off by more is none of the chain's.
-const MOST_OFF: f64 = 0.12;
+const MOST_OFF: f64 = 0.45;
+/// What a flight that is off costs at most, in impacts: more than one, so that a single sound behind it is none of the ball's.
+const BREAK_COSTS: f64 = 1.25;
+/// One sigma of the logarithm of a drop's restitution about that of all drops: another ball, another place.
+const BETWEEN_DROPS: f64 = 0.1;
+/// What a drop's restitution costs at most, in impacts: a long chain is one, whatever its ratio.
+const ANOTHER_COSTS: f64 = 2.0;
 /// Most impacts in a row that may have gone unheard, and what each of them costs, in impacts.
 const MOST_UNHEARD: usize = 3;
 const UNHEARD_COSTS: f64 = 0.5;
@@ -32,24 +39,34 @@ const FEWEST: usize = 3;
 /// Sounds among which a chain is looked for: the loudest.
 const MOST: usize = 120;
 
-/// Which sounds of each drop (rising times) are the ball's: those of the longest chains that one restitution makes of all drops. All
+/// Which sounds of each drop (rising times) are the ball's: those of the longest chains that about one restitution makes of all drops. All
 /// of a drop in which no three form a chain; of more than 120 sounds in a drop the loudest are looked at.
 pub fn impacts(drops: &[Vec<Candidate>]) -> Vec<Vec<usize>> {
-    let whole = |drop: &Vec<Candidate>| (0..drop.len()).collect::<Vec<usize>>();
     let steps = ((RESTITUTIONS[1] - RESTITUTIONS[0]) / STEP).round() as usize;
-    let mut best: (f64, Vec<Vec<usize>>) = (f64::NEG_INFINITY, drops.iter().map(whole).collect());
-    for step in 0..=steps {
+    let of_step = |step: usize| -> Vec<(f64, Vec<usize>)> {
         let restitution = (RESTITUTIONS[0] + STEP * step as f64).exp();
-        let chains: Vec<(f64, Vec<usize>)> = drops.iter().map(|drop| longest(drop, restitution)).collect();
-        let worth: f64 = chains.iter().map(|c| c.0).sum();
-        if worth > best.0 {
-            let kept = |(chain, drop): ((f64, Vec<usize>), &Vec<Candidate>)| {
-                if chain.1.len() < FEWEST { whole(drop) } else { chain.1 }
-            };
-            best = (worth, chains.into_iter().zip(drops).map(kept).collect());
-        }
-    }
-    best.1
+        drops.iter().map(|drop| longest(drop, restitution)).collect()
+    };
+    let by_step: Vec<Vec<(f64, Vec<usize>)>> = (0..=steps).map(of_step).collect();
+    let worth = |chains: &[(f64, Vec<usize>)]| chains.iter().map(|chain| chain.0).sum::<f64>();
+    // The first of those that are worth as much.
+    let first_best = |worths: &mut dyn Iterator<Item = f64>| {
+        worths
+            .enumerate()
+            .fold((0, f64::NEG_INFINITY), |best, (at, w)| if w > best.1 { (at, w) } else { best })
+            .0
+    };
+    let common = first_best(&mut by_step.iter().map(|chains| worth(chains)));
+    let of_drop = |(number, drop): (usize, &Vec<Candidate>)| {
+        let away = |step: usize| STEP * (step as f64 - common as f64) / BETWEEN_DROPS;
+        let mut worths = by_step
+            .iter()
+            .enumerate()
+            .map(|(step, chains)| chains[number].0 - (0.5 * away(step).powi(2)).min(ANOTHER_COSTS));
+        let (_, chain) = &by_step[first_best(&mut worths)][number];
+        if chain.len() < FEWEST { (0..drop.len()).collect() } else { chain.clone() }
+    };
+    drops.iter().enumerate().map(of_drop).collect()
 }
 
 /// The end of a chain: two sounds in a row, with so many impacts unheard between them.
@@ -97,7 +114,8 @@ fn longest(drop: &[Candidate], restitution: f64) -> (f64, Vec<usize>) {
                 for (at, before) in ends[from].iter().enumerate() {
                     let last = parts(drop[from].t_s - drop[before.from].t_s, before.unheard, restitution).1;
                     let off = (first / (restitution * last)).ln();
-                    let gains = before.worth + worth(to) - costs - 0.5 * (off / SPREAD).powi(2);
+                    let gains =
+                        before.worth + worth(to) - costs - (0.5 * (off / SPREAD).powi(2)).min(BREAK_COSTS);
                     if off.abs() < MOST_OFF && gains > end.worth {
                         (end.worth, end.before) = (gains, Some(at));
                     }
@@ -193,6 +211,35 @@ mod tests {
             assert_eq!(impacts(&[heard.clone()]), [(0..9).collect::<Vec<_>>()], "{unheard}");
             let late = heard.split_off(2);
             assert_eq!(impacts(&[late, whole.clone()])[0], (0..7).collect::<Vec<_>>(), "{unheard}");
+        }
+    }
+
+    /// A softer place under one impact, and a softer ball in one drop: all are the ball's still, and a stray sound is not.
+    #[test]
+    fn a_ratio_may_change() {
+        let steady = drop(0.85, 7);
+        for softer in [0.6, 0.7, 0.95] {
+            for at in 2..5 {
+                let mut times: Vec<f64> = steady.iter().map(|s| s.t_s).collect();
+                let (mut flight, mut t_s) = (times[1] - times[0], times[1]);
+                for (k, time) in times.iter_mut().enumerate().skip(2) {
+                    flight *= if k == at + 1 { softer } else { 0.85 };
+                    t_s += flight;
+                    *time = t_s;
+                }
+                let changed: Vec<Candidate> =
+                    times.iter().zip(&steady).map(|(&t_s, s)| Candidate { t_s, ..*s }).collect();
+                let whole: Vec<usize> = (0..7).collect();
+                assert_eq!(
+                    impacts(&[changed.clone(), steady.clone()]),
+                    [whole.clone(), whole.clone()],
+                    "{softer} {at}"
+                );
+                let (heard, stray) = with(changed, times[0] + 0.3 * (times[1] - times[0]), 2.0);
+                assert_eq!(impacts(&[heard, steady.clone()])[0], without(8, stray), "{softer} {at}");
+            }
+            let all = [drop(0.85, 7), drop(0.85, 7), drop(softer, 7)];
+            assert!(impacts(&all).iter().all(|kept| kept.len() == 7), "{softer}");
         }
     }
 

@@ -15,6 +15,8 @@ const FLIGHT: usize = 1;
 const MISREAD: usize = 2;
 const DIRECTION: usize = 3;
 const UNHEARD: usize = 4;
+/// What keeps a flight from ending: longer contact, a gust. By more than this another restitution, or an unheard impact, makes it longer.
+const LONGEST_DELAY_S: f64 = 0.02;
 /// The number of that unknown where there are times alone.
 const UNHEARD_IN_TIMES: usize = 2;
 
@@ -32,8 +34,8 @@ fn unheard() -> LocalUnknown {
 fn of_times() -> Vec<LocalUnknown> {
     vec![
         one("another restitution", "log_restitution", ""),
-        one("a longer flight", "duration_s", "s"),
-        one("a misread time", "late_s", "s"),
+        one("a longer flight", "duration_s", "s").at_most(LONGEST_DELAY_S),
+        one("a misread time", "late_s", "s").at_most(LONGEST_DELAY_S),
     ]
 }
 

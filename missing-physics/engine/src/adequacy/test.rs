@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::adequacy::linearised::Linearised;
 use crate::adequacy::null::draw;
-use crate::adequacy::omnibus::{omnibus, omnibus_tests};
+use crate::adequacy::omnibus::Omnibus;
 use crate::adequacy::tail::Tail;
 use crate::diagnosis::TestOutcome;
 use crate::fit::optimum::Fit;
@@ -47,12 +47,13 @@ pub(crate) fn test(
     let chosen = chosen_shapes(&linearised, &observed, |k| draw(problem, &truth, rule, seed ^ 0x5eed, k));
     linearised.play(&sorted(chosen.into_iter().chain(truth.iter().map(|&(shape, _)| shape)).chain([0])));
 
+    let omnibus = Omnibus::new(problem, rule);
     let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
         let reading = linearised.read(data);
         let left = linearised.residual(data, &reading);
         let white = linearised.whitened(&left, &reading);
         let mut all = reading.gains;
-        all.extend(omnibus(problem, &left, &white, rule));
+        all.extend(omnibus.statistics(&left, &white));
         all
     };
     let seen = statistics(&observed);
@@ -60,7 +61,7 @@ pub(crate) fn test(
         .into_par_iter()
         .map(|k| statistics(&draw(problem, &truth, rule, seed, k)))
         .collect();
-    let undirected = omnibus_tests(problem, rule);
+    let undirected = omnibus.tests();
     let first = seen.len() - undirected.len();
     let tail = |t: usize| {
         let draws = null.iter().map(|row| row[t]);

@@ -153,7 +153,8 @@ impl Scene<'_> {
         scan: &Scan<'_>,
     ) -> Result<Option<Found>, PredictError> {
         let (variable, of) = (&self.variables[along], &self.unknowns[unknown]);
-        let alone = of.is_model_s() && of.runs_are_alone();
+        // The rows that are likeliest are judged whatever size they ask for.
+        let alone = of.is_model_s() && of.runs_are_alone() && of.described.largest.is_infinite();
         if variable.error <= 0.0 || !alone || !are_events(self.problem) {
             return Ok(None);
         }
@@ -170,6 +171,7 @@ impl Scene<'_> {
             alone: self.unknowns[unknown].runs_are_alone(),
             rows: self.projection.rows,
             whole: self.projection.residual.iter().map(|run| dot(run, run)).sum(),
+            largest: self.unknowns[unknown].described.largest,
         }
     }
 

@@ -69,6 +69,8 @@ pub(crate) struct Scan<'a> {
     pub(crate) rows: f64,
     /// The sum of squares of all that is left.
     pub(crate) whole: f64,
+    /// The largest plausible size.
+    pub(crate) largest: f64,
 }
 
 impl Scan<'_> {
@@ -143,7 +145,10 @@ impl Scan<'_> {
         runs: impl Fn() -> Vec<bool>,
     ) {
         let price = form.sizes() as f64 * self.rows.ln();
-        let gains: Vec<f64> = effects.iter().map(Effect::gain).collect();
+        let plausible =
+            |e: &Effect| self.largest.is_infinite() || e.largest(form, self.bins, interval) <= self.largest;
+        let gains: Vec<f64> =
+            effects.iter().map(|e| if plausible(e) { e.gain() } else { f64::NEG_INFINITY }).collect();
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
             // What takes away more than there is takes it by rounding.
             let sound = gain <= self.whole * (1.0 + EVEN);
@@ -224,6 +229,9 @@ impl Scan<'_> {
                     // The number of ways to choose so many of the runs, and that number itself.
                     ways += (((self.runs - k) as f64) / (k + 1) as f64).ln();
                     let price = self.rows.ln() + scanned + 2.0 * (ways + (self.runs as f64).ln());
+                    if sum.size().abs() > self.largest {
+                        continue;
+                    }
                     let gain = sum.gain();
                     if best.as_ref().is_none_or(|b| gain - price > b.worth()) {
                         let mut runs = vec![false; self.runs];
@@ -248,7 +256,10 @@ impl Scan<'_> {
         let worth = |interval: (usize, usize), form: Form| {
             let of_component = |r: &Responses| {
                 let runs = r.by_run(self.bins, interval, form).into_iter().zip(&found.runs);
-                total(runs.filter(|(_, acts)| **acts).map(|(effect, _)| effect)).gain()
+                let all = total(runs.filter(|(_, acts)| **acts).map(|(effect, _)| effect));
+                let small =
+                    self.largest.is_infinite() || all.largest(form, self.bins, interval) <= self.largest;
+                if small { all.gain() } else { f64::NEG_INFINITY }
             };
             self.responses.iter().map(of_component).sum::<f64>() - price(form)
         };

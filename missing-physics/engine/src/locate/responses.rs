@@ -101,6 +101,26 @@ impl Effect {
         gain + (self.product[1] - part * self.product[0]).powi(2) / second
     }
 
+    /// Both sizes that fit best together; the second is zero where it is not determined.
+    fn sizes(&self) -> [f64; 2] {
+        let first = self.first();
+        let part = self.beside(self.cross, (0, 1)) / first;
+        let second = determined(self.beside(self.square[1], (1, 1)) - part * part * first, self.square[1]);
+        let bent = if second > 0.0 { (self.product[1] - part * self.product[0]) / second } else { 0.0 };
+        [self.product[0] / first - part * bent, bent]
+    }
+
+    /// The largest size of a form within an interval of bins, where it fits best; not a number where that is not determined.
+    pub(crate) fn largest(&self, form: Form, bins: &Bins, (from, to): (usize, usize)) -> f64 {
+        let [one, other] = self.sizes();
+        let (Form::Straight(edge) | Form::Bent(edge)) = form else { return one.abs() };
+        let width = (bins.edge(to) - bins.edge(from)) * if edge == Edge::Begin { 1.0 } else { -1.0 };
+        // At the far end, and where the parabola turns.
+        let turns = (-0.5 * one / other).clamp(width.min(0.0), width.max(0.0));
+        let at = |x: f64| (one * x + other * x * x).abs();
+        if other == 0.0 { at(width) } else { at(width).max(at(turns)) }
+    }
+
     /// The first size that fits best; not a number where it is not determined.
     pub(crate) fn size(&self) -> f64 {
         self.product[0] / self.first()

@@ -100,7 +100,7 @@ pub trait JointLimits: Sync {
 }
 
 /// One unknown more that may act at some rows only: a force on the equations of motion, the restitution of an impact, a stiffness.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LocalUnknown {
     /// What it is, for a person, with its article (`a force`).
     pub name: String,
@@ -108,18 +108,26 @@ pub struct LocalUnknown {
     pub components: Vec<Quantity>,
     /// Whether it acts at single rows only, each by an amount of its own (an impact that went unheard), and in no interval.
     pub at_single_rows: bool,
+    /// The largest size, in units of its components, that an interval may have; infinite where any is plausible.
+    pub largest: f64,
 }
 
 impl LocalUnknown {
     /// An unknown that may act within an interval.
     pub fn new(name: impl Into<String>, components: Vec<Quantity>) -> Self {
-        Self { name: name.into(), components, at_single_rows: false }
+        Self { name: name.into(), components, at_single_rows: false, largest: f64::INFINITY }
     }
 
     /// The same unknown, which acts at single rows only.
     #[must_use]
     pub fn at_single_rows(self) -> Self {
         Self { at_single_rows: true, ..self }
+    }
+
+    /// The same unknown, which is at most so large: beyond, what it does is no longer in proportion to its size, or is no longer it.
+    #[must_use]
+    pub fn at_most(self, largest: f64) -> Self {
+        Self { largest, ..self }
     }
 }
 

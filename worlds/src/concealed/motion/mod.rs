@@ -198,13 +198,31 @@ impl Machine {
                 let position = self.world.plant.joints().first().map_or(0, |joint| joint.position);
                 let outputs = self.world.plant.outputs();
                 let (name, _) = outputs.iter().find(|o| o.1 == position)?;
-                Some(Place::new(name, at - 2.0 * width, at + 2.0 * width))
+                let place = Place::new(name, at - 2.0 * width, at + 2.0 * width);
+                Some(place.in_runs(self.runs_through(position, at, width)))
             }
             What::Change => {
                 let later = (run..self.world.runs.len()).map(|run| (run + 1).to_string());
                 Some(Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(later))
             }
             What::Hum => None,
+        }
+    }
+
+    /// The runs in which a state comes so near to a bump's middle that it is half as high there as at most.
+    fn runs_through(&self, state: usize, middle: f64, width: f64) -> Vec<String> {
+        let near = width * (2.0 * f64::ln(2.0)).sqrt();
+        let comes_near = |run: &usize| {
+            let states = self.world.states(*run);
+            states.iter().any(|state_of_row| (state_of_row[state] - middle).abs() <= near)
+        };
+        let count = self.world.runs.len();
+        let through: Vec<usize> = (0..count).filter(comes_near).collect();
+        // None stands for all.
+        if through.len() == count {
+            Vec::new()
+        } else {
+            through.iter().map(|run| (run + 1).to_string()).collect()
         }
     }
 
