@@ -4,5 +4,6 @@ pub(crate) mod linearised;
 pub(crate) mod null;
 mod omnibus;
 pub(crate) mod outliers;
+mod spectrum;
 mod tail;
 pub(crate) mod test;

@@ -1,11 +1,7 @@
 //! Tests that look for nothing in particular: serial correlation, shifts of runs and of intervals, single frequencies, the size of the
 //! residual, single runs that miss.
 
-use std::sync::Arc;
-
-use rustfft::num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
-
+use crate::adequacy::spectrum::{Lines, highest};
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::statistics::median;
@@ -13,8 +9,20 @@ use crate::statistics::median;
 /// A test that looks for nothing in particular.
 pub(crate) struct OmnibusTest {
     pub(crate) name: String,
-    /// Whether its statistic stays at a floor in most worlds, so that its null distribution is counted.
-    pub(crate) rare: bool,
+    pub(crate) law: Law,
+    /// Whether it looks in one run, one stretch or at one frequency only.
+    pub(crate) narrow: bool,
+}
+
+/// What kind of number a statistic is, which says how its null distribution is continued beyond the draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Law {
+    /// A sum of squares.
+    Sum,
+    /// The largest of many squares.
+    Largest,
+    /// At a floor in most worlds: counted.
+    Rare,
 }
 
 /// Tests that look for nothing in particular.
@@ -35,20 +43,24 @@ impl<'a> Omnibus<'a> {
     pub(crate) fn tests(&self) -> Vec<OmnibusTest> {
         let mut tests = Vec::new();
         for (c, channel) in self.problem.recording.channels.iter().enumerate() {
-            let mut test = |what: &str, rare: bool| {
-                tests.push(OmnibusTest { name: format!("{}: {what}", channel.name), rare });
+            let mut test = |what: &str, law: Law, narrow: bool| {
+                tests.push(OmnibusTest { name: format!("{}: {what}", channel.name), law, narrow });
             };
-            test("neighbouring rows (8 lags)", false);
-            test("neighbouring rows (24 lags)", false);
-            test("shifts between runs", false);
-            test("shifts of intervals of rows", false);
-            test("a shift within one run", false);
-            test("neighbouring rows of one stretch", false);
-            test("one frequency", false);
-            test("a run that misses by far more than the others", true);
+            test("neighbouring rows (8 lags)", Law::Sum, false);
+            test("neighbouring rows (24 lags)", Law::Sum, false);
+            test("shifts between runs", Law::Sum, false);
+            test("shifts of intervals of rows", Law::Largest, false);
+            test("a shift within one run", Law::Largest, true);
+            test("neighbouring rows of one stretch", Law::Largest, true);
+            test("one frequency", Law::Largest, true);
+            test("a run that misses by far more than the others", Law::Rare, false);
             if self.rule.fixed_sigma[c].is_some() {
-                test("size against the known noise", false);
+                test("size against the known noise", Law::Sum, false);
             }
+        }
+        if self.problem.channels() > 1 {
+            let name = "all channels: one frequency".into();
+            tests.push(OmnibusTest { name, law: Law::Largest, narrow: true });
         }
         tests
     }
@@ -56,6 +68,7 @@ impl<'a> Omnibus<'a> {
     /// Statistics of a residual and the same whitened, `[run][channel]`.
     pub(crate) fn statistics(&self, left: &[Vec<Vec<f64>>], white: &[Vec<Vec<f64>>]) -> Vec<f64> {
         let mut statistics = Vec::new();
+        let mut spectrum = self.lines.as_ref().map(Lines::nothing).unwrap_or_default();
         for c in 0..self.problem.channels() {
             let runs: Vec<&[f64]> = white.iter().map(|row| row[c].as_slice()).collect();
             let total: f64 = runs.iter().flat_map(|r| r.iter()).map(|v| v * v).sum();
@@ -72,52 +85,18 @@ impl<'a> Omnibus<'a> {
             statistics.push(scan(&runs));
             statistics.push(shift_in_a_run(&runs));
             statistics.push(correlated_stretch(&runs));
-            statistics.push(self.lines.as_ref().map_or(0.0, |lines| lines.highest(&runs, total)));
+            let of_channel = self.lines.as_ref().map(|lines| lines.powers(&runs, total)).unwrap_or_default();
+            statistics.push(highest(&of_channel));
+            spectrum.iter_mut().zip(of_channel).for_each(|(all, power)| *all += power);
             statistics.push(odd_run(left, c));
             if self.rule.fixed_sigma[c].is_some() {
                 statistics.push(total / rows.max(1) as f64);
             }
         }
-        statistics
-    }
-}
-
-/// Looks for an oscillation of one frequency, in rows, that all runs share, whatever its phase in each (Fisher 1929,
-/// doi:10.1098/rspa.1929.0151).
-struct Lines {
-    transform: Arc<dyn Fft<f64>>,
-}
-
-impl Lines {
-    /// Runs shorter than this have no frequencies to speak of.
-    const SHORTEST: usize = 24;
-
-    fn new(longest: usize) -> Option<Self> {
-        let length = longest.next_power_of_two();
-        (longest >= Self::SHORTEST).then(|| Self { transform: FftPlanner::new().plan_fft_forward(length) })
-    }
-
-    /// The largest power at one frequency, summed over runs, in units of the mean square of all rows.
-    fn highest(&self, runs: &[&[f64]], total: f64) -> f64 {
-        let length = self.transform.len();
-        let mut power = vec![0.0; length / 2];
-        let mut scratch = vec![Complex64::default(); self.transform.get_inplace_scratch_len()];
-        let mut both = vec![Complex64::default(); length];
-        // Two runs are transformed together: one is the real part, the other the imaginary one.
-        for pair in runs.chunks(2) {
-            both.fill(Complex64::default());
-            let [first, second] = [pair[0], pair.get(1).copied().unwrap_or_default()];
-            both.iter_mut().zip(first).for_each(|(z, v)| z.re = *v);
-            both.iter_mut().zip(second).for_each(|(z, v)| z.im = *v);
-            self.transform.process_with_scratch(&mut both, &mut scratch);
-            for (k, power) in power.iter_mut().enumerate().skip(1) {
-                let (a, b) = (both[k], both[length - k].conj());
-                let [one, other] = [a + b, a - b].map(|z| 0.25 * z.norm_sqr());
-                *power += one / first.len().max(1) as f64 + other / second.len().max(1) as f64;
-            }
+        if self.problem.channels() > 1 {
+            statistics.push(highest(&spectrum));
         }
-        let rows: usize = runs.iter().map(|r| r.len()).sum();
-        if total > 0.0 { power.into_iter().fold(0.0, f64::max) * rows as f64 / total } else { 0.0 }
+        statistics
     }
 }
 
@@ -151,7 +130,7 @@ fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
         .sum()
 }
 
-/// The largest standardised sum over an interval of rows of a single run, of lengths that double and at steps of a quarter of a length: what
+/// The square of the largest standardised sum over an interval of rows of a single run, of lengths that double and at steps of a quarter of a length: what
 /// acts in one run alone is too faint in what all runs share.
 fn shift_in_a_run(runs: &[&[f64]]) -> f64 {
     const SHORTEST: usize = 4;
@@ -166,14 +145,15 @@ fn shift_in_a_run(runs: &[&[f64]]) -> f64 {
         let lengths = std::iter::successors(Some(SHORTEST), |l| Some(2 * l)).take_while(|l| *l <= run.len());
         for length in lengths {
             for from in (0..=run.len() - length).step_by(length / 4) {
-                best = best.max((sums[from + length] - sums[from]).abs() / (length as f64).sqrt());
+                best = best.max((sums[from + length] - sums[from]).powi(2) / length as f64);
             }
         }
     }
     best
 }
 
-/// The largest correlation of neighbouring rows within a stretch of a run, as [`portmanteau`] has it of all rows, over stretches of an
+/// The root of the largest correlation of neighbouring rows within a stretch of a run, as [`portmanteau`] has it of all rows (a sum of fourth
+/// powers, whose root falls off as squares do), over stretches of an
 /// eighth of the run that overlap by half; in units of the stretch's own squares, so that rows that are noisier do not count.
 fn correlated_stretch(runs: &[&[f64]]) -> f64 {
     const STRETCHES: usize = 8;
@@ -191,10 +171,10 @@ fn correlated_stretch(runs: &[&[f64]]) -> f64 {
             best = best.max(portmanteau(&[stretch], squares, length, LAGS));
         }
     }
-    best
+    best.sqrt()
 }
 
-/// The largest standardised sum over an interval of relative position that all runs share.
+/// The square of the largest standardised sum over an interval of relative position that all runs share.
 fn scan(runs: &[&[f64]]) -> f64 {
     const BINS: usize = 16;
     let mut sums = [0.0; BINS + 1];
@@ -215,9 +195,50 @@ fn scan(runs: &[&[f64]]) -> f64 {
         for j in i + 1..=BINS {
             let n: f64 = counts[j] - counts[i];
             if n > 0.0 {
-                best = best.max((sums[j] - sums[i]).abs() / n.sqrt());
+                best = best.max((sums[j] - sums[i]).powi(2) / n);
             }
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng as _;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution as _, StandardNormal};
+
+    use super::*;
+
+    fn noise(runs: usize, rows: usize) -> Vec<Vec<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        (0..runs).map(|_| (0..rows).map(|_| StandardNormal.sample(&mut rng)).collect()).collect()
+    }
+
+    fn slices(runs: &[Vec<f64>]) -> Vec<&[f64]> {
+        runs.iter().map(Vec::as_slice).collect()
+    }
+
+    /// A shift of half a sigma in a fifth of one run of six is seen there, and is hardly seen in all of them together.
+    #[test]
+    fn a_shift_within_one_run_is_seen_in_that_run() {
+        let still = noise(6, 1000);
+        let mut shifted = still.clone();
+        shifted[3][600..800].iter_mut().for_each(|v| *v += 0.5);
+        assert!(shift_in_a_run(&slices(&still)) < 4.5f64.powi(2));
+        assert!(shift_in_a_run(&slices(&shifted)) > 6.0f64.powi(2));
+        assert!(scan(&slices(&shifted)) < 4.5f64.powi(2));
+    }
+
+    /// Rows that hang together in a tenth of one run are seen there, noisier ones are not.
+    #[test]
+    fn rows_that_hang_together_in_one_stretch_are_seen_there() {
+        let still = noise(6, 1000);
+        let (mut louder, mut together) = (still.clone(), still.clone());
+        louder[2][300..400].iter_mut().for_each(|v| *v *= 5.0);
+        together[2][300..400].iter_mut().enumerate().for_each(|(i, v)| *v += 1.5 * (0.7 * i as f64).sin());
+        let [quiet, louder, together] = [&still, &louder, &together].map(|r| correlated_stretch(&slices(r)));
+        assert!(quiet < 6.0 && together > 9.0, "{quiet} {together}");
+        assert!(louder < 6.0, "{louder}");
+    }
 }

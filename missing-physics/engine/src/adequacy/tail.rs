@@ -1,8 +1,9 @@
 //! Tails of null distributions.
 
-use statrs::distribution::{ContinuousCDF, Gamma, Normal};
+use statrs::distribution::{ContinuousCDF, Gamma, Gumbel, Normal};
 
-/// The upper tail of a statistic's null distribution: a gamma law with its mean and variance, or the normal law that it becomes.
+/// The upper tail of a statistic's null distribution: a gamma law with its mean and variance, or the normal law that it becomes; of the
+/// largest of many squares, whose tail is an exponential one, Gumbel's law.
 ///
 /// The law only puts the tests on one scale; the p-value of all tests together is counted, not read from it.
 pub(crate) enum Tail {
@@ -10,6 +11,7 @@ pub(crate) enum Tail {
     Constant,
     Gamma(Gamma),
     Normal(Normal),
+    Gumbel(Gumbel),
     /// Counted, of a statistic that is the same in most draws: the draws, rising.
     Counted(Vec<f64>),
 }
@@ -21,19 +23,22 @@ const NORMAL_SHAPE: f64 = 1e4;
 impl Tail {
     /// From draws of the statistic; those that are not finite do not count.
     pub(crate) fn new(values: impl Iterator<Item = f64>) -> Self {
-        let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-        let n = values.len().max(1) as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-        if !(mean > 1e-9 && variance > 1e-18) {
-            return Self::Constant;
-        }
+        let Some((mean, variance)) = moments(values) else { return Self::Constant };
         let shape = mean * mean / variance;
         if shape < NORMAL_SHAPE {
             Gamma::new(shape, mean / variance).map_or(Self::Constant, Self::Gamma)
         } else {
             Normal::new(mean, variance.sqrt()).map_or(Self::Constant, Self::Normal)
         }
+    }
+
+    /// From draws of the largest of many numbers that each fall off exponentially (Gumbel 1958, Statistics of Extremes, ch. 5): its mean is
+    /// Euler's constant times its scale above its mode.
+    pub(crate) fn of_largest(values: impl Iterator<Item = f64>) -> Self {
+        const EULER: f64 = 0.577_215_664_901_532_9;
+        let Some((mean, variance)) = moments(values) else { return Self::Constant };
+        let scale = variance.sqrt() * 6f64.sqrt() / std::f64::consts::PI;
+        Gumbel::new(mean - EULER * scale, scale).map_or(Self::Constant, Self::Gumbel)
     }
 
     /// From draws of a statistic that is the same in most of them.
@@ -52,6 +57,11 @@ impl Tail {
             Self::Constant => 1.0,
             Self::Gamma(law) => law.sf(value).clamp(1e-300, 1.0),
             Self::Normal(law) => law.sf(value).clamp(1e-300, 1.0),
+            // `1 - exp(-exp(-z))`, which the law's own survival function rounds to nothing.
+            Self::Gumbel(law) => {
+                let above = (-(value - law.location()) / law.scale()).exp();
+                (-(-above).exp_m1()).clamp(1e-300, 1.0)
+            }
             Self::Counted(draws) => {
                 let above = draws.len() - draws.partition_point(|draw| *draw < value);
                 ((above as f64 + 1.0) / (draws.len() as f64 + 1.0)).min(1.0)
@@ -60,9 +70,40 @@ impl Tail {
     }
 }
 
+/// Mean and variance of the finite ones; `None` where they do not vary about a positive number.
+fn moments(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    (mean > 1e-9 && variance > 1e-18).then_some((mean, variance))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The largest of 500 squares of normal numbers: far beyond the draws the tail is what it is by counting single ones.
+    #[test]
+    fn the_tail_of_a_largest_square_is_an_exponential_one() {
+        use rand::SeedableRng as _;
+        use rand_distr::{Distribution as _, StandardNormal};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let mut square = || {
+            let z: f64 = StandardNormal.sample(&mut rng);
+            z * z
+        };
+        let largest: Vec<f64> = (0..999).map(|_| (0..500).map(|_| square()).fold(0.0, f64::max)).collect();
+        let [largest, sum] = [Tail::of_largest(largest.iter().copied()), Tail::new(largest.into_iter())];
+        for value in [20.0, 30.0, 40.0, 60.0] {
+            let normal = Normal::new(0.0, 1.0).unwrap();
+            let true_p = 1000.0 * normal.sf(f64::sqrt(value));
+            let ratio = largest.p(value) / true_p;
+            assert!((0.3..4.0).contains(&ratio), "{value}: {ratio}");
+        }
+        // A gamma law would be too sure by far.
+        assert!(sum.p(40.0) < 0.1 * largest.p(40.0));
+    }
 
     /// A statistic that varies by rounding alone (three rows, one of them a thousand times too deep) once took minutes.
     #[test]

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::adequacy::linearised::Linearised;
 use crate::adequacy::null::draw;
-use crate::adequacy::omnibus::Omnibus;
+use crate::adequacy::omnibus::{Law, Omnibus};
 use crate::adequacy::tail::Tail;
 use crate::diagnosis::TestOutcome;
 use crate::fit::optimum::Fit;
@@ -23,8 +23,10 @@ pub(crate) struct Adequacy {
 
 /// Worlds in which is seen which shapes of noise are chosen at all.
 const PILOTS: u64 = 12;
-/// A test that looks for nothing in particular must be this much surer than one that looks for a listed mechanism.
+/// A test that looks for nothing in particular must be this much surer than one that looks for a listed mechanism ...
 const UNDIRECTED_WEIGHT: f64 = 3.0;
+/// ... and one that looks for it in one run, one stretch or at one frequency only, so much.
+const NARROW_WEIGHT: f64 = 10.0;
 
 /// Tests a fitted model against the mechanisms `rivals`, smooth functions of every variable, serial correlation, shifts of
 /// runs and of intervals, and the calibrated noise.
@@ -65,13 +67,21 @@ pub(crate) fn test(
     let first = seen.len() - undirected.len();
     let tail = |t: usize| {
         let draws = null.iter().map(|row| row[t]);
-        if t >= first && undirected[t - first].rare { Tail::counted(draws) } else { Tail::new(draws) }
+        match t.checked_sub(first).map_or(Law::Sum, |omnibus| undirected[omnibus].law) {
+            Law::Sum => Tail::new(draws),
+            Law::Largest => Tail::of_largest(draws),
+            Law::Rare => Tail::counted(draws),
+        }
     };
     let tails: Vec<Tail> = (0..seen.len()).map(tail).collect();
     let directed = linearised.mechanisms;
     let smallest = |row: &[f64]| {
         let weighted = row.iter().zip(&tails).enumerate().map(|(t, (x, tail))| {
-            let weight = if t < directed { 1.0 } else { UNDIRECTED_WEIGHT };
+            let weight = match t.checked_sub(first) {
+                Some(omnibus) if undirected[omnibus].narrow => NARROW_WEIGHT,
+                _ if t < directed => 1.0,
+                _ => UNDIRECTED_WEIGHT,
+            };
             weight * tail.p(*x)
         });
         weighted.fold(f64::INFINITY, f64::min)
@@ -79,7 +89,7 @@ pub(crate) fn test(
     let observed_smallest = smallest(&seen);
     let below = null.iter().filter(|row| smallest(row) <= observed_smallest).count();
     let names = linearised.alternatives.iter().map(|a| a.name.clone());
-    let names = names.chain(undirected.into_iter().map(|test| test.name));
+    let names = names.chain(undirected.iter().map(|test| test.name.clone()));
     let mut tests: Vec<TestOutcome> = names
         .zip(seen.iter().zip(&tails))
         .map(|(name, (&statistic, tail))| TestOutcome { name, statistic, p_value: tail.p(statistic) })
