@@ -11,8 +11,13 @@ use crate::model::{Mechanism, PredictError, Scope};
 use crate::noise::rule::{NoiseRule, NoiseState};
 use crate::problem::{Problem, Selection};
 
+/// Degree of the polynomial in the number of the run that the adequacy test looks for: what warms up or wears from run to run.
+const ORDER: usize = 2;
+/// Fewer runs show no such course.
+const FEWEST_RUNS: usize = 5;
+
 /// Everything that the model or any rival frees, and where its columns stand in a block: nuisance of the model, shared of the model, nuisance
-/// of rivals, shared of rivals, polynomials.
+/// of rivals, shared of rivals, polynomials in variables, polynomials in the number of the run.
 struct Layout {
     wide: Selection,
     n_nuisance: usize,
@@ -114,6 +119,24 @@ fn smooth<'a>(
     })
 }
 
+/// Smooth functions of the order of the runs as alternatives; `base` is where their columns begin.
+fn along_runs<'a>(problem: &'a Problem<'_>, base: usize) -> impl Iterator<Item = Alternative> + 'a {
+    let enough = problem.rows.len() >= FEWEST_RUNS;
+    let channels = problem.recording.channels.iter().enumerate().filter(move |_| enough);
+    channels.map(move |(channel, quantity)| Alternative {
+        name: format!("{} depends on the order of the runs", quantity.name),
+        nuisance: Vec::new(),
+        shared: (base + channel * ORDER..base + (channel + 1) * ORDER).collect(),
+        sign: 0.0,
+    })
+}
+
+/// Legendre polynomials of degrees 1 and 2 of the number of a run, from -1 to 1.
+fn of_order(problem: &Problem<'_>, run: usize) -> [f64; ORDER] {
+    let x = 2.0 * run as f64 / (problem.rows.len().max(2) - 1) as f64 - 1.0;
+    [x, 1.5 * x * x - 0.5]
+}
+
 /// The blocks of one run, one for each channel.
 fn blocks(
     problem: &Problem<'_>,
@@ -129,14 +152,18 @@ fn blocks(
     let mut row = Vec::with_capacity(problem.channels());
     for channel in 0..problem.channels() {
         let n = problem.rows[run].valid[channel].len();
-        let mut raw = vec![vec![0.0; n]; layout.base() + curves.total() * DEGREE];
+        let along_runs = layout.base() + curves.total() * DEGREE;
+        let mut raw = vec![vec![0.0; n]; along_runs + problem.channels() * ORDER];
         for i in 0..wide.nuisance.len() {
             raw[layout.nuisance(i)].copy_from_slice(&columns[i][start..start + n]);
         }
         for i in 0..wide.shared.len() {
             raw[layout.shared(i)].copy_from_slice(&columns[wide.nuisance.len() + i][start..start + n]);
         }
-        curves.fill(problem, run, channel, &mut raw[layout.base()..]);
+        curves.fill(problem, run, channel, &mut raw[layout.base()..along_runs]);
+        for (k, value) in of_order(problem, run).into_iter().enumerate() {
+            raw[along_runs + channel * ORDER + k].fill(value);
+        }
         start += n;
         row.push(Block { raw, mine: Vec::new(), shapes: Vec::new() });
     }
@@ -163,6 +190,7 @@ impl<'a> Linearised<'a> {
         let mechanisms = alternatives.len();
         let curves = Curves::new(problem, fit)?;
         alternatives.extend(smooth(problem, &curves, layout.base()));
+        alternatives.extend(along_runs(problem, layout.base() + curves.total() * DEGREE));
         let blocks: Vec<Vec<Block>> = (0..problem.rows.len())
             .map(|run| blocks(problem, fit, &layout, &curves, run))
             .collect::<Result<_, _>>()?;
