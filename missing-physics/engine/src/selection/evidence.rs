@@ -30,8 +30,9 @@ pub(crate) fn evidence(
     if added.iter().any(|&i| !covariance[(i, i)].is_finite()) {
         return (f64::NEG_INFINITY, Some("these data do not determine it".into()));
     }
+    let information = within_shape_priors(problem, set, selection, fit);
     let mut evidence = Evidence { problem, selection, fit, covariance, value: 0.0 };
-    evidence.value = marginal(problem, selection, fit, &fit.information);
+    evidence.value = marginal(problem, selection, fit, &information);
     for slot in problem.integer_slots(set) {
         evidence.value -= (problem.shared.upper[slot] - problem.shared.lower[slot] + 1.0).ln();
     }
@@ -47,6 +48,33 @@ pub(crate) fn evidence(
         evidence.pay(&mut left, &[spec.terms[term].parameter], &[]);
     }
     (evidence.value, evidence.ruled_out(set, &added))
+}
+
+/// The information of a fit with what the priors of shape parameters say: no shape fills more than its prior. Where the data say next to
+/// nothing of one (a lag that is shorter than the rows are apart), its Laplace approximation would.
+fn within_shape_priors(
+    problem: &Problem<'_>,
+    set: &[usize],
+    selection: &Selection,
+    fit: &Fit,
+) -> DMatrix<f64> {
+    let mut information = fit.information.clone();
+    let shapes = || set.iter().flat_map(|&m| &problem.spec().mechanisms[m].shape_parameters);
+    for (i, &slot) in selection.shared.iter().enumerate() {
+        if shapes().any(|&p| p == problem.shared.index[slot]) {
+            let width = shape_prior_width(problem, fit, slot);
+            information[(i, i)] += std::f64::consts::TAU / (width * width);
+        }
+    }
+    information
+}
+
+/// One over the density of a shape parameter's prior where it was fitted: flat within its bounds, on a log scale where these are above
+/// zero.
+fn shape_prior_width(problem: &Problem<'_>, fit: &Fit, slot: usize) -> f64 {
+    let table = &problem.shared;
+    let (low, high, x) = (table.lower[slot], table.upper[slot], fit.shared[slot]);
+    if low > 0.0 { (high / low).ln() * x } else { high - low }
 }
 
 /// The added parameters without those that may stay open and do: where others of the same mechanism are determined.
@@ -98,13 +126,9 @@ impl Evidence<'_> {
         }
     }
 
-    /// A shape parameter has a flat prior within its bounds, on a log scale where these are above zero.
     fn pay_shapes(&mut self, shapes: &[usize]) {
         for &i in shapes {
-            let slot = self.selection.shared[i];
-            let table = &self.problem.shared;
-            let (low, high, x) = (table.lower[slot], table.upper[slot], self.fit.shared[slot]);
-            self.value -= if low > 0.0 { ((high / low).ln() * x).ln() } else { (high - low).ln() };
+            self.value -= shape_prior_width(self.problem, self.fit, self.selection.shared[i]).ln();
         }
     }
 
@@ -155,7 +179,7 @@ fn marginal(problem: &Problem<'_>, selection: &Selection, fit: &Fit, information
     let volume = factor.rank() as f64 * std::f64::consts::TAU.ln();
     let nuisance = (0..selection.nuisance.len()).filter(|&i| selection.added_nuisance[i]);
     fit.log_likelihood + 0.5 * (volume - factor.log_determinant())
-        - nuisance.map(|i| nuisance_prior::cost(problem, selection, fit, i)).sum::<f64>()
+        - nuisance.map(|i| nuisance_prior::cost(problem, selection, fit, information, i)).sum::<f64>()
 }
 
 /// The marginal likelihood with so wide a normal prior of the shared parameters that no data are needed to bound them.

@@ -13,8 +13,14 @@ use crate::problem::{Problem, Selection};
 use crate::selection::prior::LOG_RANGE;
 
 /// Log evidence that the `i`-th free nuisance parameter costs: minus the log of the best normal law's density at the runs' values (with
-/// the errors that they have, alone and through the shared parameters), plus what choosing that law costs.
-pub(crate) fn cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: usize) -> f64 {
+/// the errors that they have, alone and through the shared parameters, of which `information` is known), plus what choosing that law costs.
+pub(crate) fn cost(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    fit: &Fit,
+    information: &DMatrix<f64>,
+    i: usize,
+) -> f64 {
     let (slot, widest) = (selection.nuisance[i], nuisance_prior_width(problem, selection, i));
     let n = fit.nuisance.len();
     let values: Vec<f64> = fit
@@ -25,7 +31,7 @@ pub(crate) fn cost(problem: &Problem<'_>, selection: &Selection, fit: &Fit, i: u
         .collect();
     // What the fit's wide prior has taken already.
     let taken: f64 = values.iter().map(|v| 0.5 * v * v / (widest * widest)).sum();
-    let shared = covariance(&fit.information);
+    let shared = covariance(information);
     let errors = DMatrix::from_fn(n, n, |r, q| {
         let (a, b) = (&fit.nuisance_errors[r], &fit.nuisance_errors[q]);
         let mut through = 0.0;
