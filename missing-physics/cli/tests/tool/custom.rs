@@ -240,28 +240,37 @@ fn columns_of_a_simulation_give_a_law() {
     assert!(ci[0] > -0.060 && ci[1] < -0.049, "{ci:?}");
 }
 
+/// Of twelve recordings that are the simulation with noise, at 5 % three are in doubt in 2 % of all cases, and none is given a law.
 #[test]
 fn a_simulation_that_is_right_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     missing_physics_cli::commands::new("custom", &folder.path().join("same")).unwrap();
     let data = folder.path().join("same/data.csv");
-    // The measured column is the simulated one with an error of its own.
     let csv = std::fs::read_to_string(&data).unwrap();
-    let mut lines = csv.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
-    let mut text = lines.next().unwrap().join(",") + "\n";
     let mut state = 12345u64;
-    for mut cells in lines {
-        let mut error = -6.0;
-        for _ in 0..12 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            error += (state >> 33) as f64 / (1u64 << 31) as f64;
+    let mut doubted = Vec::new();
+    for draw in 0..12 {
+        // The measured column is the simulated one with an error of its own.
+        let mut lines = csv.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+        let mut text = lines.next().unwrap().join(",") + "\n";
+        for mut cells in lines {
+            let mut error = -6.0;
+            for _ in 0..12 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                error += (state >> 33) as f64 / (1u64 << 31) as f64;
+            }
+            cells[2] = format!("{:.5}", cells[3].parse::<f64>().unwrap() + 0.002 * error);
+            text += &(cells.join(",") + "\n");
         }
-        cells[2] = format!("{:.5}", cells[3].parse::<f64>().unwrap() + 0.002 * error);
-        text += &(cells.join(",") + "\n");
+        std::fs::write(&data, text).unwrap();
+        let answer = diagnose(&folder.path().join("same")).unwrap();
+        let p = answer["p_value"].as_f64().unwrap();
+        if answer["verdict"] != "adequate" {
+            doubted.push((draw, p));
+        }
+        assert!(answer["law"].is_null(), "{draw}: {}", answer["law"]);
     }
-    std::fs::write(&data, text).unwrap();
-    let answer = diagnose(&folder.path().join("same")).unwrap();
-    assert_eq!(answer["verdict"], "adequate", "{}", answer["p_value"]);
+    assert!(doubted.len() <= 2, "{doubted:?}");
 }
 
 /// Writes a damped swing of 0.3 rad and more with noise of 2 mrad, as a sensor reads it, beside what a simulator says of it.

@@ -32,8 +32,6 @@ const COUNT_PART: f64 = 0.05;
 /// Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): unknowns and variables count in the order in which the model and the
 /// recording have them.
 const UNTOLD: f64 = 2.0;
-/// The same as a part of what the best is worth: the forms that a size may have are none that nature has, and what they leave grows with it.
-const UNTOLD_PART: f64 = 0.005;
 /// What is worth less than this part of the best, with edges that are far apart, cannot be the best with finer ones.
 const NEAR: f64 = 0.9;
 
@@ -96,8 +94,7 @@ impl Scene<'_> {
             judged.extend(finer.collect::<Result<Vec<_>, PredictError>>()?);
         }
         let most = judged.iter().map(|j| j.0).fold(f64::NEG_INFINITY, f64::max);
-        let untold = UNTOLD.max(UNTOLD_PART * most);
-        let first = judged.into_iter().find(|j| j.0 >= most - untold);
+        let first = judged.into_iter().find(|j| j.0 >= most - UNTOLD);
         first.map(|(_, unknown, along, found)| self.cause(unknown, along, found)).transpose()
     }
 
