@@ -1,5 +1,5 @@
 //! The chain that the impacts of a drop form: flights shorten by a steady ratio. A sound that does not fit it is none of the ball's, but a
-//! ratio may change once (a softer place of the table, another ball) where the chain goes on behind it.
+//! ratio may change (a softer place of the table, another ball) where the chain goes on behind it.
 
 use crate::missed::parts;
 

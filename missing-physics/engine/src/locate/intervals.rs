@@ -135,6 +135,13 @@ impl Scan<'_> {
         found.max_by(|a, b| a.worth().total_cmp(&b.worth()))
     }
 
+    /// By how much an effect lowers the sum of squares; `-infinity` where it is not plausibly so large.
+    fn gain(&self, effect: &Effect, interval: (usize, usize), form: Form) -> f64 {
+        let plausible =
+            self.largest.is_infinite() || effect.largest(form, self.bins, interval) <= self.largest;
+        if plausible { effect.gain() } else { f64::NEG_INFINITY }
+    }
+
     /// The best of each component alone and of all together, in some runs.
     fn judge(
         &self,
@@ -145,13 +152,10 @@ impl Scan<'_> {
         runs: impl Fn() -> Vec<bool>,
     ) {
         let price = form.sizes() as f64 * self.rows.ln();
-        let plausible =
-            |e: &Effect| self.largest.is_infinite() || e.largest(form, self.bins, interval) <= self.largest;
-        let gains: Vec<f64> =
-            effects.iter().map(|e| if plausible(e) { e.gain() } else { f64::NEG_INFINITY }).collect();
+        let gains: Vec<f64> = effects.iter().map(|e| self.gain(e, interval, form)).collect();
         let mut better = |gain: f64, price: f64, components: Vec<usize>| {
             // What takes away more than there is takes it by rounding.
-            let sound = gain <= self.whole * (1.0 + EVEN);
+            let sound = gain.is_finite() && gain <= self.whole * (1.0 + EVEN);
             if best.as_ref().is_none_or(|b| gain - price > b.worth()) && sound {
                 let bins = self.bins.clone();
                 let members = None;
@@ -257,9 +261,7 @@ impl Scan<'_> {
             let of_component = |r: &Responses| {
                 let runs = r.by_run(self.bins, interval, form).into_iter().zip(&found.runs);
                 let all = total(runs.filter(|(_, acts)| **acts).map(|(effect, _)| effect));
-                let small =
-                    self.largest.is_infinite() || all.largest(form, self.bins, interval) <= self.largest;
-                if small { all.gain() } else { f64::NEG_INFINITY }
+                self.gain(&all, interval, form)
             };
             self.responses.iter().map(of_component).sum::<f64>() - price(form)
         };

@@ -85,6 +85,14 @@ impl Effect {
         determined(self.beside(self.square[0], (0, 0)), self.square[0])
     }
 
+    /// How much of the first size the second has, and its square beside that; `None` where that is not determined.
+    fn second(&self, first: f64) -> Option<(f64, f64)> {
+        let part = self.beside(self.cross, (0, 1)) / first;
+        let second = self.beside(self.square[1], (1, 1)) - part * part * first;
+        let second = determined(second, self.square[1]);
+        (second > 0.0).then_some((part, second))
+    }
+
     /// By how much the sum of squares falls.
     pub(crate) fn gain(&self) -> f64 {
         let first = self.first();
@@ -92,21 +100,15 @@ impl Effect {
             return 0.0;
         }
         let gain = self.product[0] * self.product[0] / first;
-        let part = self.beside(self.cross, (0, 1)) / first;
-        let second = self.beside(self.square[1], (1, 1)) - part * part * first;
-        let second = determined(second, self.square[1]);
-        if second <= 0.0 {
-            return gain;
-        }
+        let Some((part, second)) = self.second(first) else { return gain };
         gain + (self.product[1] - part * self.product[0]).powi(2) / second
     }
 
     /// Both sizes that fit best together; the second is zero where it is not determined.
     fn sizes(&self) -> [f64; 2] {
         let first = self.first();
-        let part = self.beside(self.cross, (0, 1)) / first;
-        let second = determined(self.beside(self.square[1], (1, 1)) - part * part * first, self.square[1]);
-        let bent = if second > 0.0 { (self.product[1] - part * self.product[0]) / second } else { 0.0 };
+        let Some((part, second)) = self.second(first) else { return [self.size(), 0.0] };
+        let bent = (self.product[1] - part * self.product[0]) / second;
         [self.product[0] / first - part * bent, bent]
     }
 

@@ -126,6 +126,7 @@ impl Evidence<'_> {
         }
     }
 
+    /// Shape parameters pay one over the density of their priors.
     fn pay_shapes(&mut self, shapes: &[usize]) {
         for &i in shapes {
             self.value -= shape_prior_width(self.problem, self.fit, self.selection.shared[i]).ln();

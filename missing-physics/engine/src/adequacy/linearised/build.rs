@@ -37,6 +37,11 @@ impl Layout {
     fn base(&self) -> usize {
         self.wide.nuisance.len() + self.wide.shared.len()
     }
+
+    /// Where those in the number of the run begin.
+    fn ordered(&self, curves: &Curves) -> usize {
+        self.base() + curves.total() * DEGREE
+    }
 }
 
 /// What a mechanism frees beyond the model: places among the nuisance and the shared parameters of all, and the sign of its strength.
@@ -119,10 +124,14 @@ fn smooth<'a>(
     })
 }
 
+/// The channels of which smooth functions of the order of the runs are looked for: all, or none where there are too few runs.
+fn along_runs(problem: &Problem<'_>) -> usize {
+    if problem.rows.len() >= FEWEST_RUNS { problem.channels() } else { 0 }
+}
+
 /// Smooth functions of the order of the runs as alternatives; `base` is where their columns begin.
-fn along_runs<'a>(problem: &'a Problem<'_>, base: usize) -> impl Iterator<Item = Alternative> + 'a {
-    let enough = problem.rows.len() >= FEWEST_RUNS;
-    let channels = problem.recording.channels.iter().enumerate().filter(move |_| enough);
+fn ordered<'a>(problem: &'a Problem<'_>, base: usize) -> impl Iterator<Item = Alternative> + 'a {
+    let channels = problem.recording.channels.iter().enumerate().take(along_runs(problem));
     channels.map(move |(channel, quantity)| Alternative {
         name: format!("{} depends on the order of the runs", quantity.name),
         nuisance: Vec::new(),
@@ -152,17 +161,19 @@ fn blocks(
     let mut row = Vec::with_capacity(problem.channels());
     for channel in 0..problem.channels() {
         let n = problem.rows[run].valid[channel].len();
-        let along_runs = layout.base() + curves.total() * DEGREE;
-        let mut raw = vec![vec![0.0; n]; along_runs + problem.channels() * ORDER];
+        let ordered = layout.ordered(curves);
+        let mut raw = vec![vec![0.0; n]; ordered + along_runs(problem) * ORDER];
         for i in 0..wide.nuisance.len() {
             raw[layout.nuisance(i)].copy_from_slice(&columns[i][start..start + n]);
         }
         for i in 0..wide.shared.len() {
             raw[layout.shared(i)].copy_from_slice(&columns[wide.nuisance.len() + i][start..start + n]);
         }
-        curves.fill(problem, run, channel, &mut raw[layout.base()..along_runs]);
-        for (k, value) in of_order(problem, run).into_iter().enumerate() {
-            raw[along_runs + channel * ORDER + k].fill(value);
+        curves.fill(problem, run, channel, &mut raw[layout.base()..ordered]);
+        if channel < along_runs(problem) {
+            for (k, value) in of_order(problem, run).into_iter().enumerate() {
+                raw[ordered + channel * ORDER + k].fill(value);
+            }
         }
         start += n;
         row.push(Block { raw, mine: Vec::new(), shapes: Vec::new() });
@@ -190,7 +201,7 @@ impl<'a> Linearised<'a> {
         let mechanisms = alternatives.len();
         let curves = Curves::new(problem, fit)?;
         alternatives.extend(smooth(problem, &curves, layout.base()));
-        alternatives.extend(along_runs(problem, layout.base() + curves.total() * DEGREE));
+        alternatives.extend(ordered(problem, layout.ordered(&curves)));
         let blocks: Vec<Vec<Block>> = (0..problem.rows.len())
             .map(|run| blocks(problem, fit, &layout, &curves, run))
             .collect::<Result<_, _>>()?;
