@@ -6,7 +6,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use crate::data::Recording;
 use crate::engine::begin::{Begun, begin};
 use crate::engine::{DiagnoseError, Options};
+use crate::fit::columns::whitened_columns;
+use crate::fit::gauss_newton::solve;
+use crate::locate::projection::{Projection, dot};
 use crate::model::Model;
+use crate::problem::Problem;
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::held_out::held_out;
 use crate::selection::search::search;
@@ -38,12 +42,7 @@ pub fn oracle(
     options: &Options,
 ) -> Result<Oracle, DiagnoseError> {
     let Begun { problem, rule, baseline, .. } = begin(model, recording, options)?;
-    let mut set = Vec::with_capacity(truth.len());
-    for id in truth {
-        let at = problem.spec().mechanisms.iter().position(|m| m.id == *id);
-        set.push(at.ok_or_else(|| DiagnoseError::Unknown { id: id.clone() })?);
-    }
-    set.sort_unstable();
+    let set = numbers(&problem, truth)?;
     let competing = rule.competing();
     let everything = problem.spec().named();
     let among = candidate(&problem, &competing, &[], &[], &baseline.fit, &[])?;
@@ -69,4 +68,67 @@ pub fn oracle(
         decisive: truth.evidence - rival,
         heldout_rmse: held_out(&problem, &truth)?.rmse,
     })
+}
+
+/// What the data say of something small beside the mechanisms that are truly at work.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OracleOfLeftover {
+    /// Log Bayes factor of an effect of the true shape and a free size against none, the noise known (Schwarz 1978,
+    /// doi:10.1214/aos/1176344136); where it is large, the data show it.
+    pub decisive: f64,
+}
+
+/// Looks for what a recording has that another with the same noise has not, beside the true mechanisms (identifiers), which both have;
+/// `None` where their rows do not correspond, or they do not differ.
+///
+/// # Errors
+/// As [`oracle`].
+pub fn oracle_of_leftover(
+    model: &dyn Model,
+    (recording, without): (&Recording, &Recording),
+    truth: &[String],
+    options: &Options,
+) -> Result<Option<OracleOfLeftover>, DiagnoseError> {
+    let lengths = |r: &Recording| r.runs.iter().map(|run| run.len()).collect::<Vec<_>>();
+    if lengths(recording) != lengths(without) {
+        return Ok(None);
+    }
+    let Begun { problem, rule, baseline, .. } = begin(model, without, options)?;
+    let set = numbers(&problem, truth)?;
+    let clean = candidate(&problem, &rule.competing(), &set, &[], &baseline.fit, &[])?;
+    let Begun { problem, .. } = begin(model, recording, options)?;
+    let (selection, noise) = (&clean.selection, &clean.fit.noise);
+    let fit = solve(&problem, selection, noise, &clean.fit.shared, &clean.fit.nuisance)?;
+    let columns = (0..problem.rows.len())
+        .map(|run| whitened_columns(&problem, selection, noise, run, &fit.shared, &fit.nuisance[run]))
+        .collect::<Result<Vec<_>, _>>()?;
+    let changed = (0..problem.rows.len()).map(|run| {
+        let of_channel = |channel: usize| {
+            let [with, without] = [recording, without].map(|r| &r.runs[run].outputs[channel]);
+            let valid = problem.rows[run].valid[channel].iter();
+            let change: Vec<f64> = valid.map(|&i| with[i] - without[i]).collect();
+            let mut change = [change.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect()];
+            problem.whitener(run, channel, noise.shape[channel]).whiten_all(&mut change);
+            let [change] = change;
+            change.into_iter().map(|v: f64| v / noise.sigma[channel]).collect::<Vec<f64>>()
+        };
+        (0..problem.channels()).flat_map(of_channel).collect::<Vec<f64>>()
+    });
+    let projection = Projection::new(&columns, (selection.nuisance.len(), selection.shared.len()));
+    let rest = projection.rest(changed.collect());
+    let square: f64 = rest.iter().map(|run| dot(run, run)).sum();
+    let product: f64 = rest.iter().zip(&projection.residual).map(|(rest, left)| dot(rest, left)).sum();
+    let decisive = 0.5 * (product * product / square - projection.rows.ln());
+    Ok((square > 0.0).then_some(OracleOfLeftover { decisive }))
+}
+
+/// The numbers of mechanisms, rising.
+fn numbers(problem: &Problem<'_>, ids: &[String]) -> Result<Vec<usize>, DiagnoseError> {
+    let number = |id: &String| {
+        let at = problem.spec().mechanisms.iter().position(|m| m.id == *id);
+        at.ok_or_else(|| DiagnoseError::Unknown { id: id.clone() })
+    };
+    let mut set = ids.iter().map(number).collect::<Result<Vec<_>, _>>()?;
+    set.sort_unstable();
+    Ok(set)
 }

@@ -73,6 +73,8 @@ pub struct DomainScore {
     pub main_cause: Part,
     /// Of those, answered `partly`: the smaller one is said.
     pub leftover_said: Part,
+    /// The same where an oracle that knows what the smaller one does finds it.
+    pub leftover_shown: Part,
     /// Of those, where the set is right, intervals of 95 % that hold the true value.
     pub covered_beside: Part,
     /// Unlisted effects that a listed one imitates to 40 to 85 %: a name was given.
@@ -157,6 +159,9 @@ impl DomainScore {
                 let named = sorted(&o.chosen, &w.key.beside) == truth;
                 self.main_cause.add(named);
                 self.leftover_said.add(o.verdict == "partly");
+                if w.oracle.as_ref().and_then(|oracle| oracle.leftover).is_some_and(|l| l >= DECISIVE) {
+                    self.leftover_shown.add(o.verdict == "partly");
+                }
                 if named {
                     Self::add_intervals(&mut self.covered_beside, w);
                 }
@@ -267,6 +272,7 @@ impl DomainScore {
             "answer_set_holds": part(self.holds), "answer_set_size": number(self.set_size),
             "wrong_of_all": part(self.wrong_of_all), "unlisted_unexplained": part(self.unexplained),
             "main_cause": part(self.main_cause), "leftover_said": part(self.leftover_said),
+            "leftover_shown": part(self.leftover_shown),
             "covered_beside_leftover": part(self.covered_beside), "imitated_named": part(self.imitated),
             "located": part(self.located), "covered": part(self.covered),
             "heldout_ratio": number(self.heldout_ratio), "power": power, "confusion": self.confusion})

@@ -1,13 +1,13 @@
 //! One world of a proof: drawn, diagnosed, judged.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use missing_physics::data::Recording;
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use missing_physics::oracle::{Oracle, oracle};
+use missing_physics::oracle::{Oracle, oracle, oracle_of_leftover};
 use serde::{Deserialize, Serialize};
 use worlds::concealed::{Concealed, Hidden, Key, Maker};
 
@@ -26,6 +26,11 @@ const TURNS: [Hidden; 20] = {
 
 /// The file of what an oracle finds in a world.
 const ORACLE: &str = "oracle.json";
+/// The folders of a world's recording, and of the same without what is left over beside a listed mechanism.
+const RECORDING: &str = "recording";
+const WITHOUT_LEFTOVER: &str = "without_leftover";
+/// Far beyond any threshold, and a number in JSON.
+const MOST: f64 = 1e9;
 
 /// One world.
 pub(super) struct World {
@@ -80,6 +85,9 @@ pub(super) struct OracleFit {
     pub(super) p_value: f64,
     pub(super) decisive: f64,
     pub(super) heldout_rmse: Vec<Option<f64>>,
+    /// Log Bayes factor of what is left over beside the listed mechanism, of its true shape and a free size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) leftover: Option<f64>,
 }
 
 /// A world with everything that is known of it.
@@ -117,7 +125,15 @@ impl World {
     }
 
     pub(super) fn draw(&self) -> Concealed {
-        let drawn = self.maker.conceal(self.hidden, self.seed);
+        self.shortened(self.maker.conceal(self.hidden, self.seed))
+    }
+
+    /// The world without what is left over beside a listed mechanism; `None` of one that has nothing of the kind.
+    fn without_leftover(&self) -> Option<Concealed> {
+        self.maker.without_leftover(self.hidden, self.seed).map(|drawn| self.shortened(drawn))
+    }
+
+    fn shortened(&self, drawn: Concealed) -> Concealed {
         match self.runs {
             Some(runs) => drawn.first_runs(runs),
             None => drawn,
@@ -130,11 +146,8 @@ impl World {
         if read_json::<Outcome>(&path).is_some() {
             return Ok(());
         }
-        let recording = self.recording();
-        make_folder(&recording)?;
-        for (name, contents) in &self.draw().files {
-            write_whole(&recording.join(name), contents)?;
-        }
+        let recording = self.folder.join(RECORDING);
+        write_files(&recording, &self.draw())?;
         let begin = Instant::now();
         let (domain, loaded) = domains::load(&recording)?;
         let options = self.options();
@@ -162,11 +175,21 @@ impl World {
         if truth.is_empty() || read_json::<OracleFit>(&path).is_some() {
             return Ok(());
         }
-        let recording = self.recording();
+        let recording = self.folder.join(RECORDING);
         let (_, loaded) = domains::load(&recording)?;
-        let found = oracle(&*loaded.model, &loaded.recording, &truth, &self.options())
-            .map_err(|error| ProveError::Diagnose { recording, error })?;
-        write_json(&path, &OracleFit::of(&found))
+        let (model, options) = (&*loaded.model, self.options());
+        let failed = |error| ProveError::Diagnose { recording: recording.clone(), error };
+        let found = oracle(model, &loaded.recording, &truth, &options).map_err(failed)?;
+        let mut found = OracleFit::of(&found);
+        if let Some(without) = self.without_leftover() {
+            let folder = self.folder.join(WITHOUT_LEFTOVER);
+            write_files(&folder, &without)?;
+            let (_, without) = domains::load(&folder)?;
+            let both = (&loaded.recording, &without.recording);
+            let leftover = oracle_of_leftover(model, both, &truth, &options).map_err(failed)?;
+            found.leftover = leftover.map(|left| left.decisive.clamp(-MOST, MOST));
+        }
+        write_json(&path, &found)
     }
 
     pub(super) fn judged(&self) -> Result<Judged, ProveError> {
@@ -178,10 +201,6 @@ impl World {
         }
         let outcome = read_json(&self.folder.join("outcome.json")).ok_or_else(|| missing("outcome.json"))?;
         Ok(Judged { domain: self.maker.name(), name: self.name.clone(), key, outcome, oracle })
-    }
-
-    fn recording(&self) -> PathBuf {
-        self.folder.join("recording")
     }
 
     fn options(&self) -> Options {
@@ -224,15 +243,20 @@ impl Outcome {
 
 impl OracleFit {
     fn of(t: &Oracle) -> Self {
-        /// Far beyond any threshold, and a number in JSON.
-        const MOST: f64 = 1e9;
         Self {
             likelihood_ratio: t.likelihood_ratio.clamp(0.0, MOST),
             p_value: t.p_value.clamp(0.0, 1.0),
             decisive: if t.decisive.is_nan() { -MOST } else { t.decisive.clamp(-MOST, MOST) },
             heldout_rmse: t.heldout_rmse.iter().map(|v| finite(*v)).collect(),
+            leftover: None,
         }
     }
+}
+
+/// Writes the files of a world's recording.
+fn write_files(folder: &Path, world: &Concealed) -> Result<(), ProveError> {
+    make_folder(folder)?;
+    world.files.iter().try_for_each(|(name, contents)| write_whole(&folder.join(name), contents))
 }
 
 /// The least and the largest value of a variable over a recording.

@@ -60,6 +60,10 @@ impl Maker for Bounce {
         }
         Concealed::table(header, data, key)
     }
+
+    fn without_leftover(&self, hidden: Hidden, seed: u64) -> Option<Concealed> {
+        RigMaker::<Drops>::NEW.without_leftover(hidden, seed)
+    }
 }
 
 /// A restitution that is lower on a stripe of the table, from a drop on, or at some speeds; or a few impacts that go unheard.

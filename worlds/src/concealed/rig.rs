@@ -94,8 +94,15 @@ pub(crate) trait Rig: Sized {
             .collect()
     }
 
-    /// Sizes the hidden effects by the part of their response that no baseline can take away, and writes them into the key.
-    fn hide(&self, hidden: Hidden, choice: &Choice, key: &mut Key, rng: &mut ChaCha8Rng) -> Self::Effects {
+    /// Sizes the hidden effects by the part of their response that no baseline can take away, and writes them into the key; the second are
+    /// those on the list alone.
+    fn hide(
+        &self,
+        hidden: Hidden,
+        choice: &Choice,
+        key: &mut Key,
+        rng: &mut ChaCha8Rng,
+    ) -> [Self::Effects; 2] {
         let nuisances = self.nuisances();
         let mut effects = Self::Effects::default();
         for &listed in &choice.listed {
@@ -107,6 +114,7 @@ pub(crate) trait Rig: Sized {
         if !choice.listed.is_empty() {
             key.strength = Some(nuisances.residual_norm(&self.response(effects)));
         }
+        let listed = effects;
         if hidden.unlisted() {
             let which = choice.unlisted;
             // What could pass for the unlisted effect: what is truly at work beside it, or any two of the list, or none.
@@ -139,7 +147,7 @@ pub(crate) trait Rig: Sized {
             effects = all;
             self.describe_unlisted(which, key);
         }
-        effects
+        [effects, listed]
     }
 
     /// The part of an unlisted effect's squares that the best listed mechanism takes away.
@@ -160,6 +168,52 @@ impl<R> RigMaker<R> {
     pub(crate) const NEW: Self = Self(PhantomData);
 }
 
+/// A world that was drawn.
+struct Drawn<R: Rig> {
+    rig: R,
+    /// What is at work.
+    effects: R::Effects,
+    /// The same without what is not on the list.
+    listed: R::Effects,
+    key: Key,
+    /// Where the noise is drawn from.
+    rng: ChaCha8Rng,
+}
+
+impl<R: Rig> Drawn<R> {
+    fn new(mut hidden: Hidden, seed: u64) -> Self {
+        let (mut rng, mut tries) = (ChaCha8Rng::seed_from_u64(seed), 0);
+        loop {
+            let mut key = Key::new(hidden);
+            let (rig, choice) = R::draw(hidden, &mut rng);
+            let [effects, listed] = rig.hide(hidden, &choice, &mut key, &mut rng);
+            let fits = match hidden {
+                Hidden::Leftover => {
+                    LEFT.contains(&(key.leftover.unwrap_or(0.0) / key.strength.unwrap_or(1.0)))
+                }
+                Hidden::Imitated => IMITATED.contains(&rig.imitated(effects)),
+                _ => true,
+            };
+            if fits {
+                return Self { rig, effects, listed, key, rng };
+            }
+            tries += 1;
+            if tries == TRIES {
+                hidden = hidden.without_leftovers();
+            }
+        }
+    }
+
+    /// The recording with these effects at work.
+    fn recorded(mut self, effects: R::Effects) -> Concealed {
+        let further = self.rig.further_files(&mut self.rng);
+        let [header, data] = self.rig.files(effects, &mut self.rng);
+        let mut concealed = Concealed::table(header, data, self.key);
+        concealed.files.extend(further.into_iter().map(|(name, text)| (name, text.into_bytes())));
+        concealed
+    }
+}
+
 impl<R: Rig> Maker for RigMaker<R> {
     fn domain(&self) -> &'static str {
         R::DOMAIN
@@ -170,32 +224,15 @@ impl<R: Rig> Maker for RigMaker<R> {
     }
 
     fn conceal(&self, hidden: Hidden, seed: u64) -> Concealed {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let (mut hidden, mut tries) = (hidden, 0);
-        let (rig, effects, key) = loop {
-            let mut key = Key::new(hidden);
-            let (rig, choice) = R::draw(hidden, &mut rng);
-            let effects = rig.hide(hidden, &choice, &mut key, &mut rng);
-            let fits = match hidden {
-                Hidden::Leftover => {
-                    LEFT.contains(&(key.leftover.unwrap_or(0.0) / key.strength.unwrap_or(1.0)))
-                }
-                Hidden::Imitated => IMITATED.contains(&rig.imitated(effects)),
-                _ => true,
-            };
-            if fits {
-                break (rig, effects, key);
-            }
-            tries += 1;
-            if tries == TRIES {
-                hidden = hidden.without_leftovers();
-            }
-        };
-        let further = rig.further_files(&mut rng);
-        let [header, data] = rig.files(effects, &mut rng);
-        let mut concealed = Concealed::table(header, data, key);
-        concealed.files.extend(further.into_iter().map(|(name, text)| (name, text.into_bytes())));
-        concealed
+        let drawn = Drawn::<R>::new(hidden, seed);
+        let effects = drawn.effects;
+        drawn.recorded(effects)
+    }
+
+    fn without_leftover(&self, hidden: Hidden, seed: u64) -> Option<Concealed> {
+        let drawn = Drawn::<R>::new(hidden, seed);
+        let listed = drawn.listed;
+        (drawn.key.hidden == Hidden::Leftover).then(|| drawn.recorded(listed))
     }
 }
 

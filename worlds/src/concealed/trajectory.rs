@@ -45,6 +45,10 @@ impl Maker for Trajectory {
         let data = world.draw(seed ^ 0x5eed).csv(6);
         Concealed::table(HEADER.into(), data, key)
     }
+
+    fn without_leftover(&self, hidden: Hidden, seed: u64) -> Option<Concealed> {
+        RigMaker::<Flights>::NEW.without_leftover(hidden, seed)
+    }
 }
 
 fn listed(e: &mut Effects, which: usize, key: &mut Key, rng: &mut ChaCha8Rng) {

@@ -1,6 +1,7 @@
 //! Tests that look for nothing in particular: serial correlation, shifts of runs and of intervals, single frequencies, the size of the
 //! residual, single runs that miss.
 
+use crate::adequacy::linearised::{Linearised, Reading, ScoredNoise};
 use crate::adequacy::spectrum::{Lines, highest};
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
@@ -65,12 +66,18 @@ impl<'a> Omnibus<'a> {
         tests
     }
 
-    /// Statistics of a residual and the same whitened, `[run][channel]`.
-    pub(crate) fn statistics(&self, left: &[Vec<Vec<f64>>], white: &[Vec<Vec<f64>>]) -> Vec<f64> {
+    /// Statistics of the residual (`[run][channel]`) that a model leaves of data, as they are read.
+    pub(crate) fn statistics(
+        &self,
+        linearised: &Linearised<'_>,
+        reading: &Reading,
+        left: &[Vec<Vec<f64>>],
+    ) -> Vec<f64> {
         let mut statistics = Vec::new();
         let mut spectrum = self.lines.as_ref().map(Lines::nothing).unwrap_or_default();
         for c in 0..self.problem.channels() {
-            let runs: Vec<&[f64]> = white.iter().map(|row| row[c].as_slice()).collect();
+            let white = linearised.whitened(left, c, reading.noise[c]);
+            let runs: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
             let total: f64 = runs.iter().flat_map(|r| r.iter()).map(|v| v * v).sum();
             let rows: usize = runs.iter().map(|r| r.len()).sum();
             for lags in [8, 24] {
@@ -83,7 +90,7 @@ impl<'a> Omnibus<'a> {
                     .sum(),
             );
             statistics.push(scan(&runs));
-            statistics.push(shift_in_a_run(&runs));
+            statistics.push(shift_beside_noise(linearised, &reading.noises[c], left, c));
             statistics.push(correlated_stretch(&runs));
             let of_channel = self.lines.as_ref().map(|lines| lines.powers(&runs, total)).unwrap_or_default();
             statistics.push(highest(&of_channel));
@@ -130,10 +137,30 @@ fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
         .sum()
 }
 
-/// The square of the largest standardised sum over an interval of rows of a single run, of lengths that double and at steps of a quarter of a length: what
-/// acts in one run alone is too faint in what all runs share.
+/// Twice the gain in log likelihood of a shift within one run, the noise of a channel free beside it: noise that is correlated over a good part
+/// of a run would take the shift for its own.
+fn shift_beside_noise(
+    linearised: &Linearised<'_>,
+    noises: &[ScoredNoise],
+    left: &[Vec<Vec<f64>>],
+    channel: usize,
+) -> f64 {
+    let best = noises.iter().map(|noise| noise.score).fold(f64::NEG_INFINITY, f64::max);
+    let gain = |noise: &ScoredNoise| {
+        let white = linearised.whitened(left, channel, (noise.shape, noise.sigma));
+        let runs: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
+        shift_in_a_run(&runs) - 2.0 * (best - noise.score)
+    };
+    noises.iter().map(gain).fold(0.0, f64::max)
+}
+
+/// The square of the largest standardised difference between an interval of rows of a single run and the rest of that run: from a row on,
+/// or of lengths that double and at steps of a quarter of a length. What acts in one run alone is too faint in what all runs share, and a zero
+/// that is free in each run has taken the mean away (Page 1955, doi:10.1093/biomet/42.3-4.523).
 fn shift_in_a_run(runs: &[&[f64]]) -> f64 {
     const SHORTEST: usize = 4;
+    /// Rows from which on a shift is looked for.
+    const CHANGES: usize = 128;
     let mut best: f64 = 0.0;
     for run in runs {
         let mut before = 0.0;
@@ -142,10 +169,20 @@ fn shift_in_a_run(runs: &[&[f64]]) -> f64 {
             before
         };
         let sums: Vec<f64> = std::iter::once(0.0).chain(run.iter().map(up_to)).collect();
-        let lengths = std::iter::successors(Some(SHORTEST), |l| Some(2 * l)).take_while(|l| *l <= run.len());
+        let (rows, total) = (run.len(), sums[run.len()]);
+        let contrast = |from: usize, length: usize| {
+            let part = length as f64 / rows as f64;
+            let difference = sums[from + length] - sums[from] - part * total;
+            difference * difference / (length as f64 * (1.0 - part))
+        };
+        let step = rows.div_ceil(CHANGES);
+        for from in (SHORTEST..(rows + 1).saturating_sub(SHORTEST)).step_by(step) {
+            best = best.max(contrast(from, rows - from));
+        }
+        let lengths = std::iter::successors(Some(SHORTEST), |l| Some(2 * l)).take_while(|l| 2 * l <= rows);
         for length in lengths {
-            for from in (0..=run.len() - length).step_by(length / 4) {
-                best = best.max((sums[from + length] - sums[from]).powi(2) / length as f64);
+            for from in (0..=rows - length).step_by(length / 4) {
+                best = best.max(contrast(from, length));
             }
         }
     }
@@ -228,6 +265,19 @@ mod tests {
         assert!(shift_in_a_run(&slices(&still)) < 4.5f64.powi(2));
         assert!(shift_in_a_run(&slices(&shifted)) > 6.0f64.powi(2));
         assert!(scan(&slices(&shifted)) < 4.5f64.powi(2));
+    }
+
+    /// A shift from three fifths of a run on, whose mean a free zero takes away: all that is left of it counts.
+    #[test]
+    fn a_shift_beside_a_free_zero_loses_nothing() {
+        let mut shifted = noise(6, 1000);
+        let before = shift_in_a_run(&slices(&shifted));
+        for (row, v) in shifted[3].iter_mut().enumerate() {
+            *v += 0.5 * if row < 600 { -0.4 } else { 0.6 };
+        }
+        // Half a sigma between 600 and 400 rows: 7.7 sigmas.
+        let seen = shift_in_a_run(&slices(&shifted)).sqrt();
+        assert!(before < 4.5f64.powi(2) && (6.2..9.2).contains(&seen), "{before} {seen}");
     }
 
     /// Rows that hang together in a tenth of one run are seen there, noisier ones are not.

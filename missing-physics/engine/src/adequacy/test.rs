@@ -53,10 +53,8 @@ pub(crate) fn test(
     let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
         let reading = linearised.read(data);
         let left = linearised.residual(data, &reading);
-        let white = linearised.whitened(&left, &reading);
-        let mut all = reading.gains;
-        all.extend(omnibus.statistics(&left, &white));
-        all
+        let undirected = omnibus.statistics(&linearised, &reading, &left);
+        reading.gains.into_iter().chain(undirected).collect()
     };
     let seen = statistics(&observed);
     let null: Vec<Vec<f64>> = (0..replicates as u64)

@@ -6,7 +6,7 @@ mod intervals;
 mod least_squares;
 pub(crate) mod locations;
 mod membership;
-mod projection;
+pub(crate) mod projection;
 mod responses;
 mod scan;
 mod single;

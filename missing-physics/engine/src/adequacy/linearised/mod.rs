@@ -18,4 +18,4 @@ mod solve;
 
 pub(crate) use curves::DEGREE;
 pub(crate) use outliers::{JUMP, LAPSE};
-pub(crate) use plane::Linearised;
+pub(crate) use plane::{Linearised, Reading, ScoredNoise};

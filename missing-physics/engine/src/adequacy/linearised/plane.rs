@@ -43,6 +43,15 @@ pub(super) struct Products {
     pub(super) pooled: Vec<Vec<PooledProduct>>,
 }
 
+/// A noise that a channel may have.
+pub(crate) struct ScoredNoise {
+    /// Its shape among those in play.
+    pub(crate) shape: usize,
+    pub(crate) sigma: f64,
+    /// Log likelihood with the prior weight of the shape, up to a constant of the data's layout.
+    pub(crate) score: f64,
+}
+
 /// What a data vector says of the model and its alternatives.
 pub(crate) struct Reading {
     /// Log likelihood of the model alone, up to a constant of the data's layout.
@@ -52,6 +61,8 @@ pub(crate) struct Reading {
     pub(crate) gains: Vec<f64>,
     /// Noise of the model alone: shape in play and sigma, by channel.
     pub(crate) noise: Vec<(usize, f64)>,
+    /// All noises that each channel may have beside the model alone.
+    pub(crate) noises: Vec<Vec<ScoredNoise>>,
     /// Coefficients of the model alone, by run: nuisance, then shared.
     pub(super) coefficients: Vec<Vec<f64>>,
 }

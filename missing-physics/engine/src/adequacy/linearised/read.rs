@@ -11,8 +11,10 @@ impl Linearised<'_> {
         let (score, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
         let gain = |alternative| self.gain(&products, (&nuisance, &shared), &noise, alternative);
         let gains = self.alternatives.iter().map(gain).collect();
+        let of_channel = |channel| self.noises(&products, channel, (&nuisance, &shared), &coefficients);
+        let noises = (0..self.problem.channels()).map(of_channel).collect();
         let coefficients = self.solve_by_run(&products, &coefficients.noise, &nuisance, &shared);
-        Reading { score, gains, noise, coefficients }
+        Reading { score, gains, noise, noises, coefficients }
     }
 
     /// Shape in play and sigma of the noise that the model alone leaves of a data vector, by channel.
@@ -67,16 +69,19 @@ impl Linearised<'_> {
         data.iter().enumerate().map(of_run).collect()
     }
 
-    /// A residual, whitened and in units of its noise.
-    pub(crate) fn whitened(&self, residual: &[Vec<Vec<f64>>], reading: &Reading) -> Vec<Vec<Vec<f64>>> {
-        let mut white = residual.to_vec();
-        for (run, row) in white.iter_mut().enumerate() {
-            for (channel, column) in row.iter_mut().enumerate() {
-                let (shape, sigma) = reading.noise[channel];
-                self.problem.whitener(run, channel, self.in_play[shape]).whiten(column);
-                column.iter_mut().for_each(|v| *v /= sigma);
-            }
-        }
-        white
+    /// A channel of a residual by run, whitened and in units of a noise: its shape in play and its sigma.
+    pub(crate) fn whitened(
+        &self,
+        residual: &[Vec<Vec<f64>>],
+        channel: usize,
+        (shape, sigma): (usize, f64),
+    ) -> Vec<Vec<f64>> {
+        let of_run = |(run, row): (usize, &Vec<Vec<f64>>)| {
+            let mut column = row[channel].clone();
+            self.problem.whitener(run, channel, self.in_play[shape]).whiten(&mut column);
+            column.iter_mut().for_each(|v| *v /= sigma);
+            column
+        };
+        residual.iter().enumerate().map(of_run).collect()
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::block::{Block, Product};
-use super::plane::{Linearised, Products};
+use super::plane::{Linearised, Products, ScoredNoise};
 use super::pooled::{self, Pooled, PooledProduct};
 use crate::fit::bordered::BorderedNormal;
 use crate::linalg::dot;
@@ -153,6 +153,27 @@ impl Linearised<'_> {
         (-freedom * sigma.ln() - 0.5 * log_determinant - 0.5 * squares / (sigma * sigma), sigma)
     }
 
+    /// Every noise that a channel may have beside given coefficients, each with its likeliest sigma.
+    pub(super) fn noises(
+        &self,
+        products: &Products,
+        channel: usize,
+        columns: (&[usize], &[usize]),
+        coefficients: &Coefficients,
+    ) -> Vec<ScoredNoise> {
+        let scored = |shape: usize| {
+            let of_noise = self.problem.family.shape(self.in_play[shape]);
+            self.rule.may_have(channel, &of_noise).then(|| {
+                let (squares, log_determinant) =
+                    self.squares(products, (channel, shape), columns, coefficients);
+                let (score, sigma) =
+                    self.channel_score(channel, self.in_play[shape], squares, log_determinant);
+                ScoredNoise { shape, sigma, score: score + of_noise.log_prior() }
+            })
+        };
+        (0..self.in_play.len()).filter_map(scored).collect()
+    }
+
     /// Fits coefficients and noise in turn; returns the score, the noise and the coefficients.
     pub(super) fn alternate(
         &self,
@@ -169,23 +190,11 @@ impl Linearised<'_> {
             let mut total = 0.0;
             let mut next = noise.clone();
             for (channel, state) in next.iter_mut().enumerate() {
-                let mut best = f64::NEG_INFINITY;
-                for shape in 0..self.in_play.len() {
-                    let of_noise = self.problem.family.shape(self.in_play[shape]);
-                    if !self.rule.may_have(channel, &of_noise) {
-                        continue;
-                    }
-                    let (squares, log_determinant) =
-                        self.squares(products, (channel, shape), (nuisance, shared), &coefficients);
-                    let (mut value, sigma) =
-                        self.channel_score(channel, self.in_play[shape], squares, log_determinant);
-                    value += of_noise.log_prior();
-                    if value > best {
-                        best = value;
-                        *state = (shape, sigma);
-                    }
-                }
-                total += best;
+                let scored = self.noises(products, channel, (nuisance, shared), &coefficients);
+                let best = scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
+                let Some(best) = best else { continue };
+                *state = (best.shape, best.sigma);
+                total += best.score;
             }
             score = total;
             let still = next.iter().zip(&noise).all(|(a, b)| a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-3);
