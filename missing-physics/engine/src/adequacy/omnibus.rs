@@ -90,9 +90,11 @@ impl<'a> Omnibus<'a> {
                     .sum(),
             );
             statistics.push(scan(&runs));
-            statistics.push(shift_beside_noise(linearised, &reading.noises[c], left, c));
+            let noises = under_each(linearised, &reading.noises[c], left, c);
+            statistics.push(shift_beside_noise(&noises));
             statistics.push(correlated_stretch(&runs));
-            let of_channel = self.lines.as_ref().map(|lines| lines.powers(&runs, total)).unwrap_or_default();
+            let of_channel = self.lines.as_ref().map(|lines| powers_beside_noise(lines, &noises));
+            let of_channel = of_channel.unwrap_or_default();
             statistics.push(highest(&of_channel));
             spectrum.iter_mut().zip(of_channel).for_each(|(all, power)| *all += power);
             statistics.push(odd_run(left, c));
@@ -137,21 +139,52 @@ fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
         .sum()
 }
 
-/// Twice the gain in log likelihood of a shift within one run, the noise of a channel free beside it: noise that is correlated over a good part
-/// of a run would take the shift for its own.
-fn shift_beside_noise(
+/// A channel's residual under one of the noises that it may have.
+struct UnderNoise {
+    /// By run.
+    white: Vec<Vec<f64>>,
+    /// By how much the noise is less likely than the likeliest, as a logarithm.
+    behind: f64,
+}
+
+impl UnderNoise {
+    fn runs(&self) -> Vec<&[f64]> {
+        self.white.iter().map(Vec::as_slice).collect()
+    }
+}
+
+/// A channel's residual under each noise that it may have: one that is correlated over a good part of a run, or that swings, would take an effect
+/// for its own.
+fn under_each(
     linearised: &Linearised<'_>,
     noises: &[ScoredNoise],
     left: &[Vec<Vec<f64>>],
     channel: usize,
-) -> f64 {
+) -> Vec<UnderNoise> {
     let best = noises.iter().map(|noise| noise.score).fold(f64::NEG_INFINITY, f64::max);
-    let gain = |noise: &ScoredNoise| {
-        let white = linearised.whitened(left, channel, (noise.shape, noise.sigma));
-        let runs: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
-        shift_in_a_run(&runs) - 2.0 * (best - noise.score)
+    let under = |noise: &ScoredNoise| UnderNoise {
+        white: linearised.whitened(left, channel, (noise.shape, noise.sigma)),
+        behind: best - noise.score,
     };
+    noises.iter().map(under).collect()
+}
+
+/// Twice the gain in log likelihood of a shift within one run, the noise free beside it.
+fn shift_beside_noise(noises: &[UnderNoise]) -> f64 {
+    let gain = |noise: &UnderNoise| shift_in_a_run(&noise.runs()) - 2.0 * noise.behind;
     noises.iter().map(gain).fold(0.0, f64::max)
+}
+
+/// The gain in log likelihood of an oscillation of each frequency, the noise free beside it.
+fn powers_beside_noise(lines: &Lines, noises: &[UnderNoise]) -> Vec<f64> {
+    let mut best = lines.nothing();
+    for noise in noises {
+        let runs = noise.runs();
+        let total = runs.iter().flat_map(|run| run.iter()).map(|v| v * v).sum();
+        let powers = lines.powers(&runs, total);
+        best.iter_mut().zip(powers).for_each(|(best, power)| *best = best.max(power - noise.behind));
+    }
+    best
 }
 
 /// The square of the largest standardised difference between an interval of rows of a single run and the rest of that run: from a row on,

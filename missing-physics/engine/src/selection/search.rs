@@ -55,7 +55,6 @@ pub(crate) fn search(
         if !tell(size as f64 / MOST as f64) {
             return None;
         }
-        let before = best_evidence(&all);
         for (Wanted { set, .. }, fitted) in wanted.into_iter().zip(fitted) {
             match (fitted, &set[..]) {
                 (Ok(fitted), _) => all.push(fitted),
@@ -63,10 +62,14 @@ pub(crate) fn search(
                 (Err(_), _) => {}
             }
         }
-        let of_this_size = |c: &Candidate| problem.at_work(&c.set).len() == size && c.evidence.is_finite();
+        // A mechanism that comes with another is two at work.
+        let at_work = |c: &Candidate| problem.at_work(&c.set).len();
+        let of_this_size = |c: &Candidate| at_work(c) == size && c.evidence.is_finite();
         let mut order: Vec<usize> = (0..all.len()).filter(|&i| of_this_size(&all[i])).collect();
         order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
-        if size > 1 && best_evidence(&all) <= before {
+        let [larger, smaller] =
+            [size, size - 1].map(|most| best_evidence(all.iter().filter(|c| at_work(c) <= most)));
+        if size > 1 && larger <= smaller {
             break;
         }
         order.truncate(BEAM);
@@ -223,7 +226,7 @@ fn from_larger(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
 
 /// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
 fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
-    let best = best_evidence(all);
+    let best = best_evidence(all.iter());
     let worth =
         |c: &&mut Candidate| c.ruled_out.is_none() && !c.set.is_empty() && c.evidence > best - POLISHED;
     let mut likely: Vec<&mut Candidate> = all.iter_mut().filter(worth).collect();
@@ -242,8 +245,8 @@ fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
     });
 }
 
-fn best_evidence(all: &[Candidate]) -> f64 {
-    all.iter().filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
+fn best_evidence<'a>(of: impl Iterator<Item = &'a Candidate>) -> f64 {
+    of.filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Where the model says to begin the mechanism that a set has and its parent has not, with all whole numbers that it knows for those

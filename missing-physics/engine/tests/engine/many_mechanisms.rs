@@ -106,3 +106,22 @@ fn sets_that_differ_by_a_companion_alone_are_counted_once() {
     let drag = found.mechanisms.iter().find(|m| m.id == "drag").unwrap();
     assert!(drag.probability > 0.99, "{}", drag.probability);
 }
+
+/// A mechanism that comes with another is looked at beside a third as well, though three others alone do better than that third.
+#[test]
+fn what_comes_with_another_is_found_beside_a_third() {
+    let names = ["offset", "wave", "chirp", "early", "midway", "late", "ripple"];
+    let parameters = names.map(|name| parameter(name, 0.0, ANY)).into();
+    let chirp = Mechanism { companions: vec![1], ..mechanism("chirp", vec![2]) };
+    let mut mechanisms = vec![mechanism("wave", vec![1]), chirp];
+    mechanisms.extend((3..names.len()).map(|k| mechanism(names[k], vec![k])));
+    let law = |s: &[f64], _: &[f64], x: f64| {
+        let burst =
+            |(at, size): (f64, &f64)| size * (-(x - at).powi(2)).exp() * (5.0 * x + 0.5 * x * x).sin();
+        let bursts: f64 = [1.0, 3.0, 5.0].into_iter().zip(&s[3..]).map(burst).sum();
+        s[0] + s[1] * (5.0 * x + s[2] * x * x).sin() + bursts + s[6] * (17.0 * x).sin()
+    };
+    let model = Curve::new(parameters, mechanisms, law).from(|_| vec![vec![(1, 1.0), (2, 0.45)]]);
+    let found = answer(&model, &draw(|x| (5.0 * x + 0.5 * x * x).sin() + 0.12 * (17.0 * x).sin()));
+    assert_eq!(found.chosen, ["chirp", "ripple"], "{:?}", found.sets);
+}
