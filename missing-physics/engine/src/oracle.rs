@@ -105,12 +105,11 @@ pub fn oracle_of_leftover(
     let changed = (0..problem.rows.len()).map(|run| {
         let of_channel = |channel: usize| {
             let [with, without] = [recording, without].map(|r| &r.runs[run].outputs[channel]);
-            let valid = problem.rows[run].valid[channel].iter();
-            let change: Vec<f64> = valid.map(|&i| with[i] - without[i]).collect();
-            let mut change = [change.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect()];
-            problem.whitener(run, channel, noise.shape[channel]).whiten_all(&mut change);
-            let [change] = change;
-            change.into_iter().map(|v: f64| v / noise.sigma[channel]).collect::<Vec<f64>>()
+            let change = problem.rows[run].valid[channel].iter().map(|&i| with[i] - without[i]);
+            let mut change: Vec<f64> = change.map(|v| if v.is_finite() { v } else { 0.0 }).collect();
+            problem.whitener(run, channel, noise.shape[channel]).whiten(&mut change);
+            change.iter_mut().for_each(|v| *v /= noise.sigma[channel]);
+            change
         };
         (0..problem.channels()).flat_map(of_channel).collect::<Vec<f64>>()
     });

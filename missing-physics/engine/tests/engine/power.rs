@@ -6,10 +6,15 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-use crate::common::{Ball, World};
+use crate::common::{Ball, Curve, World, mechanism, parameter, recording};
+use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
+use missing_physics::oracle::oracle_of_leftover;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
 
 /// Size of the effect in standard errors when everything else is known: what the likelihood-ratio test that is told the
 /// true mechanism has to work with. Found by least squares on noise-free worlds, apart from the engine.
@@ -165,4 +170,37 @@ fn a_run_from_the_chosen_model_does_not_change_the_verdict() {
         assert_eq!((answer.verdict, &answer.chosen), (again.verdict, &again.chosen), "seed {seed}");
         assert_eq!(again.chosen, ["linear-drag"]);
     }
+}
+
+/// A ripple of ten standard errors beside a bend: whoever knows its shape finds it as large as it is, whatever its sign.
+#[test]
+fn an_oracle_finds_what_is_left_over_beside_a_mechanism() {
+    const ROWS: usize = 400;
+    let free = |name: &str| parameter(name, 0.0, [-10.0, 10.0]);
+    let bent = |s: &[f64], _: &[f64], x: f64| s[0] * x + s[1] * x * x;
+    let model = Curve::new(vec![free("slope"), free("bend")], vec![mechanism("bend", vec![1])], bent);
+    let drawn = |ripple: f64, rows: usize| -> Recording {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let x: Vec<f64> = (0..rows).map(|i| i as f64 / ROWS as f64).collect();
+        let reading = |x: &f64| {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            x + 5.0 * x * x + ripple * (40.0 * x).sin() + noise
+        };
+        let y = x.iter().map(reading).collect();
+        recording("x", vec![Run { label: "1".into(), inputs: vec![x], outputs: vec![y], kind: 0 }], None)
+    };
+    let decisive = |ripple: f64, rows: usize| {
+        let (with, without) = (drawn(ripple, ROWS), drawn(0.0, rows));
+        let truth = ["bend".to_owned()];
+        let found = oracle_of_leftover(&model, (&with, &without), &truth, &Options::default()).unwrap();
+        found.map(|found| found.decisive)
+    };
+    let size = 10.0 / (ROWS as f64 / 2.0).sqrt();
+    for ripple in [size, -size] {
+        let errors = (2.0 * decisive(ripple, ROWS).unwrap() + (ROWS as f64).ln()).sqrt();
+        assert!((errors - 10.0).abs() < 3.0, "{errors}");
+    }
+    assert_eq!(decisive(0.0, ROWS), None);
+    // Rows that do not correspond.
+    assert_eq!(decisive(size, ROWS - 1), None);
 }
