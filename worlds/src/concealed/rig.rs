@@ -230,6 +230,8 @@ impl<R: Rig> Maker for RigMaker<R> {
     }
 
     fn without_leftover(&self, hidden: Hidden, seed: u64) -> Option<Concealed> {
+        // Drawing costs time, and another kind has none.
+        (hidden == Hidden::Leftover).then_some(())?;
         let drawn = Drawn::<R>::new(hidden, seed);
         let listed = drawn.listed;
         (drawn.key.hidden == Hidden::Leftover).then(|| drawn.recorded(listed))

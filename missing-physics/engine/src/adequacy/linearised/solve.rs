@@ -191,10 +191,11 @@ impl Linearised<'_> {
             let mut next = noise.clone();
             for (channel, state) in next.iter_mut().enumerate() {
                 let scored = self.noises(products, channel, (nuisance, shared), &coefficients);
-                let best = scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-                let Some(best) = best else { continue };
-                *state = (best.shape, best.sigma);
-                total += best.score;
+                // A score that is no number is none, and of equal ones the first counts.
+                let known = scored.into_iter().filter(|noise| noise.score > f64::NEG_INFINITY);
+                let best = known.reduce(|best, next| if next.score > best.score { next } else { best });
+                total += best.as_ref().map_or(f64::NEG_INFINITY, |best| best.score);
+                *state = best.map_or(*state, |best| (best.shape, best.sigma));
             }
             score = total;
             let still = next.iter().zip(&noise).all(|(a, b)| a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-3);
