@@ -208,7 +208,8 @@ fn shift_in_a_run(runs: &[&[f64]]) -> f64 {
             let difference = sums[from + length] - sums[from] - part * total;
             difference * difference / (length as f64 * (1.0 - part))
         };
-        let step = rows.div_ceil(CHANGES);
+        // A run may have no value of this channel.
+        let step = rows.div_ceil(CHANGES).max(1);
         for from in (SHORTEST..(rows + 1).saturating_sub(SHORTEST)).step_by(step) {
             best = best.max(contrast(from, rows - from));
         }
@@ -298,6 +299,17 @@ mod tests {
         assert!(shift_in_a_run(&slices(&still)) < 4.5f64.powi(2));
         assert!(shift_in_a_run(&slices(&shifted)) > 6.0f64.powi(2));
         assert!(scan(&slices(&shifted)) < 4.5f64.powi(2));
+    }
+
+    /// A run without a value of the channel, or with too few for a shift, adds nothing.
+    #[test]
+    fn runs_without_values_add_nothing() {
+        let full = noise(2, 50);
+        for rows in [0, 1, 7] {
+            let beside = [full[0].as_slice(), &full[1][..rows]];
+            assert_eq!(shift_in_a_run(&beside), shift_in_a_run(&beside[..1]));
+            assert!(shift_in_a_run(&beside[1..]) <= 0.0);
+        }
     }
 
     /// A shift from three fifths of a run on, whose mean a free zero takes away: all that is left of it counts.
