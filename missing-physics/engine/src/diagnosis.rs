@@ -89,7 +89,7 @@ pub struct TestOutcome {
 pub struct AsIf {
     /// What it is, for a person, with its article (`a force`).
     pub what: String,
-    /// How large each of its components is there on average, with intervals for white noise.
+    /// How large each of its components is there on average, with intervals for noise on the scale of a few rows.
     pub sizes: Vec<Estimate>,
 }
 
@@ -117,7 +117,7 @@ pub struct Location {
     pub rms: f64,
     /// The residual of largest modulus there, in the channel's unit.
     pub largest_residual: f64,
-    /// One sigma of the channel's white noise, in its unit.
+    /// One sigma of the channel's noise on the scale of a few rows, in its unit.
     pub sigma: f64,
     /// Size of the misfit in standard errors.
     pub z: f64,

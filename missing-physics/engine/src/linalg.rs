@@ -59,6 +59,19 @@ pub(crate) fn gram<C: AsRef<[f64]>>(columns: &[C]) -> DMatrix<f64> {
     gram
 }
 
+/// Legendre polynomials of degrees 0 to `degree` at values of x in [-1, 1], one column after the other.
+pub(crate) fn legendre(x: &[f64], degree: usize) -> Vec<Vec<f64>> {
+    let mut columns = vec![vec![1.0; x.len()], x.to_vec()];
+    for d in 1..degree {
+        let n = d as f64;
+        let next =
+            |((x, now), before): ((&f64, &f64), &f64)| ((2.0 * n + 1.0) * x * now - n * before) / (n + 1.0);
+        columns.push(x.iter().zip(&columns[d]).zip(&columns[d - 1]).map(next).collect());
+    }
+    columns.truncate(degree + 1);
+    columns
+}
+
 /// Cholesky factor of a positive semidefinite matrix; directions that the matrix does not determine are left out.
 #[derive(Debug, Clone)]
 pub(crate) struct SemiCholesky {

@@ -216,7 +216,7 @@ pub(super) fn as_if(d: &Diagnosis) -> Vec<String> {
 /// What the chosen mechanisms leave, in one sentence.
 pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
     format!(
-        "{}: {} {unit} rms is left, beside white noise of {} {unit}",
+        "{}: {} {unit} rms is left, beside noise of {} {unit}",
         place_words(d, l),
         significant(l.rms, 2),
         significant(l.sigma, 2),

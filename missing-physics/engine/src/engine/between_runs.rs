@@ -39,7 +39,7 @@ impl Course<'_> {
         answer: &Answer<'_>,
         adequacy: &Adequacy,
         before: Vec<ChannelFit>,
-        Compared { ranking, white, .. }: &Compared,
+        Compared { ranking, rough, .. }: &Compared,
         chosen: &Best,
         judge: &Judge<'_>,
     ) -> Result<Diagnosis, DiagnoseError> {
@@ -70,7 +70,7 @@ impl Course<'_> {
         diagnosis.explained_share = judge.share_beside(&whole.set, &differing);
         if let Some(alone) = ranking.of(&named) {
             let fit = judge.least_squares(&named).unwrap_or(&alone.fit);
-            diagnosis.leftover = locate(problem, &alone.selection, fit, white)?;
+            diagnosis.leftover = locate(problem, &alone.selection, fit, rough)?;
         }
         if ranking.of(&differing).is_some_and(|alone| alone.evidence > whole.evidence) {
             let names = answer.names(&differing);

@@ -13,6 +13,7 @@ use crate::law::found::improves;
 use crate::law::search::find;
 use crate::locate::locations::locate;
 use crate::model::{Experiment, PredictError};
+use crate::noise::rough::rough_noise;
 use crate::noise::rule::NoiseState;
 use crate::observer::{Observer, Progress};
 use crate::problem::Problem;
@@ -44,6 +45,8 @@ pub(super) struct Compared {
     best: Option<Best>,
     /// Sigmas of the white noise, by channel.
     pub(super) white: Vec<f64>,
+    /// The noise beside which sets are judged: white, or with a correlation over a few rows.
+    pub(super) rough: NoiseState,
 }
 
 /// What sets of mechanisms say of the data.
@@ -81,12 +84,15 @@ impl Course<'_> {
         test::test(problem, &candidate.selection, &candidate.fit, &rivals, rule, replicates, seed)
     }
 
-    /// Sigmas of the white noise. Runs too short to show theirs have that of the likeliest fit: that of the baseline would be its misfit.
-    fn white_noise(&self, ranking: &Ranking) -> Vec<f64> {
+    /// Sigmas of the white noise, and the noise on the scale of a few rows. Runs too short to show theirs have that of the likeliest fit: that of
+    /// the baseline would be its misfit.
+    fn small_scale_noise(&self, ranking: &Ranking) -> Result<(Vec<f64>, NoiseState), DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         let sound = ranking.all().iter().filter(|c| c.ruled_out.is_none());
         let likeliest = sound.max_by(|a, b| a.evidence.total_cmp(&b.evidence)).unwrap_or(baseline);
-        rough_sigmas(problem, rule, &likeliest.fit)
+        let white = rough_sigmas(problem, rule, &likeliest.fit);
+        let rough = rough_noise(problem, rule, &likeliest.fit, &white)?;
+        Ok((white, rough))
     }
 
     /// The whole way.
@@ -114,53 +120,53 @@ impl Course<'_> {
         self.outcome(&answer, &adequacy, before, &compared, conclusion)
     }
 
-    /// Every set worth looking at, the preferred one, and the white noise beside which they are judged.
+    /// Every set worth looking at, the preferred one, and the noise beside which they are judged.
     fn compared(&self) -> Result<Compared, DiagnoseError> {
         let (mut ranking, unfitted) = self.compare(&self.wanted())?;
         let mut best = self.best(&mut ranking)?;
-        let white = self.white_noise(&ranking);
+        let (white, rough) = self.small_scale_noise(&ranking)?;
         if self.explains(&ranking, best.as_ref()).is_none()
-            && let Some((other, clear)) = self.unasked(&white)?
+            && let Some((other, clear)) = self.unasked(&white, &rough)?
         {
             (ranking, best) = (other, Some(clear));
         }
-        Ok(Compared { ranking, unfitted, best, white })
+        Ok(Compared { ranking, unfitted, best, white, rough })
     }
 
     /// What the sets say: one that explains the data, a main cause beside a leftover or beside a cause in a part of the data, or neither.
     fn conclusion<'c>(&'c self, compared: &'c Compared) -> Result<Conclusion<'c>, DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
-        let Compared { ranking, best, white, .. } = compared;
+        let Compared { ranking, best, rough, .. } = compared;
         let all = ranking.all();
         let explained = self.explains(ranking, best.as_ref());
         let sound = explained.and_then(|best| self.sound(compared, ranking.at(best.at)));
         let (judge, cause) = match sound {
             // What explains the data doubtfully is weighed against less of it beside a leftover.
             Some(judge) => {
-                (judge, explained.and_then(|best| self.less_beside_a_leftover(ranking, best, white)))
+                (judge, explained.and_then(|best| self.less_beside_a_leftover(ranking, best, rough)))
             }
             None => {
                 self.tell("what the closest explanation leaves", 0.0)?;
-                let judge = Judge::new(problem, rule, all, white, |c| self.alike(c));
+                let judge = Judge::new(problem, rule, all, rough, |c| self.alike(c));
                 let cause = judge.main_cause();
                 (judge, cause)
             }
         };
         if cause.is_none() && explained.is_none() {
             let near = judge.near();
-            let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
+            let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
             let cause = beside.main_cause()?.or_else(|| near.as_ref()?.main_cause());
             return Ok(Conclusion { judge, near, cause, explained, replaced: None });
         }
         // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
         let chosen = explained.map(|best| ranking.at(best.at)).filter(|_| cause.is_none());
-        let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
+        let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
         let members = chosen.map(|set| beside.members(set)).transpose()?.flatten();
         let Some(members) = members else {
             return Ok(Conclusion { judge, near: None, cause, explained, replaced: None });
         };
-        let judge = Judge::new(problem, rule, all, white, |c| c.set.len() <= members && self.alike(c));
-        let beside = BesideLocal { problem, baseline, all, judge: &judge, white };
+        let judge = Judge::new(problem, rule, all, rough, |c| c.set.len() <= members && self.alike(c));
+        let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
         let cause = beside.main_cause()?.or_else(|| judge.main_cause());
         Ok(Conclusion { judge, near: None, cause, explained: None, replaced: chosen })
     }
@@ -169,12 +175,12 @@ impl Course<'_> {
     /// which unseen data are predicted better is imitating something else.
     fn sound<'c>(&'c self, compared: &'c Compared, chosen: &Candidate) -> Option<Judge<'c>> {
         let Begun { problem, rule, .. } = self.begun;
-        let Compared { ranking, white, .. } = compared;
+        let Compared { ranking, white, rough, .. } = compared;
         if slow(problem, &chosen.fit.noise, white) {
             return None;
         }
         let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
-        Some(Judge::new(problem, rule, ranking.all(), white, parts)).filter(|judge| judge.holds(&chosen.set))
+        Some(Judge::new(problem, rule, ranking.all(), rough, parts)).filter(|judge| judge.holds(&chosen.set))
     }
 
     /// The answer that follows from a conclusion.
@@ -187,12 +193,12 @@ impl Course<'_> {
         conclusion: Conclusion<'_>,
     ) -> Result<Outcome, DiagnoseError> {
         let Begun { problem, baseline, .. } = self.begun;
-        let Compared { ranking, unfitted, best, white } = compared;
+        let Compared { ranking, unfitted, best, white, rough } = compared;
         let Conclusion { judge, near, cause, explained, replaced } = conclusion;
-        let mut sigma = white;
+        let mut noise = rough.clone();
         let (mut diagnosis, misses) = match (cause, explained) {
             (Some(cause), _) => {
-                let mut diagnosis = self.partly(answer, adequacy, before, ranking, &cause, white)?;
+                let mut diagnosis = self.partly(answer, adequacy, before, ranking, &cause, rough)?;
                 diagnosis.remarks.extend(seen_near_by(answer, &judge, &cause));
                 (diagnosis, Some(cause.chosen.least_squares))
             }
@@ -201,7 +207,8 @@ impl Course<'_> {
                 (diagnosis, None)
             }
             (None, Some(chosen)) => {
-                sigma = &ranking.at(chosen.at).fit.noise.sigma;
+                let sigma = ranking.at(chosen.at).fit.noise.sigma.clone();
+                noise = NoiseState { shape: vec![0; sigma.len()], sigma };
                 (self.explained(answer, adequacy, before, ranking, chosen, &judge)?, None)
             }
             (None, None) => {
@@ -225,19 +232,24 @@ impl Course<'_> {
             diagnosis.remarks.push("one run alone: whether another needs the same was not tested".into());
         }
         diagnosis.sets = answer.sets(ranking, best.as_ref());
-        diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, sigma)?;
+        diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &noise)?;
         Ok(Outcome { diagnosis, contradicting })
     }
 
     /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of
     /// what is left without them.
-    fn less_beside_a_leftover(&self, ranking: &Ranking, best: &Best, white: &[f64]) -> Option<MainCause> {
+    fn less_beside_a_leftover(
+        &self,
+        ranking: &Ranking,
+        best: &Best,
+        rough: &NoiseState,
+    ) -> Option<MainCause> {
         let Begun { problem, rule, .. } = self.begun;
         let chosen = ranking.at(best.at);
         if best.p_value > self.options.alpha || chosen.set.len() < 2 {
             return None;
         }
-        let cause = Judge::new(problem, rule, ranking.all(), white, |c| self.alike(c)).main_cause();
+        let cause = Judge::new(problem, rule, ranking.all(), rough, |c| self.alike(c)).main_cause();
         cause.filter(|cause| {
             let less = &cause.chosen.candidate;
             less.set.len() < chosen.set.len() && nested(less, chosen)
@@ -265,7 +277,7 @@ impl Course<'_> {
     }
 
     /// Where nothing that was asked for explains the data: what nobody has asked for, if it explains them and they are clear.
-    fn unasked(&self, white: &[f64]) -> Result<Option<(Ranking, Best)>, DiagnoseError> {
+    fn unasked(&self, white: &[f64], rough: &NoiseState) -> Result<Option<(Ranking, Best)>, DiagnoseError> {
         let Begun { problem, rule, .. } = self.begun;
         let mechanisms = &problem.spec().mechanisms;
         if mechanisms.iter().all(|m| !m.unasked) {
@@ -281,7 +293,7 @@ impl Course<'_> {
             let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
             chosen.set.iter().any(|&m| mechanisms[m].unasked)
                 && !slow(problem, &chosen.fit.noise, white)
-                && Judge::new(problem, rule, ranking.all(), white, parts).holds(&chosen.set)
+                && Judge::new(problem, rule, ranking.all(), rough, parts).holds(&chosen.set)
         });
         Ok(best.filter(|_| holds).map(|best| (ranking, best)))
     }
@@ -307,7 +319,7 @@ impl Course<'_> {
         before: Vec<ChannelFit>,
         ranking: &Ranking,
         cause: &MainCause,
-        white: &[f64],
+        noise: &NoiseState,
     ) -> Result<Diagnosis, DiagnoseError> {
         let problem = &self.begun.problem;
         let chosen = &cause.chosen.candidate;
@@ -315,7 +327,7 @@ impl Course<'_> {
         diagnosis.mechanisms = answer.mechanisms_beside_a_leftover(ranking, cause)?;
         diagnosis.chosen = answer.ids(&chosen.set);
         diagnosis.explained_share = Some(cause.chosen.share);
-        diagnosis.leftover = locate(problem, &chosen.selection, &chosen.fit, white)?;
+        diagnosis.leftover = locate(problem, &chosen.selection, &chosen.fit, noise)?;
         let after = predictions(problem, &chosen.fit)?;
         diagnosis.after = answer.errors_of(&after, &held_out(problem, &cause.chosen.least_squares)?);
         draw(&mut diagnosis, &after);

@@ -4,6 +4,7 @@ use statrs::function::factorial::ln_binomial;
 
 use crate::locate::locations::local_cause;
 use crate::model::PredictError;
+use crate::noise::rule::NoiseState;
 use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
 use crate::selection::main_cause::{Judge, MainCause, SMALLER};
@@ -17,14 +18,14 @@ const CLOSE: usize = 12;
 
 /// Sets of mechanisms with the best single cause that acts within an interval, or in some runs, beside them.
 ///
-/// All are judged by what they leave in units of white noise, less Schwarz's price of each size that is fitted and the logarithm of the number
+/// All are judged by what they leave in units of the noise, less Schwarz's price of each size that is fitted and the logarithm of the number
 /// of hypotheses of its kind. What is left beyond noise is noise of its size as well: it counts by its logarithm.
 pub(super) struct BesideLocal<'a> {
     pub(super) problem: &'a Problem<'a>,
     pub(super) baseline: &'a Candidate,
     pub(super) all: &'a [Candidate],
     pub(super) judge: &'a Judge<'a>,
-    pub(super) white: &'a [f64],
+    pub(super) noise: &'a NoiseState,
 }
 
 /// A set, and what it leaves with a local cause beside it.
@@ -56,7 +57,7 @@ impl BesideLocal<'_> {
     fn weighed(&self, at: usize) -> Result<Option<Weighed>, PredictError> {
         let set = &self.all[at];
         let Some(fit) = self.judge.least_squares(&set.set) else { return Ok(None) };
-        let local = local_cause(self.problem, &set.selection, fit, self.white)?;
+        let local = local_cause(self.problem, &set.selection, fit, self.noise)?;
         Ok(local.map(|local| {
             let after = (fit.chi2 - local.gain).max(1.0);
             let beyond = |squares: f64| (squares - self.rows()).max(0.0);

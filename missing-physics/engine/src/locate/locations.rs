@@ -31,12 +31,9 @@ impl<'a> Ground<'a> {
         problem: &Problem<'a>,
         selection: &Selection,
         baseline: &Fit,
-        sigma: &[f64],
+        noise: &NoiseState,
     ) -> Result<Self, PredictError> {
-        let noise = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
-        let columns: Vec<Vec<Vec<f64>>> = (0..problem.rows.len())
-            .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.nuisance[r]))
-            .collect::<Result<_, _>>()?;
+        let columns = columns(problem, selection, baseline, noise)?;
         let sizes = (selection.nuisance.len(), selection.shared.len());
         let projection = Projection::new(&columns, sizes);
         let (variables, unknowns) = (variables(problem, baseline)?, unknowns(problem));
@@ -44,9 +41,14 @@ impl<'a> Ground<'a> {
     }
 
     /// The single cause that is worth most.
-    fn cause(&self, problem: &Problem<'_>, fit: &Fit, sigma: &[f64]) -> Result<Option<Cause>, PredictError> {
+    fn cause(
+        &self,
+        problem: &Problem<'_>,
+        fit: &Fit,
+        noise: &NoiseState,
+    ) -> Result<Option<Cause>, PredictError> {
         let Self { variables, projection, unknowns, .. } = self;
-        Scene { problem, fit, sigma, projection, variables, unknowns }.best()
+        Scene { problem, fit, noise, projection, variables, unknowns }.best()
     }
 }
 
@@ -61,26 +63,47 @@ pub(crate) fn local_cause(
     problem: &Problem<'_>,
     selection: &Selection,
     baseline: &Fit,
-    sigma: &[f64],
+    noise: &NoiseState,
 ) -> Result<Option<LocalCause>, PredictError> {
     if problem.model.extensions().local_causes.is_none() {
         return Ok(None);
     }
-    let ground = Ground::new(problem, selection, baseline, sigma)?;
-    let cause = ground.cause(problem, baseline, sigma)?;
+    let ground = Ground::new(problem, selection, baseline, noise)?;
+    let cause = ground.cause(problem, baseline, noise)?;
     let cause = cause.filter(|cause| !cause.everywhere && ground.unknowns[cause.unknown].is_model_s());
     Ok(cause.map(|cause| LocalCause { gain: cause.gains.iter().sum(), price: cause.price }))
 }
 
-/// Finds where the cause acts, largest share first.
+/// Whitened columns of all runs.
+fn columns(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    fit: &Fit,
+    noise: &NoiseState,
+) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
+    let of_run = |r: usize| whitened_columns(problem, selection, noise, r, &fit.shared, &fit.nuisance[r]);
+    (0..problem.rows.len()).map(of_run).collect()
+}
+
+/// White noise beside which the mean of many rows is known as well as beside this noise.
+fn slow_part(problem: &Problem<'_>, noise: &NoiseState) -> NoiseState {
+    let sigma = |(shape, sigma): (&usize, &f64)| sigma * problem.family.shape(*shape).of_a_mean().sqrt();
+    let sigma = noise.shape.iter().zip(&noise.sigma).map(sigma).collect();
+    NoiseState { shape: vec![0; noise.shape.len()], sigma }
+}
+
+/// Finds where the cause acts beside a noise, largest share first.
 pub(crate) fn locate(
     problem: &Problem<'_>,
     selection: &Selection,
     baseline: &Fit,
-    sigma: &[f64],
+    noise: &NoiseState,
 ) -> Result<Vec<Location>, PredictError> {
-    let ground = Ground::new(problem, selection, baseline, sigma)?;
-    let Ground { columns, sizes, variables, projection, unknowns } = &ground;
+    let ground = Ground::new(problem, selection, baseline, noise)?;
+    let Ground { sizes, variables, projection, unknowns, .. } = &ground;
+    let slow = slow_part(problem, noise);
+    let columns =
+        &if slow == *noise { ground.columns.clone() } else { columns(problem, selection, baseline, &slow)? };
     let of_readings: Vec<(usize, &Along, Scan, Interval)> = (0..problem.channels())
         .filter_map(|channel| {
             let (along, scan, best) = best_interval(problem, columns, *sizes, channel, variables)?;
@@ -88,10 +111,10 @@ pub(crate) fn locate(
         })
         .collect();
     let worth = of_readings.iter().map(|(.., interval)| interval.worth).sum::<f64>();
-    let cause = ground.cause(problem, baseline, sigma)?;
+    let cause = ground.cause(problem, baseline, noise)?;
     let cause = cause.filter(|cause| worth <= SIMPLER * cause.worth);
-    let events = events(problem, baseline, sigma, projection, unknowns)?;
-    let places = Places { problem, columns, sigma };
+    let events = events(problem, baseline, noise, projection, unknowns)?;
+    let places = Places { problem, columns, unit: &slow.sigma, sigma: &noise.sigma };
     let found = match (cause, events) {
         (cause, Some(events))
             if {
@@ -209,6 +232,8 @@ struct Places<'a> {
     problem: &'a Problem<'a>,
     /// What the fitted baseline leaves is the last of each run's columns.
     columns: &'a [Vec<Vec<f64>>],
+    /// The unit of these, by channel.
+    unit: &'a [f64],
     sigma: &'a [f64],
 }
 
@@ -243,7 +268,7 @@ impl Places<'_> {
         for run in (0..runs.len()).filter(|&r| runs[r] || none) {
             let rows = self.rows(run, channel).filter(|&(_, row)| within.holds(run, row));
             let left = self.columns[run].last();
-            residuals.extend(rows.map(|(at, _)| left.map_or(0.0, |c| c[at]) * self.sigma[channel]));
+            residuals.extend(rows.map(|(at, _)| left.map_or(0.0, |c| c[at]) * self.unit[channel]));
         }
         let label = |r: usize| self.problem.recording.runs[r].label.clone();
         let mean = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
@@ -330,7 +355,7 @@ impl Places<'_> {
             let residual = self
                 .rows(event.run, best)
                 .find(|&(_, row)| row == event.row)
-                .and_then(|(k, _)| Some(self.columns[event.run].last()?[k] * self.sigma[best]))?;
+                .and_then(|(k, _)| Some(self.columns[event.run].last()?[k] * self.unit[best]))?;
             let gain: f64 = event.gains.iter().sum();
             let location = Location {
                 channel: self.problem.recording.channels[best].name.clone(),
@@ -356,7 +381,7 @@ impl Places<'_> {
     }
 }
 
-/// A size with its interval, from white noise.
+/// A size with its interval.
 fn estimate(unknown: &Unknown<'_>, component: usize, [value, error]: [f64; 2]) -> Estimate {
     const CI95: f64 = 1.96;
     let Quantity { name, unit } = unknown.described.components[component].clone();

@@ -4,6 +4,7 @@
 pub(crate) mod estimate;
 pub(crate) mod family;
 pub(crate) mod process;
+pub(crate) mod rough;
 pub(crate) mod rule;
 
 pub use process::{Shape, Whitener, rough_sigma};

@@ -38,6 +38,20 @@ impl Shape {
         if square > 0.0 { (square / (1.0 + square), steps) } else { (self.correlated, self.length_steps) }
     }
 
+    /// How many times larger the variance of the mean of many rows, evenly spaced, is than that of white noise.
+    pub(crate) fn of_a_mean(&self) -> f64 {
+        if self.correlated <= 0.0 {
+            return 1.0;
+        }
+        let correlated = if self.smooth {
+            4.0 / 3f64.sqrt() * self.length_steps
+        } else {
+            let neighbours = (-1.0 / self.length_steps).exp();
+            (1.0 + neighbours) / (1.0 - neighbours)
+        };
+        1.0 - self.correlated + self.correlated * correlated.max(1.0)
+    }
+
     /// Log prior weight against white noise: colour has to show, and a faint slow part (which would swallow any faint
     /// slow effect) has to show most.
     pub fn log_prior(&self) -> f64 {

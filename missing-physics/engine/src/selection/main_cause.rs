@@ -89,19 +89,18 @@ fn without(set: &[usize], member: usize) -> Vec<usize> {
 }
 
 impl<'a> Judge<'a> {
-    /// Fits the wanted candidates and the baseline by ordinary least squares with white noise of the given sigmas.
+    /// Fits the wanted candidates and the baseline by least squares beside a noise that is rough: a slow misfit is not taken for noise.
     pub(crate) fn new(
         problem: &'a Problem<'a>,
         rule: &NoiseRule,
         all: &'a [Candidate],
-        sigma: &[f64],
+        noise: &NoiseState,
         wanted: impl Fn(&Candidate) -> bool + Sync,
     ) -> Self {
-        let white = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
         let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let least_squares = |c: &Candidate| -> Option<LeastSquares> {
             (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
-            let fit = solve(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
+            let fit = solve(problem, &c.selection, noise, &c.fit.shared, &c.fit.nuisance).ok()?;
             let seen = (fit.chi2 - values as f64).max(0.0);
             Some(LeastSquares { fit, seen, unseen: OnceLock::new() })
         };

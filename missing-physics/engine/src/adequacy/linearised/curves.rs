@@ -1,6 +1,7 @@
 //! Smooth functions of the inputs and of the prediction itself: what a residual may depend on when nothing is known.
 
 use crate::fit::optimum::Fit;
+use crate::linalg::legendre;
 use crate::model::PredictError;
 use crate::problem::Problem;
 
@@ -107,15 +108,6 @@ impl Curves {
         let valid = &problem.rows[run].valid[channel];
         let Some(values) = &self.scaled[variable] else { return vec![vec![0.0; valid.len()]; degree + 1] };
         let x: Vec<f64> = valid.iter().map(|&i| values[run][i]).collect();
-        let mut columns = vec![vec![1.0; x.len()], x.clone()];
-        for d in 1..degree {
-            let n = d as f64;
-            let next = |((x, now), before): ((&f64, &f64), &f64)| {
-                ((2.0 * n + 1.0) * x * now - n * before) / (n + 1.0)
-            };
-            columns.push(x.iter().zip(&columns[d]).zip(&columns[d - 1]).map(next).collect());
-        }
-        columns.truncate(degree + 1);
-        columns
+        legendre(&x, degree)
     }
 }
