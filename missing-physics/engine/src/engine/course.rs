@@ -13,7 +13,7 @@ use crate::law::found::improves;
 use crate::law::search::find;
 use crate::locate::locations::locate;
 use crate::model::{Experiment, PredictError};
-use crate::noise::rough::rough_noise;
+use crate::noise::rough::RoughNoise;
 use crate::noise::rule::NoiseState;
 use crate::observer::{Observer, Progress};
 use crate::problem::Problem;
@@ -46,7 +46,7 @@ pub(super) struct Compared {
     /// Sigmas of the white noise, by channel.
     pub(super) white: Vec<f64>,
     /// The noise beside which sets are judged: white, or with a correlation over a few rows.
-    pub(super) rough: NoiseState,
+    pub(super) rough: RoughNoise,
 }
 
 /// What sets of mechanisms say of the data.
@@ -86,12 +86,12 @@ impl Course<'_> {
 
     /// Sigmas of the white noise, and the noise on the scale of a few rows. Runs too short to show theirs have that of the likeliest fit: that of
     /// the baseline would be its misfit.
-    fn small_scale_noise(&self, ranking: &Ranking) -> Result<(Vec<f64>, NoiseState), DiagnoseError> {
+    fn small_scale_noise(&self, ranking: &Ranking) -> Result<(Vec<f64>, RoughNoise), DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         let sound = ranking.all().iter().filter(|c| c.ruled_out.is_none());
         let likeliest = sound.max_by(|a, b| a.evidence.total_cmp(&b.evidence)).unwrap_or(baseline);
         let white = rough_sigmas(problem, rule, &likeliest.fit);
-        let rough = rough_noise(problem, rule, &likeliest.fit, &white)?;
+        let rough = RoughNoise::new(problem, rule, &likeliest.fit, &white)?;
         Ok((white, rough))
     }
 
@@ -207,8 +207,7 @@ impl Course<'_> {
                 (diagnosis, None)
             }
             (None, Some(chosen)) => {
-                let sigma = ranking.at(chosen.at).fit.noise.sigma.clone();
-                noise = NoiseState { shape: vec![0; sigma.len()], sigma };
+                noise = RoughNoise::white(ranking.at(chosen.at).fit.noise.sigma.clone());
                 (self.explained(answer, adequacy, before, ranking, chosen, &judge)?, None)
             }
             (None, None) => {
@@ -242,7 +241,7 @@ impl Course<'_> {
         &self,
         ranking: &Ranking,
         best: &Best,
-        rough: &NoiseState,
+        rough: &RoughNoise,
     ) -> Option<MainCause> {
         let Begun { problem, rule, .. } = self.begun;
         let chosen = ranking.at(best.at);
@@ -277,7 +276,7 @@ impl Course<'_> {
     }
 
     /// Where nothing that was asked for explains the data: what nobody has asked for, if it explains them and they are clear.
-    fn unasked(&self, white: &[f64], rough: &NoiseState) -> Result<Option<(Ranking, Best)>, DiagnoseError> {
+    fn unasked(&self, white: &[f64], rough: &RoughNoise) -> Result<Option<(Ranking, Best)>, DiagnoseError> {
         let Begun { problem, rule, .. } = self.begun;
         let mechanisms = &problem.spec().mechanisms;
         if mechanisms.iter().all(|m| !m.unasked) {
@@ -319,7 +318,7 @@ impl Course<'_> {
         before: Vec<ChannelFit>,
         ranking: &Ranking,
         cause: &MainCause,
-        noise: &NoiseState,
+        noise: &RoughNoise,
     ) -> Result<Diagnosis, DiagnoseError> {
         let problem = &self.begun.problem;
         let chosen = &cause.chosen.candidate;

@@ -4,7 +4,7 @@ use statrs::function::factorial::ln_binomial;
 
 use crate::locate::locations::local_cause;
 use crate::model::PredictError;
-use crate::noise::rule::NoiseState;
+use crate::noise::rough::RoughNoise;
 use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
 use crate::selection::main_cause::{Judge, MainCause, SMALLER};
@@ -25,7 +25,7 @@ pub(super) struct BesideLocal<'a> {
     pub(super) baseline: &'a Candidate,
     pub(super) all: &'a [Candidate],
     pub(super) judge: &'a Judge<'a>,
-    pub(super) noise: &'a NoiseState,
+    pub(super) noise: &'a RoughNoise,
 }
 
 /// A set, and what it leaves with a local cause beside it.
@@ -39,7 +39,7 @@ struct Weighed {
 
 impl BesideLocal<'_> {
     fn rows(&self) -> f64 {
-        (0..self.problem.channels()).map(|c| self.problem.count(c)).sum::<usize>() as f64
+        self.noise.all_rows(self.problem)
     }
 
     fn counted(&self, squares: f64) -> f64 {
@@ -57,7 +57,7 @@ impl BesideLocal<'_> {
     fn weighed(&self, at: usize) -> Result<Option<Weighed>, PredictError> {
         let set = &self.all[at];
         let Some(fit) = self.judge.least_squares(&set.set) else { return Ok(None) };
-        let local = local_cause(self.problem, &set.selection, fit, self.noise)?;
+        let local = local_cause(self.problem, &set.selection, fit, &self.noise.slow())?;
         Ok(local.map(|local| {
             let after = (fit.chi2 - local.gain).max(1.0);
             let beyond = |squares: f64| (squares - self.rows()).max(0.0);

@@ -13,7 +13,6 @@ use crate::locate::projection::{Projection, dot};
 use crate::locate::responses::{Asked, Column, Responses};
 use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
-use crate::noise::rule::NoiseState;
 use crate::problem::Problem;
 
 /// Each channel by itself, with a smooth departure or noise of its own, has to be worth so much more than a single cause; so have single rows,
@@ -62,7 +61,7 @@ pub(crate) struct Cause {
 pub(crate) struct Scene<'a> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) fit: &'a Fit,
-    pub(crate) noise: &'a NoiseState,
+    pub(crate) sigma: &'a [f64],
     pub(crate) projection: &'a Projection,
     pub(crate) variables: &'a [Along],
     pub(crate) unknowns: &'a [Unknown<'a>],
@@ -116,7 +115,7 @@ impl Scene<'_> {
         Asked {
             problem: self.problem,
             fit: self.fit,
-            noise: self.noise,
+            sigma: self.sigma,
             unknown: &self.unknowns[unknown],
             component,
             along: &self.variables[along],
@@ -159,7 +158,7 @@ impl Scene<'_> {
         if variable.error <= 0.0 || !alone || !are_events(self.problem) {
             return Ok(None);
         }
-        let columns = of.at_each_row(self.problem, self.fit, self.noise, component)?;
+        let columns = of.at_each_row(self.problem, self.fit, self.sigma, component)?;
         let rows = Rows::new(self.projection, &columns, &variable.values, variable.error);
         Ok(scan.with_errors(component, &rows))
     }

@@ -12,6 +12,7 @@ use crate::locate::scan::{Interval, Scan};
 use crate::locate::single::{Event, Events, events};
 use crate::locate::unknowns::{Unknown, unknowns};
 use crate::model::{PredictError, Quantity};
+use crate::noise::rough::RoughNoise;
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
@@ -31,9 +32,12 @@ impl<'a> Ground<'a> {
         problem: &Problem<'a>,
         selection: &Selection,
         baseline: &Fit,
-        noise: &NoiseState,
+        sigma: &[f64],
     ) -> Result<Self, PredictError> {
-        let columns = columns(problem, selection, baseline, noise)?;
+        let noise = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
+        let columns: Vec<Vec<Vec<f64>>> = (0..problem.rows.len())
+            .map(|r| whitened_columns(problem, selection, &noise, r, &baseline.shared, &baseline.nuisance[r]))
+            .collect::<Result<_, _>>()?;
         let sizes = (selection.nuisance.len(), selection.shared.len());
         let projection = Projection::new(&columns, sizes);
         let (variables, unknowns) = (variables(problem, baseline)?, unknowns(problem));
@@ -41,14 +45,9 @@ impl<'a> Ground<'a> {
     }
 
     /// The single cause that is worth most.
-    fn cause(
-        &self,
-        problem: &Problem<'_>,
-        fit: &Fit,
-        noise: &NoiseState,
-    ) -> Result<Option<Cause>, PredictError> {
+    fn cause(&self, problem: &Problem<'_>, fit: &Fit, sigma: &[f64]) -> Result<Option<Cause>, PredictError> {
         let Self { variables, projection, unknowns, .. } = self;
-        Scene { problem, fit, noise, projection, variables, unknowns }.best()
+        Scene { problem, fit, sigma, projection, variables, unknowns }.best()
     }
 }
 
@@ -63,33 +62,15 @@ pub(crate) fn local_cause(
     problem: &Problem<'_>,
     selection: &Selection,
     baseline: &Fit,
-    noise: &NoiseState,
+    sigma: &[f64],
 ) -> Result<Option<LocalCause>, PredictError> {
     if problem.model.extensions().local_causes.is_none() {
         return Ok(None);
     }
-    let ground = Ground::new(problem, selection, baseline, noise)?;
-    let cause = ground.cause(problem, baseline, noise)?;
+    let ground = Ground::new(problem, selection, baseline, sigma)?;
+    let cause = ground.cause(problem, baseline, sigma)?;
     let cause = cause.filter(|cause| !cause.everywhere && ground.unknowns[cause.unknown].is_model_s());
     Ok(cause.map(|cause| LocalCause { gain: cause.gains.iter().sum(), price: cause.price }))
-}
-
-/// Whitened columns of all runs.
-fn columns(
-    problem: &Problem<'_>,
-    selection: &Selection,
-    fit: &Fit,
-    noise: &NoiseState,
-) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
-    let of_run = |r: usize| whitened_columns(problem, selection, noise, r, &fit.shared, &fit.nuisance[r]);
-    (0..problem.rows.len()).map(of_run).collect()
-}
-
-/// White noise beside which the mean of many rows is known as well as beside this noise.
-fn slow_part(problem: &Problem<'_>, noise: &NoiseState) -> NoiseState {
-    let sigma = |(shape, sigma): (&usize, &f64)| sigma * problem.family.shape(*shape).of_a_mean().sqrt();
-    let sigma = noise.shape.iter().zip(&noise.sigma).map(sigma).collect();
-    NoiseState { shape: vec![0; noise.shape.len()], sigma }
 }
 
 /// Finds where the cause acts beside a noise, largest share first.
@@ -97,13 +78,11 @@ pub(crate) fn locate(
     problem: &Problem<'_>,
     selection: &Selection,
     baseline: &Fit,
-    noise: &NoiseState,
+    noise: &RoughNoise,
 ) -> Result<Vec<Location>, PredictError> {
-    let ground = Ground::new(problem, selection, baseline, noise)?;
-    let Ground { sizes, variables, projection, unknowns, .. } = &ground;
-    let slow = slow_part(problem, noise);
-    let columns =
-        &if slow == *noise { ground.columns.clone() } else { columns(problem, selection, baseline, &slow)? };
+    let sigma = &noise.slow();
+    let ground = Ground::new(problem, selection, baseline, sigma)?;
+    let Ground { columns, sizes, variables, projection, unknowns } = &ground;
     let of_readings: Vec<(usize, &Along, Scan, Interval)> = (0..problem.channels())
         .filter_map(|channel| {
             let (along, scan, best) = best_interval(problem, columns, *sizes, channel, variables)?;
@@ -111,10 +90,10 @@ pub(crate) fn locate(
         })
         .collect();
     let worth = of_readings.iter().map(|(.., interval)| interval.worth).sum::<f64>();
-    let cause = ground.cause(problem, baseline, noise)?;
+    let cause = ground.cause(problem, baseline, sigma)?;
     let cause = cause.filter(|cause| worth <= SIMPLER * cause.worth);
-    let events = events(problem, baseline, noise, projection, unknowns)?;
-    let places = Places { problem, columns, unit: &slow.sigma, sigma: &noise.sigma };
+    let events = events(problem, baseline, sigma, projection, unknowns)?;
+    let places = Places { problem, columns, unit: sigma, noise };
     let found = match (cause, events) {
         (cause, Some(events))
             if {
@@ -234,7 +213,7 @@ struct Places<'a> {
     columns: &'a [Vec<Vec<f64>>],
     /// The unit of these, by channel.
     unit: &'a [f64],
-    sigma: &'a [f64],
+    noise: &'a RoughNoise,
 }
 
 impl Places<'_> {
@@ -256,7 +235,7 @@ impl Places<'_> {
             let rows = self.rows(run, channel).filter(|&(_, row)| within.holds(run, row));
             let (sum, n) = rows.fold((0.0_f64, 0.0_f64), |(s, n), (at, _)| (s + missed(at).powi(2), n + 1.0));
             // A run shows the misfit where its rows exceed the noise at 1 in 1,000.
-            n > 0.0 && sum > n + 3.1 * (2.0 * n).sqrt() + 3.0
+            n > 0.0 && sum > self.noise.rows(channel, n as usize) + 3.1 * self.noise.spread(channel, n) + 3.0
         };
         coefficients.iter().enumerate().map(misses).collect()
     }
@@ -273,7 +252,7 @@ impl Places<'_> {
         let label = |r: usize| self.problem.recording.runs[r].label.clone();
         let mean = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
         // Of all rows that a fit with an offset was made to, rounding alone is left of it.
-        let mean = if mean.abs() > 1e-9 * self.sigma[channel] { mean } else { 0.0 };
+        let mean = if mean.abs() > 1e-9 * self.unit[channel] { mean } else { 0.0 };
         let square = residuals.iter().map(|v| v * v).sum::<f64>() / residuals.len().max(1) as f64;
         let larger = |a: f64, v: f64| if v.abs() > a.abs() { v } else { a };
         let [from, to] = within.edges();
@@ -288,7 +267,7 @@ impl Places<'_> {
             mean_residual: mean,
             rms: square.sqrt(),
             largest_residual: residuals.into_iter().fold(0.0, larger),
-            sigma: self.sigma[channel],
+            sigma: self.noise.sigma[channel],
             z: gain.max(0.0).sqrt(),
             as_if: None,
         }
@@ -368,7 +347,7 @@ impl Places<'_> {
                 mean_residual: residual,
                 rms: residual.abs(),
                 largest_residual: residual,
-                sigma: self.sigma[best],
+                sigma: self.noise.sigma[best],
                 z: gain.max(0.0).sqrt(),
                 as_if: Some(AsIf {
                     what: unknown.described.name.clone(),

@@ -17,7 +17,7 @@ pub(crate) struct Projection {
 const WITHIN: f64 = 1e-7;
 
 impl Projection {
-    /// Of columns by run: those of nuisance parameters, those of shared ones, the residual; all whitened.
+    /// Of columns by run: those of nuisance parameters, those of shared ones, the residual; all as if noise were white.
     pub(crate) fn new(columns: &[Vec<Vec<f64>>], (n_nuisance, n_shared): (usize, usize)) -> Self {
         let basis = |run: &Vec<Vec<f64>>| {
             let mut basis: Vec<Vec<f64>> = Vec::new();

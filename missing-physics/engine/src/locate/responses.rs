@@ -7,7 +7,6 @@ use crate::locate::bins::{Along, Bins};
 use crate::locate::projection::{Projection, dot};
 use crate::locate::unknowns::Unknown;
 use crate::model::PredictError;
-use crate::noise::rule::NoiseState;
 use crate::problem::Problem;
 
 /// Powers of a variable that a size may be made of.
@@ -165,7 +164,7 @@ fn amounts(
 pub(crate) struct Asked<'a> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) fit: &'a Fit,
-    pub(crate) noise: &'a NoiseState,
+    pub(crate) sigma: &'a [f64],
     pub(crate) unknown: &'a Unknown<'a>,
     pub(crate) component: usize,
     pub(crate) along: &'a Along,
@@ -194,7 +193,7 @@ impl Asked<'_> {
             let size = |x: f64| weights.iter().rev().fold(0.0, |sum, weight| sum * x + weight);
             let all = amounts(self.along, self.bins, size, within);
             let sum: f64 = all.iter().flatten().sum();
-            let moved = self.unknown.response(self.problem, self.fit, self.noise, self.component, all)?;
+            let moved = self.unknown.response(self.problem, self.fit, self.sigma, self.component, all)?;
             Ok(Column { moved, mean: sum / rows.max(1.0) })
         };
         form.weights(self.bins, interval)[..form.sizes()].iter().map(of_size).collect()
@@ -204,21 +203,21 @@ impl Asked<'_> {
     pub(crate) fn at_rows(&self, acts: &[Vec<bool>]) -> Result<Column, PredictError> {
         let amounts = acts.iter().map(|run| run.iter().map(|&acts| f64::from(u8::from(acts))).collect());
         let moved =
-            self.unknown.response(self.problem, self.fit, self.noise, self.component, amounts.collect())?;
+            self.unknown.response(self.problem, self.fit, self.sigma, self.component, amounts.collect())?;
         Ok(Column { moved, mean: 1.0 })
     }
 }
 
 impl Responses {
     pub(crate) fn new(asked: &Asked<'_>, projection: &Projection) -> Result<Self, PredictError> {
-        let Asked { problem, fit, noise, unknown, component, along, bins } = *asked;
+        let Asked { problem, fit, sigma, unknown, component, along, bins } = *asked;
         let edges = bins.len() + 1;
         let runs = problem.rows.len();
         let mut columns: Vec<Vec<Vec<f64>>> = vec![Vec::with_capacity(POWERS * edges); runs];
         let only = |power: usize, bin: usize| amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
         let all_bins: Vec<Vec<Vec<f64>>> =
             (0..POWERS).flat_map(|power| (0..bins.len()).map(move |bin| only(power, bin))).collect();
-        let mut by_bin = unknown.responses(problem, fit, noise, component, &all_bins)?.into_iter();
+        let mut by_bin = unknown.responses(problem, fit, sigma, component, &all_bins)?.into_iter();
         drop(all_bins);
         for _ in 0..POWERS {
             let mut sums: Vec<Vec<f64>> = projection.residual.iter().map(|r| vec![0.0; r.len()]).collect();

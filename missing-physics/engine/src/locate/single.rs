@@ -5,7 +5,6 @@ use crate::locate::cause::{SIMPLER, gains};
 use crate::locate::projection::{Projection, dot};
 use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
-use crate::noise::rule::NoiseState;
 use crate::problem::Problem;
 
 /// No more than this many events are single ones.
@@ -33,7 +32,7 @@ pub(crate) struct Events {
 pub(crate) fn events(
     problem: &Problem<'_>,
     fit: &Fit,
-    noise: &NoiseState,
+    sigma: &[f64],
     projection: &Projection,
     unknowns: &[Unknown<'_>],
 ) -> Result<Option<Events>, PredictError> {
@@ -49,7 +48,7 @@ pub(crate) fn events(
     for (number, unknown) in unknowns.iter().enumerate().filter(|(_, u)| u.is_model_s() && u.runs_are_alone())
     {
         for component in 0..unknown.described.components.len() {
-            let columns = unknown.at_each_row(problem, fit, noise, component)?;
+            let columns = unknown.at_each_row(problem, fit, sigma, component)?;
             let found = greedy(problem, projection.clone(), &columns, number, component);
             if !found.rows.is_empty() && best.as_ref().is_none_or(|b| weight(&found) > weight(b)) {
                 best = Some(found);

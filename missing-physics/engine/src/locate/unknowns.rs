@@ -2,7 +2,6 @@
 
 use crate::fit::optimum::Fit;
 use crate::model::{LocalCauses, LocalUnknown, PredictError};
-use crate::noise::rule::NoiseState;
 use crate::problem::Problem;
 
 /// Runs of more rows than this have no rows of which each is an event.
@@ -44,16 +43,16 @@ impl Unknown<'_> {
         self.model.is_none_or(|(causes, _)| causes.runs_are_alone())
     }
 
-    /// What a component of the given size at each row does to the measured rows, by run, channel after channel, whitened as the noise is.
+    /// What a component of the given size at each row does to the measured rows, by run, channel after channel, in sigmas.
     pub(crate) fn response(
         &self,
         problem: &Problem<'_>,
         fit: &Fit,
-        noise: &NoiseState,
+        sigma: &[f64],
         component: usize,
         amounts: Vec<Vec<f64>>,
     ) -> Result<Vec<Vec<f64>>, PredictError> {
-        let mut all = self.responses(problem, fit, noise, component, &[amounts])?;
+        let mut all = self.responses(problem, fit, sigma, component, &[amounts])?;
         Ok(all.pop().unwrap_or_default())
     }
 
@@ -62,7 +61,7 @@ impl Unknown<'_> {
         &self,
         problem: &Problem<'_>,
         fit: &Fit,
-        noise: &NoiseState,
+        sigma: &[f64],
         component: usize,
         amounts: &[Vec<Vec<f64>>],
     ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
@@ -83,9 +82,8 @@ impl Unknown<'_> {
         };
         let white = |(run, moved): (usize, &Vec<f64>)| -> Vec<f64> {
             let channel = |channel: usize| {
-                let mut picked = problem.pick(run, channel, moved);
-                problem.whitener(run, channel, noise.shape[channel]).whiten(&mut picked);
-                picked.into_iter().map(move |v| v / noise.sigma[channel])
+                let picked = problem.pick(run, channel, moved);
+                picked.into_iter().map(move |v| v / sigma[channel])
             };
             (0..problem.channels()).flat_map(channel).collect()
         };
@@ -97,7 +95,7 @@ impl Unknown<'_> {
         &self,
         problem: &Problem<'_>,
         fit: &Fit,
-        noise: &NoiseState,
+        sigma: &[f64],
         component: usize,
     ) -> Result<Vec<Vec<Vec<f64>>>, PredictError> {
         let runs = &problem.recording.runs;
@@ -106,7 +104,7 @@ impl Unknown<'_> {
         for row in 0..longest {
             let only = |n: usize| (0..n).map(|i| f64::from(u8::from(i == row))).collect();
             let amounts: Vec<Vec<f64>> = runs.iter().map(|run| only(run.len())).collect();
-            let moved = self.response(problem, fit, noise, component, amounts)?;
+            let moved = self.response(problem, fit, sigma, component, amounts)?;
             for ((all, moved), run) in columns.iter_mut().zip(moved).zip(runs) {
                 if row < run.len() {
                     all.push(moved);

@@ -38,18 +38,22 @@ impl Shape {
         if square > 0.0 { (square / (1.0 + square), steps) } else { (self.correlated, self.length_steps) }
     }
 
-    /// How many times larger the variance of the mean of many rows, evenly spaced, is than that of white noise.
-    pub(crate) fn of_a_mean(&self) -> f64 {
+    /// Correlation of rows so many steps apart, along evenly spaced rows; of errors that accumulate none.
+    fn at_lag(&self, lag: f64) -> f64 {
         if self.correlated <= 0.0 {
-            return 1.0;
+            return 0.0;
         }
-        let correlated = if self.smooth {
-            4.0 / 3f64.sqrt() * self.length_steps
-        } else {
-            let neighbours = (-1.0 / self.length_steps).exp();
-            (1.0 + neighbours) / (1.0 - neighbours)
-        };
-        1.0 - self.correlated + self.correlated * correlated.max(1.0)
+        let x = if self.smooth { 3f64.sqrt() * lag / self.length_steps } else { lag / self.length_steps };
+        self.correlated * (-x).exp() * if self.smooth { 1.0 + x } else { 1.0 }
+    }
+
+    /// How many times larger than for white noise the variance is of the mean of many evenly spaced rows, and that of the mean of their squares.
+    pub(crate) fn of_means(&self) -> [f64; 2] {
+        /// Lags beyond which nothing is left, in correlation lengths.
+        const FAR: f64 = 20.0;
+        let lags = (1..=(FAR * self.length_steps).ceil() as usize).map(|lag| self.at_lag(lag as f64));
+        let [sum, squares] = lags.fold([0.0, 0.0], |[sum, squares], r| [sum + r, squares + r * r]);
+        [1.0 + 2.0 * sum, 1.0 + 2.0 * squares]
     }
 
     /// Log prior weight against white noise: colour has to show, and a faint slow part (which would swallow any faint

@@ -8,7 +8,7 @@ use crate::fit::prediction::residuals;
 use crate::linalg::{gram, legendre, rank};
 use crate::model::PredictError;
 use crate::noise::process::{Shape, Whitener};
-use crate::noise::rule::{NoiseRule, NoiseState};
+use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::statistics::median;
 
@@ -24,32 +24,76 @@ const LONGEST: (f64, f64) = (2.8, 1.0 / 16.0);
 const LAGS: usize = 6;
 const WHITE: (f64, f64) = (0.1, 2.5);
 
-/// The rough noise that a fit leaves: of each channel the likeliest shape with a short correlation once everything smooth is taken away
-/// from windows of a few dozen rows, and its sigma; `white` is the channels' sigma where that shape is white.
+/// Noise on the scale of a few rows, by channel.
 ///
-/// # Errors
-/// Where the model predicts nothing.
-pub(crate) fn rough_noise(
-    problem: &Problem<'_>,
-    rule: &NoiseRule,
-    fit: &Fit,
-    white: &[f64],
-) -> Result<NoiseState, PredictError> {
-    let left = residuals(problem, fit)?;
-    let mut noise = NoiseState { shape: vec![0; white.len()], sigma: white.to_vec() };
-    for channel in 0..problem.channels() {
-        // Errors that accumulate are slow.
-        if problem.family.shape(fit.noise.shape[channel]).accumulated > 0.0 {
-            continue;
-        }
-        let windows = Windows::new(problem, channel, &left);
-        let Some((shape, sigma)) = windows.and_then(|windows| windows.likeliest(problem, rule)) else {
-            continue;
-        };
-        noise.shape[channel] = shape;
-        noise.sigma[channel] = rule.fixed_sigma[channel].unwrap_or(sigma.max(rule.floor[channel]));
+/// Beside noise whose neighbours are correlated many rows tell as much of what is slow as fewer rows with white noise of a larger sigma do.
+#[derive(Debug, Clone)]
+pub(crate) struct RoughNoise {
+    /// Sigma of a reading.
+    pub(crate) sigma: Vec<f64>,
+    /// How many times larger than for white noise the variance is of a mean of many rows, and that of the mean of their squares.
+    of_means: Vec<[f64; 2]>,
+}
+
+impl RoughNoise {
+    /// White noise.
+    pub(crate) fn white(sigma: Vec<f64>) -> Self {
+        Self { of_means: vec![[1.0, 1.0]; sigma.len()], sigma }
     }
-    Ok(noise)
+
+    /// What a fit leaves: of each channel the likeliest shape with a short correlation once everything smooth is taken away from windows of a
+    /// few dozen rows, and its sigma; `white` is the channels' sigma where that shape is white.
+    ///
+    /// # Errors
+    /// Where the model predicts nothing.
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        rule: &NoiseRule,
+        fit: &Fit,
+        white: &[f64],
+    ) -> Result<Self, PredictError> {
+        let left = residuals(problem, fit)?;
+        let mut noise = Self::white(white.to_vec());
+        for channel in 0..problem.channels() {
+            // Errors that accumulate are slow.
+            if problem.family.shape(fit.noise.shape[channel]).accumulated > 0.0 {
+                continue;
+            }
+            let windows = Windows::new(problem, channel, &left);
+            if let Some((shape, sigma)) = windows.and_then(|windows| windows.likeliest(problem, rule)) {
+                noise.of_means[channel] = shape.of_means();
+                noise.sigma[channel] = rule.fixed_sigma[channel].unwrap_or(sigma.max(rule.floor[channel]));
+            }
+        }
+        Ok(noise)
+    }
+
+    /// Sigma of the white noise beside which slow effects are known as well as beside this noise.
+    pub(crate) fn slow(&self) -> Vec<f64> {
+        self.sigma.iter().zip(&self.of_means).map(|(sigma, [mean, _])| sigma * mean.sqrt()).collect()
+    }
+
+    /// Rows with such white noise that tell as much as the rows of a channel do: the sum of squares that the noise leaves, in units of it.
+    pub(crate) fn rows(&self, channel: usize, rows: usize) -> f64 {
+        rows as f64 / self.of_means[channel][0]
+    }
+
+    /// The same of all channels.
+    pub(crate) fn all_rows(&self, problem: &Problem<'_>) -> f64 {
+        (0..problem.channels()).map(|c| self.rows(c, problem.count(c))).sum()
+    }
+
+    /// Standard deviation of such a sum of squares.
+    pub(crate) fn spread(&self, channel: usize, rows: f64) -> f64 {
+        let [mean, squares] = self.of_means[channel];
+        (2.0 * rows * squares).sqrt() / mean
+    }
+
+    /// The same of all channels.
+    pub(crate) fn whole_spread(&self, problem: &Problem<'_>) -> f64 {
+        let variances = (0..problem.channels()).map(|c| self.spread(c, problem.count(c) as f64).powi(2));
+        variances.sum::<f64>().sqrt()
+    }
 }
 
 /// A few dozen rows of a run.
@@ -103,7 +147,7 @@ impl Windows {
 
     /// The likeliest shape and its sigma; none where that is white, correlated over many rows, or does not whiten what is left: then
     /// it is no noise of this kind.
-    fn likeliest(&self, problem: &Problem<'_>, rule: &NoiseRule) -> Option<(usize, f64)> {
+    fn likeliest(&self, problem: &Problem<'_>, rule: &NoiseRule) -> Option<(Shape, f64)> {
         let accumulates = |shape: &Shape| shape.accumulated > 0.0;
         let score = |shape: usize| self.under(problem, rule, shape);
         let higher = |a: &(f64, f64), b: &(f64, f64)| a.0 > b.0;
@@ -118,7 +162,7 @@ impl Windows {
         let (number, (_, sigma)) = problem.family.climb(best, |s| !accumulates(s), score, higher);
         let shape = problem.family.shape(number);
         let rough = number > 0 && shape.length_steps <= self.longest && self.whitens(problem, shape);
-        rough.then_some((number, sigma))
+        rough.then_some((shape, sigma))
     }
 
     /// Whether a shape leaves neighbours in the windows that are hardly correlated.
@@ -180,7 +224,7 @@ mod tests {
     use crate::data::{Recording, Run};
     use crate::fit::gauss_newton::solve;
     use crate::model::{Model, Quantity, Spec};
-    use crate::noise::rule::noise_rule;
+    use crate::noise::rule::{NoiseState, noise_rule};
 
     /// A model that predicts nothing but zero.
     struct Nothing(Spec);
@@ -196,7 +240,7 @@ mod tests {
         }
     }
 
-    /// Six runs of autoregressive noise of unit variance around a slow wave, and what is found of it: length in steps, and sigma.
+    /// Six runs of autoregressive noise of unit variance around a slow wave, and what is found of it: how much less a mean is known, and sigma.
     fn found(rows: usize, correlation: f64, wave: f64) -> (f64, f64) {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let mut run = |number: usize| {
@@ -224,16 +268,16 @@ mod tests {
         let white = vec![crate::statistics::median(&mut problem.rough_sigmas(0)).unwrap()];
         let start = NoiseState { shape: vec![0], sigma: white.clone() };
         let fit = solve(&problem, &problem.select(&[], &[]), &start, &[], &problem.nuisance_start).unwrap();
-        let noise = rough_noise(&problem, &rule, &fit, &white).unwrap();
-        (problem.family.shape(noise.shape[0]).length_steps, noise.sigma[0])
+        let noise = RoughNoise::new(&problem, &rule, &fit, &white).unwrap();
+        (noise.of_means[0][0], noise.sigma[0])
     }
 
-    /// Neighbours that are correlated by 0.5 have a length of 1.4 steps, whatever slow thing there is beside them.
+    /// Neighbours that are correlated by 0.5: means have three times the variance, (1 + r) / (1 - r), whatever slow thing there is beside them.
     #[test]
     fn noise_of_a_few_rows_is_found_beside_what_is_slow() {
         for wave in [0.0, 3.0] {
-            let (length, sigma) = found(500, 0.5, wave);
-            assert!((length - 1.44).abs() < 0.2 && (sigma - 1.0).abs() < 0.08, "{length} {sigma}");
+            let (mean, sigma) = found(500, 0.5, wave);
+            assert!((mean - 3.0).abs() < 0.4 && (sigma - 1.0).abs() < 0.08, "{mean} {sigma}");
         }
     }
 
@@ -241,16 +285,27 @@ mod tests {
     #[test]
     fn what_is_slow_is_no_noise() {
         for wave in [0.0, 3.0] {
-            let (length, sigma) = found(500, 0.0, wave);
-            assert!(length == 0.0 && (sigma - 1.0).abs() < 0.08, "{length} {sigma}");
+            let (mean, sigma) = found(500, 0.0, wave);
+            assert!(mean <= 1.0 && (sigma - 1.0).abs() < 0.08, "{mean} {sigma}");
         }
-        let (length, sigma) = found(500, 0.98, 0.0);
-        assert!(length <= LONGEST.0 && sigma < 0.5, "{length} {sigma}");
+        let (mean, sigma) = found(500, 0.98, 0.0);
+        assert!(mean <= 1.0 && sigma < 0.3, "{mean} {sigma}");
     }
 
     /// Runs of a dozen rows do not show a correlation.
     #[test]
     fn short_runs_have_white_noise() {
-        assert!(found(12, 0.5, 0.0).0 == 0.0);
+        assert!(found(12, 0.5, 0.0).0 <= 1.0);
+    }
+
+    /// Autoregressive noise has its sums in closed form: (1 + r) / (1 - r) and (1 + r^2) / (1 - r^2).
+    #[test]
+    fn means_of_autoregressive_noise() {
+        let r: f64 = 0.6;
+        let shape = Shape { correlated: 1.0, length_steps: -1.0 / r.ln(), ..Shape::WHITE };
+        let [mean, squares] = shape.of_means();
+        approx::assert_relative_eq!(mean, (1.0 + r) / (1.0 - r), max_relative = 1e-6);
+        approx::assert_relative_eq!(squares, (1.0 + r * r) / (1.0 - r * r), max_relative = 1e-6);
+        assert!(Shape::WHITE.of_means() == [1.0, 1.0]);
     }
 }

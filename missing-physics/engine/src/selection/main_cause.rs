@@ -12,6 +12,7 @@ use crate::fit::optimum::{Fit, covariance};
 use crate::leftover::fit::{given, with_leftover};
 use crate::leftover::process::Process;
 use crate::model::PredictError;
+use crate::noise::rough::RoughNoise;
 use crate::noise::rule::{NoiseRule, NoiseState};
 use crate::problem::{Problem, Selection};
 use crate::selection::candidate::Candidate;
@@ -63,6 +64,7 @@ pub(crate) struct MainCause {
 pub(crate) struct Judge<'a> {
     problem: &'a Problem<'a>,
     rule: NoiseRule,
+    rough: RoughNoise,
     all: &'a [Candidate],
     /// By candidate.
     least_squares: Vec<Option<LeastSquares>>,
@@ -89,25 +91,27 @@ fn without(set: &[usize], member: usize) -> Vec<usize> {
 }
 
 impl<'a> Judge<'a> {
-    /// Fits the wanted candidates and the baseline by least squares beside a noise that is rough: a slow misfit is not taken for noise.
+    /// Fits the wanted candidates and the baseline by ordinary least squares, to be judged beside a noise on the scale of a few rows.
     pub(crate) fn new(
         problem: &'a Problem<'a>,
         rule: &NoiseRule,
         all: &'a [Candidate],
-        noise: &NoiseState,
+        rough: &RoughNoise,
         wanted: impl Fn(&Candidate) -> bool + Sync,
     ) -> Self {
-        let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
+        let white = NoiseState { shape: vec![0; problem.channels()], sigma: rough.slow() };
+        let rows = rough.all_rows(problem);
         let least_squares = |c: &Candidate| -> Option<LeastSquares> {
             (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
-            let fit = solve(problem, &c.selection, noise, &c.fit.shared, &c.fit.nuisance).ok()?;
-            let seen = (fit.chi2 - values as f64).max(0.0);
+            let fit = solve(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
+            let seen = (fit.chi2 - rows).max(0.0);
             Some(LeastSquares { fit, seen, unseen: OnceLock::new() })
         };
         let least_squares: Vec<Option<LeastSquares>> = all.par_iter().map(least_squares).collect();
         let judged = all.iter().map(|_| OnceLock::new()).collect();
         let rule = rule.beside_a_leftover();
-        Self { problem, rule, all, least_squares, judged, cut: Cut::Fifths, base: 0.0 }.with_base()
+        let rough = rough.clone();
+        Self { problem, rule, rough, all, least_squares, judged, cut: Cut::Fifths, base: 0.0 }.with_base()
     }
 
     /// A judge by unseen data that lie close to those seen; of a single run only, since of several the others show what each one does.
@@ -120,6 +124,7 @@ impl<'a> Judge<'a> {
         let judge = Self {
             problem: self.problem,
             rule: self.rule.clone(),
+            rough: self.rough.clone(),
             all: self.all,
             least_squares: self.least_squares.iter().map(again).collect(),
             judged: self.all.iter().map(|_| OnceLock::new()).collect(),
@@ -158,7 +163,7 @@ impl<'a> Judge<'a> {
     fn unseen(&self, at: usize) -> Option<f64> {
         let LeastSquares { fit, unseen, .. } = self.least_squares[at].as_ref()?;
         let selection = &self.all[at].selection;
-        let misfit = || unseen_misfit(self.problem, selection, fit, &fit.noise, self.cut).ok();
+        let misfit = || unseen_misfit(self.problem, selection, fit, &self.rough, self.cut).ok();
         *unseen.get_or_init(misfit)
     }
 
@@ -276,8 +281,7 @@ impl<'a> Judge<'a> {
 
     /// The misfit that noise alone may leave.
     fn misfit_of_noise(&self) -> f64 {
-        let rows: usize = (0..self.problem.channels()).map(|c| self.problem.count(c)).sum();
-        CHANCE * (2.0 * rows as f64).sqrt()
+        CHANCE * self.rough.whole_spread(self.problem)
     }
 
     /// Whether a set leaves nothing but noise of unseen data; or takes away most of the baseline's misfit there, and predicts them no worse than it
@@ -322,9 +326,8 @@ impl<'a> Judge<'a> {
     /// the two fits differ by.
     fn widened(&self, selection: &Selection, least_squares: &Fit, beside: Fit) -> Fit {
         let problem = self.problem;
-        let rows: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let fitted = selection.shared.len() + selection.nuisance.len() * problem.rows.len();
-        let beyond = (least_squares.chi2 - rows.saturating_sub(fitted) as f64).max(0.0);
+        let beyond = (least_squares.chi2 - (self.rough.all_rows(problem) - fitted as f64).max(0.0)).max(0.0);
         let white = covariance(&least_squares.information);
         let mut wide = covariance(&beside.information);
         let n = wide.nrows();

@@ -6,7 +6,7 @@ use crate::fit::gauss_newton::solve_again;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
-use crate::noise::rule::NoiseState;
+use crate::noise::rough::RoughNoise;
 use crate::problem::{Problem, Selection};
 
 /// Groups in which runs, or the rows of a single run, are left out.
@@ -30,26 +30,24 @@ impl Cut {
     }
 }
 
-/// Sum of squares, in units of a noise, by which unseen data miss a fit beyond that noise.
+/// Sum of squares, in units of the noise beside which slow effects are seen, by which unseen data miss a fit beyond the noise.
 ///
 /// Each run (or each of five groups of runs) is left out in turn, its nuisance parameters then fitted to it; of a single run, every fifth
-/// of its pieces. All fits are by least squares beside that noise: one that is rough takes no slow misfit for its own.
+/// of its pieces. Fits are plain least squares: a slow misfit is not taken for noise.
 pub(crate) fn unseen_misfit(
     problem: &Problem<'_>,
     selection: &Selection,
     fit: &Fit,
-    noise: &NoiseState,
+    rough: &RoughNoise,
     cut: Cut,
 ) -> Result<f64, PredictError> {
-    let miss = |unseen: &Problem<'_>, fit: &Fit| -> Result<f64, PredictError> {
-        let mut sum = 0.0;
-        for (run, left) in residuals(unseen, fit)?.into_iter().enumerate() {
-            for (channel, mut column) in left.into_iter().enumerate() {
-                unseen.whitener(run, channel, noise.shape[channel]).whiten(&mut column);
-                sum += column.iter().map(|v| (v / noise.sigma[channel]).powi(2) - 1.0).sum::<f64>();
-            }
-        }
-        Ok(sum)
+    let white = &fit.noise;
+    let miss = |residual: Vec<Vec<Vec<f64>>>| -> f64 {
+        let of_column = |(channel, column): (usize, &Vec<f64>)| {
+            let squares: f64 = column.iter().map(|v| (v / white.sigma[channel]).powi(2)).sum();
+            squares - rough.rows(channel, column.len())
+        };
+        residual.iter().flat_map(|run| run.iter().enumerate()).map(of_column).sum()
     };
     let runs = problem.recording.runs.len();
     let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
@@ -58,10 +56,10 @@ pub(crate) fn unseen_misfit(
         let nuisance =
             |ids: &[usize]| -> Vec<Vec<f64>> { ids.iter().map(|&r| fit.nuisance[r].clone()).collect() };
         let seen = problem.of_runs(&train);
-        let trained = solve_again(&seen, selection, noise, &fit.shared, &nuisance(&train))?;
+        let trained = solve_again(&seen, selection, white, &fit.shared, &nuisance(&train))?;
         let unseen = problem.of_runs(&test);
-        let tested = solve_again(&unseen, &known, noise, &trained.shared, &nuisance(&test))?;
-        miss(&unseen, &tested)
+        let tested = solve_again(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
+        Ok(miss(residuals(&unseen, &tested)?))
     };
     let of_rows = |fold: usize| -> Result<f64, PredictError> {
         let rows = problem.recording.runs[0].len();
@@ -74,8 +72,8 @@ pub(crate) fn unseen_misfit(
             }
             problem.with(recording)
         };
-        let trained = solve_again(&without(true), selection, noise, &fit.shared, &fit.nuisance)?;
-        miss(&without(false), &trained)
+        let trained = solve_again(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
+        Ok(miss(residuals(&without(false), &trained)?))
     };
     let folds = if runs > 1 { runs.min(FOLDS) } else { FOLDS };
     let of_fold = |fold: usize| if runs > 1 { of_runs(fold, folds) } else { of_rows(fold) };
