@@ -241,8 +241,8 @@ mod tests {
     }
 
     /// Six runs of autoregressive noise of unit variance around a slow wave, and what is found of it: how much less a mean is known, and sigma.
-    fn found(rows: usize, correlation: f64, wave: f64) -> (f64, f64) {
-        let mut rng = ChaCha8Rng::seed_from_u64(7);
+    fn found(rows: usize, correlation: f64, wave: f64, seed: u64) -> (f64, f64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut run = |number: usize| {
             let mut now: f64 = StandardNormal.sample(&mut rng);
             let mut of_row = |row: usize| {
@@ -275,9 +275,13 @@ mod tests {
     /// Neighbours that are correlated by 0.5: means have three times the variance, (1 + r) / (1 - r), whatever slow thing there is beside them.
     #[test]
     fn noise_of_a_few_rows_is_found_beside_what_is_slow() {
+        const SEEDS: u64 = 12;
         for wave in [0.0, 3.0] {
-            let (mean, sigma) = found(500, 0.5, wave);
-            assert!((mean - 3.0).abs() < 0.4 && (sigma - 1.0).abs() < 0.08, "{mean} {sigma}");
+            let all: Vec<(f64, f64)> = (0..SEEDS).map(|seed| found(500, 0.5, wave, seed)).collect();
+            let average = |of: fn(&(f64, f64)) -> f64| all.iter().map(of).sum::<f64>() / SEEDS as f64;
+            let (mean, sigma) = (average(|found| found.0), average(|found| found.1));
+            assert!((mean - 3.0).abs() < 0.3 && (sigma - 1.0).abs() < 0.04, "{mean} {sigma}");
+            assert!(all.iter().all(|found| (found.0 - 3.0).abs() < 1.2), "{all:?}");
         }
     }
 
@@ -285,17 +289,17 @@ mod tests {
     #[test]
     fn what_is_slow_is_no_noise() {
         for wave in [0.0, 3.0] {
-            let (mean, sigma) = found(500, 0.0, wave);
+            let (mean, sigma) = found(500, 0.0, wave, 7);
             assert!(mean <= 1.0 && (sigma - 1.0).abs() < 0.08, "{mean} {sigma}");
         }
-        let (mean, sigma) = found(500, 0.98, 0.0);
+        let (mean, sigma) = found(500, 0.98, 0.0, 7);
         assert!(mean <= 1.0 && sigma < 0.3, "{mean} {sigma}");
     }
 
     /// Runs of a dozen rows do not show a correlation.
     #[test]
     fn short_runs_have_white_noise() {
-        assert!(found(12, 0.5, 0.0).0 <= 1.0);
+        assert!(found(12, 0.5, 0.0, 7).0 <= 1.0);
     }
 
     /// Autoregressive noise has its sums in closed form: (1 + r) / (1 - r) and (1 + r^2) / (1 - r^2).
