@@ -71,6 +71,10 @@ pub struct DomainScore {
     pub unexplained: Part,
     /// Worlds of a listed effect with a smaller unlisted one: answered by exactly the listed one.
     pub main_cause: Part,
+    /// Of those, the listed one alone is the answer or one of its rivals.
+    pub main_cause_among: Part,
+    /// Of those, a mechanism named that is not there, the listed one alone not among the rivals.
+    pub wrong_beside: Part,
     /// Of those, answered `partly`: the smaller one is said.
     pub leftover_said: Part,
     /// The same where an oracle that knows what the smaller one does finds it.
@@ -155,9 +159,10 @@ impl DomainScore {
                 }
             }
             Hidden::Leftover => {
-                let truth = sorted(&w.key.mechanisms, &w.key.beside);
-                let named = sorted(&o.chosen, &w.key.beside) == truth;
+                let Named { right: named, among, wrong, .. } = Named::of(w);
                 self.main_cause.add(named);
+                self.main_cause_among.add(among);
+                self.wrong_beside.add(wrong);
                 self.leftover_said.add(o.verdict == "partly");
                 if w.oracle.as_ref().and_then(|oracle| oracle.leftover).is_some_and(|l| l >= DECISIVE) {
                     self.leftover_shown.add(o.verdict == "partly");
@@ -182,12 +187,7 @@ impl DomainScore {
 
     fn add_listed(&mut self, w: &Judged, doubted: bool) {
         let o = &w.outcome;
-        let without_nuisances = |ids: &[String]| sorted(ids, &w.key.beside);
-        let truth = without_nuisances(&w.key.mechanisms);
-        let chosen = without_nuisances(&o.chosen);
-        let answered = !o.chosen.is_empty();
-        let holds = chosen == truth || o.confused_with.iter().any(|set| without_nuisances(set) == truth);
-        let wrong = answered && !holds && !chosen.iter().all(|m| truth.contains(m));
+        let Named { truth, chosen, right, among, wrong } = Named::of(w);
         self.detected.add(doubted);
         self.wrong_of_all.add(wrong);
         if let [single] = truth.as_slice() {
@@ -206,16 +206,16 @@ impl DomainScore {
                 test.add(oracle.p_value <= 0.05);
             }
             if oracle.decisive >= DECISIVE {
-                self.right.add(o.verdict == "explained" && chosen == truth);
-                self.ambiguous.add(o.verdict == "ambiguous" && holds);
+                self.right.add(o.verdict == "explained" && right);
+                self.ambiguous.add(o.verdict == "ambiguous" && among);
                 self.wrong.add(wrong);
-                if answered {
-                    self.holds.add(holds);
+                if !o.chosen.is_empty() {
+                    self.holds.add(among);
                     self.sizes.push(1.0 + o.confused_with.len() as f64);
                 }
             }
         }
-        if chosen == truth {
+        if right {
             self.add_right(w);
         }
     }
@@ -271,11 +271,36 @@ impl DomainScore {
             "right": part(self.right), "ambiguous": part(self.ambiguous), "wrong": part(self.wrong),
             "answer_set_holds": part(self.holds), "answer_set_size": number(self.set_size),
             "wrong_of_all": part(self.wrong_of_all), "unlisted_unexplained": part(self.unexplained),
-            "main_cause": part(self.main_cause), "leftover_said": part(self.leftover_said),
+            "main_cause": part(self.main_cause), "main_cause_among": part(self.main_cause_among),
+            "wrong_beside_leftover": part(self.wrong_beside), "leftover_said": part(self.leftover_said),
             "leftover_shown": part(self.leftover_shown),
             "covered_beside_leftover": part(self.covered_beside), "imitated_named": part(self.imitated),
             "located": part(self.located), "covered": part(self.covered),
             "heldout_ratio": number(self.heldout_ratio), "power": power, "confusion": self.confusion})
+    }
+}
+
+/// The names of an answer beside the true ones, both without what is no matter of the world's.
+struct Named {
+    truth: Vec<String>,
+    chosen: Vec<String>,
+    /// The answer is the truth.
+    right: bool,
+    /// The answer is the truth, or one of its rivals is.
+    among: bool,
+    /// Something is named that is not there, and no rival is the truth.
+    wrong: bool,
+}
+
+impl Named {
+    fn of(w: &Judged) -> Self {
+        let without_nuisances = |ids: &[String]| sorted(ids, &w.key.beside);
+        let truth = without_nuisances(&w.key.mechanisms);
+        let chosen = without_nuisances(&w.outcome.chosen);
+        let right = chosen == truth;
+        let among = right || w.outcome.confused_with.iter().any(|set| without_nuisances(set) == truth);
+        let wrong = !among && !chosen.iter().all(|m| truth.contains(m));
+        Self { truth, chosen, right, among, wrong }
     }
 }
 

@@ -6,7 +6,7 @@ use super::score::{DomainScore, Part, Score};
 pub(super) type Measure = (&'static str, &'static str, fn(&DomainScore) -> String);
 
 /// All measures, in the order of the table.
-pub(super) const MEASURES: [Measure; 20] = [
+pub(super) const MEASURES: [Measure; 22] = [
     ("false alarms at 5 %", "in the band", |s| banded(s.alarms_5, 0.05)),
     ("false alarms at 1 %", "in the band", |s| banded(s.alarms_1, 0.01)),
     ("listed effects detected", "", |s| part(s.detected)),
@@ -19,6 +19,8 @@ pub(super) const MEASURES: [Measure; 20] = [
     ("wrong name, of all listed", "<= 5 %", |s| part(s.wrong_of_all)),
     ("unlisted and doubted: unexplained", ">= 80 %", |s| part(s.unexplained)),
     ("a leftover beside: main cause named", ">= 90 %", |s| part(s.main_cause)),
+    ("  in the answer, with rivals", "", |s| part(s.main_cause_among)),
+    ("  a wrong name", "", |s| part(s.wrong_beside)),
     ("  leftover said", ">= 90 %", |s| part(s.leftover_said)),
     ("    where an oracle finds it", ">= 90 %", |s| part(s.leftover_shown)),
     ("  intervals that hold the truth", ">= 90 %", |s| part(s.covered_beside)),

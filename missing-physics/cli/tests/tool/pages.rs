@@ -24,20 +24,30 @@ fn printed(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Each command of the front page that is followed by a block of text prints that text.
-#[test]
-fn the_front_page_shows_what_the_tool_prints() {
-    let page = page("README.md");
+/// Each command of a page that is followed by a block of text prints that text; `shown` says how many there are.
+#[track_caller]
+fn shows_what_the_tool_prints(path: &str, shown: usize) {
+    let page = page(path);
     let blocks: Vec<(&str, &str)> =
         page.split("```").skip(1).step_by(2).map(|block| block.split_once('\n').unwrap()).collect();
-    let mut shown = 0;
+    let mut compared = 0;
     for pair in blocks.windows(2) {
         let [("sh", command), ("text", text)] = pair else { continue };
         let arguments = command.trim().strip_prefix("cargo run --release -- ").unwrap();
-        assert_eq!(printed(&arguments.split_whitespace().collect::<Vec<_>>()), *text, "{command}");
-        shown += 1;
+        assert_eq!(printed(&arguments.split_whitespace().collect::<Vec<_>>()), *text, "{path}: {command}");
+        compared += 1;
     }
-    assert_eq!(shown, 2);
+    assert_eq!(compared, shown, "{path}");
+}
+
+#[test]
+fn the_front_page_shows_what_the_tool_prints() {
+    shows_what_the_tool_prints("README.md", 2);
+}
+
+#[test]
+fn the_page_of_measured_recordings_shows_what_the_tool_prints() {
+    shows_what_the_tool_prints("docs/evidence/real.md", 3);
 }
 
 /// The front page's picture is what `--svg` writes.
