@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::adequacy::linearised::Linearised;
 use crate::adequacy::null::draw;
 use crate::adequacy::omnibus::{Law, Omnibus};
-use crate::adequacy::tail::Tail;
+use crate::adequacy::tail::Null;
 use crate::diagnosis::TestOutcome;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
@@ -63,34 +63,28 @@ pub(crate) fn test(
         .collect();
     let undirected = omnibus.tests();
     let first = seen.len() - undirected.len();
-    let tail = |t: usize| {
-        let draws = null.iter().map(|row| row[t]);
-        match t.checked_sub(first).map_or(Law::Sum, |omnibus| undirected[omnibus].law) {
-            Law::Sum => Tail::new(draws),
-            Law::Largest => Tail::of_largest(draws),
-            Law::Rare => Tail::counted(draws),
-        }
-    };
-    let tails: Vec<Tail> = (0..seen.len()).map(tail).collect();
+    let nulls: Vec<Null> = (0..seen.len())
+        .map(|t| {
+            let law = t.checked_sub(first).map_or(Law::Sum, |omnibus| undirected[omnibus].law);
+            Null::new(law, null.iter().map(|row| row[t]).collect())
+        })
+        .collect();
     let directed = linearised.mechanisms;
-    let smallest = |row: &[f64]| {
-        let weighted = row.iter().zip(&tails).enumerate().map(|(t, (x, tail))| {
-            let weight = match t.checked_sub(first) {
-                Some(omnibus) if undirected[omnibus].narrow => NARROW_WEIGHT,
-                _ if t < directed => 1.0,
-                _ => UNDIRECTED_WEIGHT,
-            };
-            weight * tail.p(*x)
-        });
-        weighted.fold(f64::INFINITY, f64::min)
+    let weight = |t: usize| match t.checked_sub(first) {
+        Some(omnibus) if undirected[omnibus].narrow => NARROW_WEIGHT,
+        _ if t < directed => 1.0,
+        _ => UNDIRECTED_WEIGHT,
     };
-    let observed_smallest = smallest(&seen);
-    let below = null.iter().filter(|row| smallest(row) <= observed_smallest).count();
+    let smallest =
+        |p: &dyn Fn(usize) -> f64| (0..seen.len()).map(|t| weight(t) * p(t)).fold(f64::INFINITY, f64::min);
+    let observed_smallest = smallest(&|t| nulls[t].p(seen[t]));
+    let as_small = |k: &usize| smallest(&|t| nulls[t].p_of_draw(*k)) <= observed_smallest;
+    let below = (0..null.len()).filter(as_small).count();
     let names = linearised.alternatives.iter().map(|a| a.name.clone());
     let names = names.chain(undirected.iter().map(|test| test.name.clone()));
     let mut tests: Vec<TestOutcome> = names
-        .zip(seen.iter().zip(&tails))
-        .map(|(name, (&statistic, tail))| TestOutcome { name, statistic, p_value: tail.p(statistic) })
+        .zip(seen.iter().zip(&nulls))
+        .map(|(name, (&statistic, null))| TestOutcome { name, statistic, p_value: null.p(statistic) })
         .collect();
     tests.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
     Ok(Adequacy { p_value: (below as f64 + 1.0) * floor, p_floor: floor, tests })

@@ -6,10 +6,15 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-use crate::common::{Ball, World};
+use crate::common::{Ball, World, mechanism, parameter};
+use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::Verdict;
 use missing_physics::engine::{Options, diagnose};
+use missing_physics::model::{Model, PredictError, Quantity, Spec};
 use missing_physics::observer::Silent;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 const WORLDS: u64 = 300;
@@ -20,12 +25,16 @@ fn holds(world: World) {
 }
 
 fn holds_in(world: World, worlds: u64) {
-    let model = Ball::default();
+    holds_of(&Ball::default(), |seed| world.draw(1000 + seed), worlds);
+}
+
+/// The same of a model, and of worlds by seed.
+fn holds_of(model: &dyn Model, world: impl Fn(u64) -> Recording, worlds: u64) {
     let options = Options { replicates: 199, ..Options::default() };
     let p: Vec<f64> = (0..worlds)
         .map(|seed| {
             let options = Options { seed, ..options.clone() };
-            let answer = diagnose(&model, &world.draw(1000 + seed), &[], &options, &Silent).unwrap();
+            let answer = diagnose(model, &world(seed), &[], &options, &Silent).unwrap();
             assert_eq!(answer.verdict == Verdict::Adequate, answer.p_value > 0.05);
             answer.p_value
         })
@@ -81,5 +90,68 @@ fn one_run_of_a_few_rows() {
     for rows in [4, 5, 6, 8, 12] {
         println!("{rows} rows");
         holds(World { runs: 1, rows, ..World::NULL });
+    }
+}
+
+/// Two sensors: a level, and a wave that eight mechanisms act on, each of them a wave of another length.
+struct TwoSensors(Spec);
+
+impl TwoSensors {
+    const MECHANISMS: usize = 8;
+
+    fn new() -> Self {
+        let sizes = (0..Self::MECHANISMS).map(|k| parameter(&format!("size_{k}"), 0.0, [-10.0, 10.0]));
+        let baseline = ["level", "wave"].map(|name| parameter(name, 0.5, [-10.0, 10.0]));
+        Self(Spec {
+            baseline: "a level and a wave".into(),
+            parameters: baseline.into_iter().chain(sizes).collect(),
+            mechanisms: (0..Self::MECHANISMS).map(|k| mechanism(&format!("wave-{k}"), vec![2 + k])).collect(),
+            ..Spec::default()
+        })
+    }
+}
+
+impl Model for TwoSensors {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+
+    fn predict(&self, run: &Run, shared: &[f64], _: &[f64], out: &mut [f64]) -> Result<(), PredictError> {
+        let (level, wave) = out.split_at_mut(run.len());
+        level.fill(shared[0]);
+        for (wave, t) in wave.iter_mut().zip(&run.inputs[0]) {
+            let sizes = shared[2..].iter().zip(2..);
+            *wave = shared[1] * t.cos() + sizes.map(|(size, k)| size * (f64::from(k) * t).cos()).sum::<f64>();
+        }
+        Ok(())
+    }
+}
+
+/// A sensor of which mechanisms, or curves, take away all that a few rows leave, beside another one that has rows to spare; both print many
+/// digits.
+#[test]
+fn a_few_rows_of_a_sensor_that_all_mechanisms_act_on() {
+    let digits = 1e-7_f64;
+    let world = |seed: u64, rows: usize| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let times: Vec<f64> = (0..rows).map(|i| 2.0 * i as f64 / (rows - 1) as f64).collect();
+        let mut read = |v: f64| {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            ((v + 1e-3 * noise) / digits).round() * digits
+        };
+        let level = times.iter().map(|_| read(0.7)).collect();
+        let wave = times.iter().map(|t| read(0.3 * t.cos())).collect();
+        Recording {
+            channels: vec![Quantity::new("level", ""), Quantity::new("wave", "")],
+            variables: vec![Quantity::new("t_s", "s")],
+            runs: vec![Run { label: "1".into(), inputs: vec![times], outputs: vec![level, wave], kind: 0 }],
+            noise_along: Some(0),
+            calibration: vec![None, None],
+            resolution: vec![digits, digits],
+        }
+    };
+    for rows in [7, 8, 9, 12] {
+        println!("{rows} rows");
+        holds_of(&TwoSensors::new(), |seed| world(seed, rows), WORLDS);
     }
 }

@@ -42,6 +42,11 @@ pub(super) struct Product {
 }
 
 impl Block {
+    /// Whether a column acts here.
+    pub(super) fn acts(&self, column: usize) -> bool {
+        self.raw[column].iter().any(|v| *v != 0.0)
+    }
+
     /// The columns whitened, the nuisance columns eliminated.
     pub(super) fn whitened(&self, whitener: &Whitener) -> Whitened {
         let mut columns = self.raw.clone();

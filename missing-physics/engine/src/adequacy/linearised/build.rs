@@ -100,6 +100,7 @@ fn mechanisms(problem: &Problem<'_>, selection: &Selection, rivals: &[usize]) ->
         nuisance: freed.nuisance.into_iter().map(|i| layout.nuisance(i)).collect(),
         shared: freed.shared.into_iter().map(|i| layout.shared(i)).collect(),
         sign: freed.sign,
+        measurable: true,
     };
     let alternatives = all.into_iter().map(placed).collect();
     (layout, alternatives)
@@ -119,6 +120,7 @@ fn smooth<'a>(
                 nuisance: Vec::new(),
                 shared: (first..first + DEGREE).collect(),
                 sign: 0.0,
+                measurable: true,
             }
         })
     })
@@ -137,6 +139,7 @@ fn ordered<'a>(problem: &'a Problem<'_>, base: usize) -> impl Iterator<Item = Al
         nuisance: Vec::new(),
         shared: (base + channel * ORDER..base + (channel + 1) * ORDER).collect(),
         sign: 0.0,
+        measurable: true,
     })
 }
 
@@ -231,6 +234,10 @@ impl<'a> Linearised<'a> {
             freedom,
         };
         linearised.play(&linearised.rule.allowed.clone());
+        let measurable: Vec<bool> =
+            linearised.alternatives.iter().map(|alternative| linearised.leaves_noise(alternative)).collect();
+        let alternatives = linearised.alternatives.iter_mut().zip(measurable);
+        alternatives.for_each(|(alternative, leaves_noise)| alternative.measurable &= leaves_noise);
         Ok(linearised)
     }
 }

@@ -15,6 +15,8 @@ pub(crate) struct Alternative {
     pub(super) shared: Vec<usize>,
     /// For a single shared column: the sign that its coefficient must have (0: either).
     pub(super) sign: f64,
+    /// Whether it leaves noise to measure it by.
+    pub(super) measurable: bool,
 }
 
 /// The linearised model.
@@ -85,6 +87,27 @@ impl Linearised<'_> {
     /// Degrees of freedom of the noise that the model and so many further columns leave.
     pub(super) fn freedom_beside(&self, columns: usize) -> f64 {
         self.freedom.iter().sum::<f64>() - columns as f64
+    }
+
+    /// Degrees of freedom that these columns leave of one channel's noise: its rows, less the directions among them in which the columns act.
+    /// Columns that act on one channel alone leave nothing of it where all channels together have rows enough.
+    pub(super) fn freedom_of(&self, channel: usize, nuisance: &[usize], shared: &[usize]) -> f64 {
+        let of_run = |row: &Vec<Block>| {
+            let added = nuisance.iter().filter(|&&a| a >= self.n_nuisance);
+            row[channel].mine.len() + added.filter(|&&a| row[channel].acts(a)).count()
+        };
+        let by_run: usize = self.blocks.iter().map(of_run).sum();
+        self.problem.count(channel) as f64 - (by_run + self.pooled[channel][0].rank(shared)) as f64
+    }
+
+    /// Whether an alternative leaves noise in every channel on which it acts.
+    pub(super) fn leaves_noise(&self, alternative: &Alternative) -> bool {
+        let (_, model) = self.columns_with(0);
+        let shared = [&model[..], &alternative.shared].concat();
+        let added = || alternative.nuisance.iter().chain(&alternative.shared);
+        let acts = |channel: usize| self.blocks.iter().any(|row| added().any(|&a| row[channel].acts(a)));
+        let mut acting = (0..self.problem.channels()).filter(|&c| acts(c));
+        acting.all(|c| self.freedom_of(c, &alternative.nuisance, &shared) >= 1.0)
     }
 
     /// Drops all alternatives: the model alone is read.

@@ -30,9 +30,8 @@ pub(super) struct PooledProduct {
 
 /// Which nuisance columns act on one channel of each run at most, which eliminates them.
 pub(super) fn separate(blocks: &[Vec<Block>], n_nuisance: usize) -> Vec<bool> {
-    let acts = |block: &&Block, column: usize| block.raw[column].iter().any(|v| *v != 0.0);
     let of_run = |row: &Vec<Block>, column: usize| {
-        let mut acting = row.iter().filter(|block| acts(block, column));
+        let mut acting = row.iter().filter(|block| block.acts(column));
         acting.next().is_none_or(|block| block.mine.contains(&column)) && acting.next().is_none()
     };
     (0..n_nuisance).map(|column| blocks.iter().all(|row| of_run(row, column))).collect()
@@ -59,6 +58,14 @@ impl Pooled {
             }
         }
         pooled
+    }
+
+    /// In how many directions these columns act beside each run's nuisance columns.
+    pub(super) fn rank(&self, columns: &[usize]) -> usize {
+        let n = columns.len();
+        let gram = DMatrix::from_fn(n, n, |i, j| self.beside[(columns[i], columns[j])]);
+        let squares: Vec<f64> = columns.iter().map(|&a| self.squares[a]).collect();
+        SemiCholesky::against(gram, &squares).rank()
     }
 
     /// Of one data vector's products with the blocks of all runs.

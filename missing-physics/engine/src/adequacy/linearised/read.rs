@@ -35,7 +35,7 @@ impl Linearised<'_> {
     ) -> f64 {
         // Beside an alternative that leaves nothing of the data there is no noise to measure it by.
         let columns = alternative.shared.len() + alternative.nuisance.len() * self.blocks.len();
-        if self.freedom_beside(columns) < 1.0 {
+        if !alternative.measurable || self.freedom_beside(columns) < 1.0 {
             return 0.0;
         }
         let with_nuisance = [nuisance, &alternative.nuisance].concat();

@@ -2,8 +2,8 @@
 
 use super::plane::Linearised;
 
-/// Where the model and every mechanism leave fewer degrees of freedom than this, the noise is that of the model alone: what next to
-/// nothing is left of says nothing of noise.
+/// Where the model and every mechanism leave fewer degrees of freedom than this, of all channels together or of one, its noise is that of
+/// the model alone: what next to nothing is left of says nothing of noise.
 const LEAST_FREEDOM: f64 = 5.0;
 
 /// Most moves of a climb at one stride.
@@ -15,11 +15,20 @@ impl Linearised<'_> {
     pub(crate) fn noise_beyond_mechanisms(&self, data: &[Vec<Vec<f64>>]) -> Vec<(usize, f64)> {
         let products = self.products(data);
         let nuisance: Vec<usize> = (0..self.n_nuisance).collect();
-        let (_, with) = self.columns_with(self.mechanisms);
-        let enough = self.freedom_beside(with.len() - self.n_shared) >= LEAST_FREEDOM;
-        let shared = if enough { with } else { self.columns_with(0).1 };
+        let [(_, alone), (_, with)] = [0, self.mechanisms].map(|n| self.columns_with(n));
         let start = self.white_start(&products);
-        let (_, noise, _) = self.alternate(&products, &nuisance, &shared, &start, 8);
+        let noise_beside = |shared: &[usize]| self.alternate(&products, &nuisance, shared, &start, 8).1;
+        let enough = |c: usize| self.freedom_of(c, &nuisance, &with) >= LEAST_FREEDOM;
+        let mut enough: Vec<bool> = (0..self.problem.channels()).map(enough).collect();
+        if self.freedom_beside(with.len() - self.n_shared) < LEAST_FREEDOM {
+            enough.fill(false);
+        }
+        let mut noise = noise_beside(if enough.contains(&true) { &with } else { &alone });
+        if enough.contains(&true) && enough.contains(&false) {
+            let of_model = noise_beside(&alone);
+            let short = (0..noise.len()).filter(|&c| !enough[c]);
+            short.for_each(|c| noise[c] = of_model[c]);
+        }
         noise.into_iter().map(|(shape, sigma)| (self.in_play[shape], sigma)).collect()
     }
 
