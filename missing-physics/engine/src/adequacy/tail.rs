@@ -41,9 +41,9 @@ impl Null {
         match (self.law, &self.tail) {
             (Law::Sum, _) => Tail::sum(others()).p(value),
             (Law::Largest, _) => Tail::largest(others()).p(value),
+            // It is one of those at or above it itself.
             (Law::Rare, Tail::Counted(draws)) if value > 0.0 && value.is_finite() => {
-                let above = draws.len() - draws.partition_point(|other| *other < value);
-                above as f64 / draws.len() as f64
+                at_or_above(draws, value) / draws.len() as f64
             }
             (Law::Rare, _) => 1.0,
         }
@@ -62,6 +62,11 @@ enum Tail {
     Gumbel(Gumbel),
     /// Counted, of a statistic that is the same in most draws: the draws, rising.
     Counted(Vec<f64>),
+}
+
+/// How many of the rising draws are at or above a value.
+fn at_or_above(draws: &[f64], value: f64) -> f64 {
+    (draws.len() - draws.partition_point(|draw| *draw < value)) as f64
 }
 
 /// From this shape on a gamma law is a normal one: its skewness is 0.02, and its tail, a series, takes time with the root of the shape.
@@ -110,10 +115,7 @@ impl Tail {
                 let above = (-(value - law.location()) / law.scale()).exp();
                 (-(-above).exp_m1()).clamp(1e-300, 1.0)
             }
-            Self::Counted(draws) => {
-                let above = draws.len() - draws.partition_point(|draw| *draw < value);
-                ((above as f64 + 1.0) / (draws.len() as f64 + 1.0)).min(1.0)
-            }
+            Self::Counted(draws) => ((at_or_above(draws, value) + 1.0) / (draws.len() as f64 + 1.0)).min(1.0),
         }
     }
 }

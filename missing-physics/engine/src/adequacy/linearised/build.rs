@@ -100,7 +100,6 @@ fn mechanisms(problem: &Problem<'_>, selection: &Selection, rivals: &[usize]) ->
         nuisance: freed.nuisance.into_iter().map(|i| layout.nuisance(i)).collect(),
         shared: freed.shared.into_iter().map(|i| layout.shared(i)).collect(),
         sign: freed.sign,
-        measurable: true,
     };
     let alternatives = all.into_iter().map(placed).collect();
     (layout, alternatives)
@@ -120,7 +119,6 @@ fn smooth<'a>(
                 nuisance: Vec::new(),
                 shared: (first..first + DEGREE).collect(),
                 sign: 0.0,
-                measurable: true,
             }
         })
     })
@@ -139,7 +137,6 @@ fn ordered<'a>(problem: &'a Problem<'_>, base: usize) -> impl Iterator<Item = Al
         nuisance: Vec::new(),
         shared: (base + channel * ORDER..base + (channel + 1) * ORDER).collect(),
         sign: 0.0,
-        measurable: true,
     })
 }
 
@@ -229,15 +226,14 @@ impl<'a> Linearised<'a> {
             n_nuisance,
             n_shared,
             alternatives,
+            measurable: Vec::new(),
             mechanisms,
             rule,
             freedom,
         };
         linearised.play(&linearised.rule.allowed.clone());
-        let measurable: Vec<bool> =
-            linearised.alternatives.iter().map(|alternative| linearised.leaves_noise(alternative)).collect();
-        let alternatives = linearised.alternatives.iter_mut().zip(measurable);
-        alternatives.for_each(|(alternative, leaves_noise)| alternative.measurable &= leaves_noise);
+        let leave_noise = linearised.alternatives.iter().map(|a| linearised.leaves_noise(a));
+        linearised.measurable = leave_noise.collect();
         Ok(linearised)
     }
 }

@@ -15,8 +15,6 @@ pub(crate) struct Alternative {
     pub(super) shared: Vec<usize>,
     /// For a single shared column: the sign that its coefficient must have (0: either).
     pub(super) sign: f64,
-    /// Whether it leaves noise to measure it by.
-    pub(super) measurable: bool,
 }
 
 /// The linearised model.
@@ -32,6 +30,8 @@ pub(crate) struct Linearised<'a> {
     pub(super) n_nuisance: usize,
     pub(super) n_shared: usize,
     pub(crate) alternatives: Vec<Alternative>,
+    /// Whether each alternative leaves noise to measure it by.
+    pub(super) measurable: Vec<bool>,
     /// How many of the alternatives, the first ones, are mechanisms.
     pub(crate) mechanisms: usize,
     pub(super) rule: NoiseRule,
@@ -100,8 +100,12 @@ impl Linearised<'_> {
         self.problem.count(channel) as f64 - (by_run + self.pooled[channel][0].rank(shared)) as f64
     }
 
-    /// Whether an alternative leaves noise in every channel on which it acts.
+    /// Whether an alternative leaves noise, of all channels together and in every one on which it acts.
     pub(super) fn leaves_noise(&self, alternative: &Alternative) -> bool {
+        let columns = alternative.shared.len() + alternative.nuisance.len() * self.blocks.len();
+        if self.freedom_beside(columns) < 1.0 {
+            return false;
+        }
         let (_, model) = self.columns_with(0);
         let shared = [&model[..], &alternative.shared].concat();
         let added = || alternative.nuisance.iter().chain(&alternative.shared);
@@ -113,6 +117,7 @@ impl Linearised<'_> {
     /// Drops all alternatives: the model alone is read.
     pub(crate) fn without_alternatives(mut self) -> Self {
         self.alternatives.clear();
+        self.measurable.clear();
         self
     }
 

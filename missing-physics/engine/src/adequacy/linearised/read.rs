@@ -9,8 +9,11 @@ impl Linearised<'_> {
         let (nuisance, shared) = self.columns_with(0);
         let start = self.white_start(&products);
         let (score, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
-        let gain = |alternative| self.gain(&products, (&nuisance, &shared), &noise, alternative);
-        let gains = self.alternatives.iter().map(gain).collect();
+        let gain = |(alternative, measurable): (_, &bool)| {
+            // Beside an alternative that leaves nothing of the data there is no noise to measure it by.
+            if *measurable { self.gain(&products, (&nuisance, &shared), &noise, alternative) } else { 0.0 }
+        };
+        let gains = self.alternatives.iter().zip(&self.measurable).map(gain).collect();
         let of_channel = |channel| self.noises(&products, channel, (&nuisance, &shared), &coefficients);
         let noises = (0..self.problem.channels()).map(of_channel).collect();
         let coefficients = self.solve_by_run(&products, &coefficients.noise, &nuisance, &shared);
@@ -25,7 +28,7 @@ impl Linearised<'_> {
     }
 
     /// By how much an alternative lowers the sum of squares that the model alone leaves, in units of the noise that is left beside the
-    /// alternative; nothing where its coefficient has the wrong sign, or where it leaves no noise to measure it by.
+    /// alternative; nothing where its coefficient has the wrong sign.
     fn gain(
         &self,
         products: &Products,
@@ -33,11 +36,6 @@ impl Linearised<'_> {
         noise: &[(usize, f64)],
         alternative: &Alternative,
     ) -> f64 {
-        // Beside an alternative that leaves nothing of the data there is no noise to measure it by.
-        let columns = alternative.shared.len() + alternative.nuisance.len() * self.blocks.len();
-        if !alternative.measurable || self.freedom_beside(columns) < 1.0 {
-            return 0.0;
-        }
         let with_nuisance = [nuisance, &alternative.nuisance].concat();
         let with_shared = [shared, &alternative.shared].concat();
         let (_, beside, _) = self.alternate(products, &with_nuisance, &with_shared, noise, 4);
