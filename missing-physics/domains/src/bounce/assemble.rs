@@ -9,7 +9,7 @@ use super::drop::Drop;
 use super::effects::Effects;
 use super::experiments::{experiments, of_times};
 use super::figure::{Shown, figures};
-use super::model::{BounceModel, COPIES};
+use super::model::{BounceModel, copies};
 use super::read::{Heard, Rig};
 use super::rows::Rows;
 use super::setup::Setup;
@@ -114,9 +114,10 @@ impl Drops {
             (judged.spread, judged.plausible),
             self.microphones.clone(),
         );
+        let copies = copies(drops.len());
         let mut runs = Vec::new();
         for (h, linear) in self.heard.iter().zip(judged.drops) {
-            runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, COPIES).ok_or_else(|| senseless(h))?);
+            runs.push(model.run(&h.label, linear, &h.drop, &h.numbers, copies).ok_or_else(|| senseless(h))?);
         }
         let channels = placed_channels(self.microphones.spare());
         let calibration = self.placed_calibration(channels.len());

@@ -31,8 +31,15 @@ pub(super) struct ShownDrop {
     null_samples: Vec<Vec<Vec<Vec<f64>>>>,
 }
 
-/// Simulated drops for each measured one and each plausible spread.
-pub(super) const COPIES: usize = 5;
+/// Simulated drops for each measured one and each plausible spread, where so many were measured.
+///
+/// A single drop makes no more null worlds than it has simulated ones: a thousand, as many as a test asks for. Null worlds that are alike
+/// hide in each other's tail, and the data, of which there is one, look rarer than they are.
+pub(super) fn copies(drops: usize) -> usize {
+    const OF_ONE: usize = 64;
+    const FEWEST: usize = 5;
+    OF_ONE.div_ceil(drops.max(1)).max(FEWEST)
+}
 
 /// The model of the domain `bounce`.
 #[derive(Debug)]

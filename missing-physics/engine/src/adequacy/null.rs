@@ -28,12 +28,18 @@ pub(crate) fn draw(
         .collect();
     // One world for all runs; drawn from the stream's number, so that a model without any draws what it always drew.
     let world = stream as usize;
+    let single = problem.rows.len() == 1;
     (0..problem.rows.len())
         .map(|run| {
             let errors = problem.model.extensions().errors;
             let worlds = errors.map_or(&[][..], |errors| errors.null_samples(&problem.recording.runs[run]));
             let copies = worlds.get(world.checked_rem(worlds.len()).unwrap_or(0));
-            let copy = copies.and_then(|c| c.get(rng.random_range(0..c.len().max(1))));
+            let copy = copies.and_then(|copies| {
+                // Runs make many worlds together; a single one makes no two that are alike if its copies take turns.
+                let in_turn = world / worlds.len() % copies.len().max(1);
+                let any = rng.random_range(0..copies.len().max(1));
+                copies.get(if single { in_turn } else { any })
+            });
             (0..problem.channels())
                 .map(|c| {
                     let valid = &problem.rows[run].valid[c];

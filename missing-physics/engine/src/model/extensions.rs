@@ -70,7 +70,7 @@ pub trait ErrorModel: Sync {
 
     /// Errors of a run under the null hypothesis, in sigmas of each channel, `[world][copy][channel][row]`, of a model that knows
     /// them not to be normal: as many worlds for every run, which share what is not known of the noise, and independent copies in
-    /// each. None by default.
+    /// each, of which a recording of one run needs as many as make a thousand with all its worlds. None by default.
     fn null_samples(&self, _run: &Run) -> &[Vec<Vec<Vec<f64>>>] {
         &[]
     }
