@@ -19,4 +19,5 @@ mod recorded;
 mod repair;
 mod report;
 mod templates;
+mod turning_over;
 mod watch;

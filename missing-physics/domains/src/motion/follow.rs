@@ -6,7 +6,7 @@ use missing_physics::fit::least_squares;
 use missing_physics::model::Model as _;
 use missing_physics::noise::rough_sigma;
 
-use super::growth::too_long;
+use super::growth::{lost, missed, too_long};
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range, rms};
 use super::windows::{cut, rows};
@@ -160,26 +160,44 @@ pub(super) fn sigma(recording: &Recording, run: &Run, channel: usize) -> f64 {
     sigma.max(LEAST_SIGMA * (high - low))
 }
 
+/// The longest windows in which a motion can be followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Longest {
+    /// Their number of rows.
+    pub(super) rows: usize,
+    /// What longer ones do.
+    pub(super) beyond: &'static str,
+}
+
 /// Fits the equations in short windows, then in longer ones: a fit over a whole run from far off would lose the phase and settle in a
-/// wrong place. The second is the number of rows of the longest windows that can be followed, where whole runs cannot.
+/// wrong place. The second are the longest windows that can be followed, where whole runs cannot.
 pub(super) fn windows(
     model: &MotionModel,
     recording: &Recording,
     mut shared: Vec<f64>,
-) -> Result<(Vec<f64>, Option<usize>), String> {
+) -> Result<(Vec<f64>, Option<Longest>), String> {
     let free = model.freed();
     let longest = recording.runs.iter().map(Run::len).max().unwrap_or(0);
+    // What cannot be followed to its end is cut in two at least.
+    let shorter =
+        |followed: usize, beyond| Some(Longest { rows: followed.min((longest / 2).max(1)), beyond });
     let mut length = FIRST_WINDOW;
     let mut followed = FIRST_WINDOW;
+    let mut missed_before = f64::INFINITY;
     loop {
         let whole = length >= longest;
         if length > FIRST_WINDOW {
             let sizes = sizes(&free, &cut(recording, followed), &shared)?;
             if too_long(&free, recording, &shared, &sizes.states, length.min(longest)) {
-                return Ok((shared, Some(followed)));
+                return Ok((
+                    shared,
+                    shorter(
+                        followed,
+                        "a small deviation of the start grows until the motion tells nothing of the physics",
+                    ),
+                ));
             }
         }
-        followed = length;
         let mut windowed = if whole { recording.clone() } else { cut(recording, length) };
         if !whole {
             // Evenly spread, not all of them.
@@ -190,8 +208,13 @@ pub(super) fn windows(
         }
         let model = if whole { model } else { &free };
         if let Ok(fit) = least_squares(model, &windowed, &shared) {
-            shared = fit.shared;
+            let missed = missed(model, recording, &windowed, &fit);
+            if lost(missed, missed_before) {
+                return Ok((shared, shorter(followed, "the fit of the equations settles on another motion")));
+            }
+            (shared, missed_before) = (fit.shared, missed);
         }
+        followed = length;
         if whole {
             return Ok((shared, None));
         }

@@ -1,6 +1,7 @@
 //! How a deviation of the start grows: which windows are too long to be followed.
 
 use missing_physics::data::{Recording, Run};
+use missing_physics::fit::LeastSquares;
 use missing_physics::model::Model as _;
 
 use super::model::MotionModel;
@@ -8,8 +9,48 @@ use super::windows::cut;
 
 /// By how much a deviation of the start may grow in a window, both in parts of the size of the motion.
 const MOST_GROWTH: f64 = 10.0;
+/// A fit that misses by more than this part of an output's spread, and by more than so many times what it misses in windows half as long,
+/// has settled on another motion (a pendulum that turns over once more): what a missing force moves grows as the square of time.
+const LOST: f64 = 0.2;
+const FASTER: f64 = 4.0;
 /// Windows of one length that are looked at.
 const LOOKED_AT: usize = 12;
+
+/// Root mean square by which a fit misses windows of a recording, in parts of the spread of an output: the largest of all outputs;
+/// infinite where it does not follow them.
+pub(super) fn missed(
+    model: &MotionModel,
+    recording: &Recording,
+    windows: &Recording,
+    LeastSquares { shared, nuisance, .. }: &LeastSquares,
+) -> f64 {
+    let channels = recording.channels.len();
+    let mut squares = vec![(0.0, 0_usize); channels];
+    for (window, nuisance) in windows.runs.iter().zip(nuisance) {
+        let mut out = vec![0.0; window.len() * channels];
+        if model.predict(window, shared, nuisance, &mut out).is_err() {
+            return f64::INFINITY;
+        }
+        for ((sum, count), (column, out)) in
+            squares.iter_mut().zip(window.outputs.iter().zip(out.chunks(window.len().max(1))))
+        {
+            for (v, out) in column.iter().zip(out).filter(|(v, _)| v.is_finite()) {
+                *sum += (v - out).powi(2);
+                *count += 1;
+            }
+        }
+    }
+    let parts = squares.iter().enumerate().map(|(c, (sum, count))| {
+        let spread = deviation(recording.runs.iter().flat_map(|r| &r.outputs[c]).copied());
+        (sum / (*count).max(1) as f64).sqrt() / spread
+    });
+    parts.fold(0.0, f64::max)
+}
+
+/// Whether a fit has lost the motion on the way through windows by which it misses so much, and windows half as long by so much.
+pub(super) fn lost(missed: f64, half: f64) -> bool {
+    missed > LOST && missed > FASTER * half
+}
 
 /// Whether windows of a number of rows are too long: a deviation of their start grows beyond what can be followed. `free` is the model
 /// with all states free at a window's start, `sizes` are those of the states.

@@ -63,12 +63,12 @@ fn fitted(equations: Equations, alone: &Recording, places: &[usize]) -> Option<(
     let mut model = MotionModel::baseline(equations, first_pace(alone));
     let starts = model.spec().starts(Scope::Shared);
     resolve(&mut model, alone, &starts).ok()?;
-    let (shared, length) = windows(&model, alone, starts).ok()?;
-    let fit = match length {
+    let (shared, longest) = windows(&model, alone, starts).ok()?;
+    let fit = match longest {
         None => least_squares(&model, alone, &shared),
-        Some(length) => {
+        Some(longest) => {
             let free = model.freed();
-            least_squares(&free, &cut(alone, length), &shared)
+            least_squares(&free, &cut(alone, longest.rows), &shared)
         }
     };
     let fit = fit.ok()?;

@@ -101,9 +101,9 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
     let starts: Vec<f64> = model.spec().starts(Scope::Shared);
     resolve(&mut model, &recording, &starts)?;
     let (mut fitted, followed) = windows(&model, &recording, starts)?;
-    if let Some(length) = followed {
+    if let Some(longest) = followed {
         let mut free = model.freed();
-        resolve(&mut free, &cut(&recording, length), &fitted)?;
+        resolve(&mut free, &cut(&recording, longest.rows), &fitted)?;
         model.set_pace(free.pace());
         model.set_state_sizes(free.state_sizes().to_vec());
     } else {
@@ -120,7 +120,7 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
     }
     remarks.extend(held::remarks(&model, &recording, &fitted));
     let stated = model.stated(&fitted);
-    let Some(length) = followed else {
+    let Some(longest) = followed else {
         let scales = sizes(&model, &recording, &fitted)?;
         let times = [scales.step_s, scales.duration_s];
         let model = model.full(scales, &stated, None);
@@ -129,13 +129,13 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
     };
     let free = model.freed();
     let whole = recording;
-    let recording = cut(&whole, length);
+    let recording = cut(&whole, longest.rows);
     let scales = sizes(&free, &recording, &fitted)?;
     let span = |r: &Run| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0].first().unwrap_or(&0.0);
-    let longest = recording.runs.iter().map(span).fold(0.0, f64::max);
+    let span = recording.runs.iter().map(span).fold(0.0, f64::max);
     remarks.push(format!(
-        "runs are followed in windows of {longest:.3} s with free starts: over more, a small deviation of the start grows until the \
-         motion tells nothing of the physics"
+        "runs are followed in windows of {span:.3} s with free starts: over more, {}",
+        longest.beyond
     ));
     let model = model.full(scales, &stated, Some(&whole.runs));
     Ok(Tuned { model, recording, experiments: Vec::new(), remarks })

@@ -1,7 +1,7 @@
 //! Intervals by profile likelihood.
 
 use crate::estimate::reach::{END, Z95};
-use crate::fit::gauss_newton::solve;
+use crate::fit::gauss_newton::{solve, solve_below};
 use crate::fit::optimum::{Fit, covariance};
 use crate::problem::{Problem, Selection};
 use crate::selection::candidate::Candidate;
@@ -35,9 +35,15 @@ impl<'a> Profile<'a> {
     }
 
     fn at(&self, value: f64) -> Option<Fit> {
+        self.at_below(value, f64::INFINITY)
+    }
+
+    /// The same, given up where the sum of squares will hardly get below `most`.
+    fn at_below(&self, value: f64, most: f64) -> Option<Fit> {
         let mut shared = self.fit.shared.clone();
         shared[self.slot] = value;
-        solve(self.problem, &self.others, &self.fit.noise, &shared, &self.fit.nuisance).ok()
+        let start = (&shared[..], &self.fit.nuisance[..]);
+        solve_below(most, self.problem, &self.others, &self.fit.noise, start).ok()
     }
 
     /// By how much a standard error is wider than that of the fit's own noise.
@@ -56,7 +62,7 @@ impl<'a> Profile<'a> {
     /// The top of the likelihood to which a fit climbs from a value, the parameter being free again; none where the sum of squares
     /// at the value is `most` or more.
     fn top_from(&self, value: f64, most: f64) -> Option<Fit> {
-        let near = self.at(value).filter(|f| f.chi2 < most)?;
+        let near = self.at_below(value, most).filter(|f| f.chi2 < most)?;
         solve(self.problem, self.all, &near.noise, &near.shared, &near.nuisance).ok()
     }
 

@@ -15,22 +15,29 @@ const ITERATIONS_OF_MANY: usize = 24;
 /// The same where a fit to all data shows where one to a part of them ends.
 const ITERATIONS_AGAIN: usize = 6;
 /// Gain in the sum of squares that a step promises, in units of what is left of a value, below which it is not taken by a model that knows
-/// many mechanisms: it would move no parameter by more than a thirtieth of its error.
-const NOT_WORTH: f64 = 1e-3;
+/// many mechanisms: it would move no parameter by more than a tenth of its error.
+pub(crate) const NOT_WORTH: f64 = 1e-2;
 /// What a step may promise at most, in parts of the sum of squares, where a fit that does not go down any more is at its end.
 const STALLED: f64 = 1e-4;
-/// Gain in the sum of squares, in units of what is left of a value, below which a step that does not go down is not shortened further.
-const NO_GAIN: f64 = 1e-6;
+/// Gain in the sum of squares that a step promises, in the same units, below which one that does not go down shortened either is at a
+/// kink, for a model that knows many mechanisms.
+const NO_GAIN: f64 = 0.1;
 /// Gain of a shortened step, in the same units, that is next to none.
 const HARDLY: f64 = 1e-3;
 /// Gain of a step, promised and had, in the same units, at which a fit is at its end.
 const SETTLED: f64 = 1e-5;
+/// How many times what a step promises a fit may still gain, from the second step on.
+const HOPE: f64 = 2.0;
 /// The least part of a step that is tried.
 const SHORTEST: f64 = 0.1;
 /// A step of which more than this part would have been best is not shortened.
 const WHOLE: f64 = 0.75;
 /// Shortened steps in a row that gain next to nothing, after which a fit is at its end: dry friction and jumps leave kinks.
 const PATIENCE: usize = 3;
+/// A step that gains less than this part of what it promised leads along a crease of the sum of squares, ...
+const POOR: f64 = 0.1;
+/// ... and one that gains less than this next to nothing: for a model that knows many mechanisms, where dry friction leaves creases.
+const CREASE: f64 = 0.02;
 
 pub(crate) fn linearise(
     problem: &Problem<'_>,
@@ -39,10 +46,9 @@ pub(crate) fn linearise(
     shared: &[f64],
     nuisance: &[Vec<f64>],
 ) -> Result<NormalEquations, PredictError> {
-    let of_run = |run: usize| normal_of_run(problem, selection, noise, run, shared, &nuisance[run]);
-    let normals = problem.by_run(of_run)?;
-    let chi2 = normals.iter().map(|gram| gram[(gram.nrows() - 1, gram.nrows() - 1)]).sum();
-    Ok(NormalEquations { normals, chi2 })
+    NormalEquations::with(problem, |run| {
+        normal_of_run(problem, selection, noise, run, shared, &nuisance[run])
+    })
 }
 
 /// The sum of squares alone, without derivatives.
@@ -92,6 +98,57 @@ fn best_length(length: f64, predicted: f64, gained: f64) -> f64 {
     if bent > 0.0 && best < WHOLE { best } else { 1.0 }
 }
 
+/// By how much a step is damped, as a part of the information of each parameter.
+struct Damping {
+    part: f64,
+    growth: f64,
+    many: bool,
+}
+
+impl Damping {
+    /// Of the first step that is damped.
+    const FIRST: f64 = 1e-2;
+    /// By how much it grows with the first step that fails, and with each further one so many times as much.
+    const GROWTH: f64 = 2.0;
+    /// The same of a model that knows few mechanisms: it grows and falls by decades.
+    const FIRST_OF_FEW: f64 = 1e-3;
+    const DECADE: f64 = 10.0;
+    /// By how much it grows at the most with a step that goes down.
+    const POOR: f64 = 2.0;
+    /// Beyond this no step goes down.
+    const MOST: f64 = 1e8;
+
+    fn none(many: bool) -> Self {
+        Self { part: 0.0, growth: Self::GROWTH, many }
+    }
+
+    /// After a step that does not go down.
+    fn failed(&mut self) {
+        let (first, growth) =
+            if self.many { (Self::FIRST, self.growth) } else { (Self::FIRST_OF_FEW, Self::DECADE) };
+        self.part = if self.part == 0.0 { first } else { self.part * growth };
+        self.growth *= Self::GROWTH;
+    }
+
+    /// After a step that gained a part of what it promised (for a model that knows many mechanisms, Nielsen 1999, Damping parameter in
+    /// Marquardt's method, IMM-REP-1999-05).
+    fn succeeded(&mut self, part: f64) {
+        self.growth = Self::GROWTH;
+        let (least, factor) = if self.many {
+            (1e-2 * Self::FIRST, (1.0 - (2.0 * part - 1.0).powi(3)).clamp(1.0 / Self::DECADE, Self::POOR))
+        } else {
+            (1e-3 * Self::FIRST_OF_FEW, 1.0 / Self::DECADE)
+        };
+        self.part = if self.part < least { 0.0 } else { self.part * factor };
+    }
+
+    /// After a step that hardly gained anything of what it promised: along a crease its direction is wrong, not its length.
+    fn misled(&mut self) {
+        self.growth = Self::GROWTH;
+        self.part = if self.part == 0.0 { Self::FIRST } else { self.part * Self::POOR };
+    }
+}
+
 /// Fits the free parameters for a given noise, from a given start.
 pub(crate) fn solve(
     problem: &Problem<'_>,
@@ -122,29 +179,55 @@ pub(crate) fn solve_within(
     problem: &Problem<'_>,
     selection: &Selection,
     noise: &NoiseState,
+    start: (&[f64], &[Vec<f64>]),
+) -> Result<Fit, PredictError> {
+    descend((iterations, f64::INFINITY), problem, selection, noise, start)
+}
+
+/// The same, given up where the sum of squares will hardly get below `most`, by a model that knows many mechanisms.
+pub(crate) fn solve_below(
+    most: f64,
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    start: (&[f64], &[Vec<f64>]),
+) -> Result<Fit, PredictError> {
+    let (iterations, most) =
+        if problem.knows_many() { (ITERATIONS_OF_MANY, most) } else { (MAX_ITERATIONS, f64::INFINITY) };
+    descend((iterations, most), problem, selection, noise, start)
+}
+
+fn descend(
+    (iterations, most): (usize, f64),
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
     (shared, nuisance): (&[f64], &[Vec<f64>]),
 ) -> Result<Fit, PredictError> {
     let n_shared = selection.shared.len();
     let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
     let mut linear = linearise(problem, selection, noise, &shared, &nuisance)?;
-    let mut damping = 0.0;
+    let many = problem.knows_many();
+    let mut damping = Damping::none(many);
     let mut converged = false;
     let mut held = vec![false; n_shared];
-    let many = problem.knows_many();
     // What part of a step is taken, whether one from here failed, and whether it was shortened since.
     let (mut length, mut failed, mut shortened) = (1.0, false, false);
     let (mut hardly, mut promised) = (0, f64::INFINITY);
     let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-    for _ in 0..iterations {
+    for iteration in 0..iterations {
         // Where a fit leaves many times the noise, what a step gains counts in units of that.
         let left = (linear.chi2 / values.max(1) as f64).max(1.0);
-        let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping);
+        let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping.part);
         let predicted = step.predicted;
         promised = predicted;
         held.clone_from(&step.held);
         let least = if many { NOT_WORTH * left } else { 1e-9 * (1.0 + 1e-6 * linear.chi2) };
         if !(predicted > least) {
             converged = true;
+            break;
+        }
+        if iteration > 0 && linear.chi2 - HOPE * predicted > most {
             break;
         }
         let step = step.part(length, &shared, &nuisance);
@@ -154,20 +237,28 @@ pub(crate) fn solve_within(
         match next {
             Some(next) if next.chi2 <= linear.chi2 * (1.0 + 1e-14) => {
                 (shared, nuisance, linear) = (step.shared, step.nuisance, next);
-                (length, failed) = (best, damping > 0.0);
-                hardly = if damping > 0.0 && gained < HARDLY * left { hardly + 1 } else { 0 };
+                let of_promised = gained / (predicted * length * (2.0 - length));
+                let hardly_any = gained < HARDLY * left && (many || damping.part > 0.0);
+                hardly = if hardly_any || many && of_promised < CREASE { hardly + 1 } else { 0 };
+                failed = damping.part > 0.0;
                 if hardly == PATIENCE {
                     converged = predicted < STALLED * (1.0 + linear.chi2);
                     break;
                 }
-                damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
-                shortened = false;
+                if many && of_promised < POOR {
+                    length = 1.0;
+                    damping.misled();
+                } else {
+                    length = best;
+                    damping.succeeded(gained / predicted);
+                }
+                shortened = many && damping.part > 0.0;
                 if gained < SETTLED * left && predicted < SETTLED * left {
                     converged = true;
                     break;
                 }
             }
-            _ if damping > 1e8 || many && predicted < NO_GAIN * left => {
+            _ if damping.part > Damping::MOST || many && shortened && predicted < NO_GAIN * left => {
                 // No step goes down any more: rounding, a bound of a nuisance parameter, or a kink.
                 converged = predicted < STALLED * (1.0 + linear.chi2);
                 break;
@@ -175,8 +266,8 @@ pub(crate) fn solve_within(
             // A step that leads too far is shortened, one that leads astray is damped.
             _ if !shortened && best > SHORTEST => (length, failed, shortened) = (best, true, true),
             _ => {
-                damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 };
-                (length, failed, shortened) = (1.0, true, false);
+                damping.failed();
+                (length, failed, shortened) = (1.0, true, many);
             }
         }
     }

@@ -2,6 +2,7 @@
 
 pub(crate) mod alternate;
 pub(crate) mod bordered;
+pub(crate) mod chord;
 pub(crate) mod columns;
 pub(crate) mod gauss_newton;
 mod least_squares;

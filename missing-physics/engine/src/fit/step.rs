@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::fit::bordered::BorderedNormal;
 use crate::linalg::{SemiCholesky, dot, rank};
+use crate::model::PredictError;
 use crate::problem::{Problem, Selection};
 
 /// The normal equations at a point.
@@ -15,6 +16,16 @@ pub(crate) struct NormalEquations {
 }
 
 impl NormalEquations {
+    /// Of a problem, from each run's.
+    pub(crate) fn with(
+        problem: &Problem<'_>,
+        of_run: impl Fn(usize) -> Result<DMatrix<f64>, PredictError> + Sync + Send,
+    ) -> Result<Self, PredictError> {
+        let normals = problem.by_run(of_run)?;
+        let chi2 = normals.iter().map(|normal| normal[(normal.nrows() - 1, normal.nrows() - 1)]).sum();
+        Ok(Self { normals, chi2 })
+    }
+
     /// The nuisance parameters of all runs eliminated.
     pub(crate) fn bordered(&self, n_shared: usize) -> BorderedNormal {
         let mut bordered = BorderedNormal::new(n_shared);

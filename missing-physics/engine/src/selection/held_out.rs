@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use crate::fit::chord::Chords;
 use crate::fit::gauss_newton::solve;
-use crate::fit::prediction::residuals;
+use crate::fit::prediction::{residuals, residuals_at};
 use crate::model::PredictError;
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
@@ -60,18 +61,21 @@ impl LeavingOut<'_> {
         let whole = bounded_marginal(problem, &candidate.selection, &candidate.fit);
         let runs = problem.recording.runs.len();
         let folds = runs.min(FOLDS);
-        let part = |ids: Vec<usize>| -> (Problem<'_>, Vec<Vec<f64>>) {
+        let part = |ids: &[usize]| -> (Problem<'_>, Vec<Vec<f64>>) {
             let nuisance = ids.iter().map(|&r| candidate.fit.nuisance[r].clone()).collect();
-            (problem.of_runs(&ids), nuisance)
+            (problem.of_runs(ids), nuisance)
         };
+        let (selection, fit) = (&candidate.selection, &candidate.fit);
+        let chords = Chords::new(problem, selection, noise, fit)?;
         let of_fold = |fold: usize| -> Result<_, PredictError> {
             let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);
-            let (seen, nuisance) = part(train);
-            let trained = solve(&seen, &candidate.selection, noise, &candidate.fit.shared, &nuisance)?;
-            let (unseen, nuisance) = part(test);
-            let tested = solve(&unseen, &self.known, noise, &trained.shared, &nuisance)?;
-            let score = whole - bounded_marginal(&seen, &candidate.selection, &trained);
-            Ok((score, residuals(&unseen, &tested)?))
+            let (seen, nuisance) = part(&train);
+            let trained = chords.fit((&seen, &train), selection, (fit.shared.clone(), nuisance))?;
+            let (unseen, nuisance) = part(&test);
+            let known = (trained.shared.clone(), nuisance);
+            let (shared, nuisance) = chords.solve((&unseen, &test), &self.known, known)?;
+            let score = whole - bounded_marginal(&seen, selection, &trained);
+            Ok((score, residuals_at(&unseen, &shared, &nuisance)?))
         };
         let of_folds: Vec<_> = (0..folds).into_par_iter().map(of_fold).collect::<Result<_, _>>()?;
         for (score, left) in of_folds {

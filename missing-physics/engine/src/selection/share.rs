@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
+use crate::fit::chord::Chords;
 use crate::fit::gauss_newton::solve_again;
 use crate::fit::optimum::Fit;
-use crate::fit::prediction::residuals;
+use crate::fit::prediction::residuals_at;
 use crate::model::PredictError;
 use crate::noise::rough::RoughNoise;
 use crate::problem::{Problem, Selection};
@@ -51,15 +52,16 @@ pub(crate) fn unseen_misfit(
     };
     let runs = problem.recording.runs.len();
     let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
-    let of_runs = |fold: usize, folds: usize| -> Result<f64, PredictError> {
+    let folds = if runs > 1 { runs.min(FOLDS) } else { FOLDS };
+    let of_runs = |chords: &Chords<'_>, fold: usize| -> Result<f64, PredictError> {
         let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);
         let nuisance =
             |ids: &[usize]| -> Vec<Vec<f64>> { ids.iter().map(|&r| fit.nuisance[r].clone()).collect() };
         let seen = problem.of_runs(&train);
-        let trained = solve_again(&seen, selection, white, &fit.shared, &nuisance(&train))?;
+        let (shared, _) = chords.solve((&seen, &train), selection, (fit.shared.clone(), nuisance(&train)))?;
         let unseen = problem.of_runs(&test);
-        let tested = solve_again(&unseen, &known, white, &trained.shared, &nuisance(&test))?;
-        Ok(miss(residuals(&unseen, &tested)?))
+        let (shared, nuisance) = chords.solve((&unseen, &test), &known, (shared, nuisance(&test)))?;
+        Ok(miss(residuals_at(&unseen, &shared, &nuisance)?))
     };
     let of_rows = |fold: usize| -> Result<f64, PredictError> {
         let rows = problem.recording.runs[0].len();
@@ -73,10 +75,13 @@ pub(crate) fn unseen_misfit(
             problem.with(recording)
         };
         let trained = solve_again(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
-        Ok(miss(residuals(&without(false), &trained)?))
+        Ok(miss(residuals_at(&without(false), &trained.shared, &trained.nuisance)?))
     };
-    let folds = if runs > 1 { runs.min(FOLDS) } else { FOLDS };
-    let of_fold = |fold: usize| if runs > 1 { of_runs(fold, folds) } else { of_rows(fold) };
-    let misfits: Vec<f64> = (0..folds).into_par_iter().map(of_fold).collect::<Result<_, _>>()?;
+    let misfits: Vec<f64> = if runs > 1 {
+        let chords = Chords::new(problem, selection, white, fit)?;
+        (0..folds).into_par_iter().map(|fold| of_runs(&chords, fold)).collect::<Result<_, _>>()?
+    } else {
+        (0..folds).into_par_iter().map(of_rows).collect::<Result<_, _>>()?
+    };
     Ok(misfits.into_iter().sum::<f64>().max(0.0))
 }

@@ -18,6 +18,8 @@ const REACH: usize = 256;
 const FREEDOM: f64 = 0.05;
 /// A row that is off by no more than so many steps in which its readings come is no accident, however still all others are.
 const STEPS: f64 = 2.0;
+/// A shift that is larger by this factor than what rows usually lie beyond their neighbours' line would show in the data.
+const SHOWN: f64 = 5.0;
 /// A channel with fewer measured rows has no scale of its own to judge a row by.
 const FEWEST_ROWS: usize = 24;
 
@@ -111,6 +113,8 @@ impl<'a> Fitted<'a> {
         let block = &linearised.blocks[run][channel];
         let step = linearised.resolution(channel);
         let left = self.left(run, channel, column);
+        let bends = bends(column);
+        let usual = median(&mut bends.iter().map(|b| b.abs()).collect::<Vec<f64>>()).unwrap_or(0.0);
         let mut residual = left.clone();
         whitener.whiten(&mut residual);
         (0..residual.len())
@@ -123,7 +127,9 @@ impl<'a> Fitted<'a> {
                 let informed = self.informed(run, whole, along);
                 let shift = dot(&image, &residual[rows]) / informed;
                 let z = if informed > FREEDOM * whole { shift * informed.sqrt() / sigma } else { 0.0 };
-                (z, shift.abs() > STEPS * step && stands_alone(&left, i, shift))
+                // Far from the data, the fitted mechanisms' tangents may leave what the data do not show.
+                let shown = shift.abs() < SHOWN * usual || bends[i] * shift > 0.5 * shift * shift;
+                (z, shown && shift.abs() > STEPS * step && stands_alone(&left, i, shift))
             })
             .collect()
     }
@@ -135,6 +141,18 @@ impl<'a> Fitted<'a> {
         self.factor.forward(&mut shared);
         whole - dot(&along, &along) - dot(&shared, &shared)
     }
+}
+
+/// By how much each value lies beyond the line through its neighbours, or at an end through the next two.
+fn bends(column: &[f64]) -> Vec<f64> {
+    let n = column.len();
+    let beyond = |i: usize| match (i, n) {
+        (_, ..3) => 0.0,
+        (0, _) => column[0] - 2.0 * column[1] + column[2],
+        (i, n) if i + 1 == n => column[i] - 2.0 * column[i - 1] + column[i - 2],
+        (i, _) => column[i] - 0.5 * (column[i - 1] + column[i + 1]),
+    };
+    (0..n).map(beyond).collect()
 }
 
 /// Whether a row that is shifted by so much stands alone. Where the level changes, the first row after it agrees with the next.
