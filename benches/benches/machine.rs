@@ -19,6 +19,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
+/// Time between rows, s, and steps of the simulation in it: one a row would be an error of its own, which a diagnosis finds.
+const ROW_S: f64 = 1e-3;
+const SUBSTEPS: usize = 50;
+
 /// Writes a recording of joints side by side, each a drive with dry friction under a command of its own at 1 kHz, and where something is to
 /// be left over with a spring that no mechanism is.
 fn write(folder: &Path, joints: usize, runs: usize, rows: usize, left: bool) {
@@ -45,22 +49,24 @@ fn write(folder: &Path, joints: usize, runs: usize, rows: usize, left: bool) {
     let (mut rng, noise) = (ChaCha8Rng::seed_from_u64(1), Normal::new(0.0, 1e-3).unwrap());
     let columns = (0..joints).map(|j| format!(",encoder{j}_rad,u{j}_v")).collect::<String>();
     let mut data = format!("run,t_s{columns}\n");
-    let dt = 1e-3;
+    let dt = ROW_S / SUBSTEPS as f64;
     for run in 0..runs {
         let mut motion = vec![[0.0_f64; 2]; joints];
         for row in 0..rows {
-            let t = dt * row as f64;
+            let t = ROW_S * row as f64;
             let _ = write!(data, "{run},{t:.3}");
             for (j, [x, v]) in motion.iter_mut().enumerate() {
                 let u = 2.0 * ((3.0 + j as f64 + 0.3 * run as f64) * t).sin();
                 let _ = write!(data, ",{:.6},{u:.4}", *x + noise.sample(&mut rng));
-                let left = if left { 0.6 * ((4.0 * *x).tanh() + 0.5 * (5.0 * *x).sin()) } else { 0.0 };
-                let force = 12.0 * u - 1.5 * *v - 6.0 * *x - left;
-                let held = *v == 0.0 && force.abs() <= 1.0;
-                let way = if *v == 0.0 { force } else { *v };
-                let next = if held { 0.0 } else { *v + dt * (force - way.signum()) };
-                *v = if next * *v < 0.0 { 0.0 } else { next };
-                *x += dt * *v;
+                for _ in 0..SUBSTEPS {
+                    let left = if left { 0.6 * ((4.0 * *x).tanh() + 0.5 * (5.0 * *x).sin()) } else { 0.0 };
+                    let force = 12.0 * u - 1.5 * *v - 6.0 * *x - left;
+                    let held = *v == 0.0 && force.abs() <= 1.0;
+                    let way = if *v == 0.0 { force } else { *v };
+                    let next = if held { 0.0 } else { *v + dt * (force - way.signum()) };
+                    *v = if next * *v < 0.0 { 0.0 } else { next };
+                    *x += dt * *v;
+                }
             }
             data.push('\n');
         }
