@@ -28,6 +28,9 @@ const RESOLVED_ROWS: usize = 4000;
 const WINDOWED_ROWS: usize = 3000;
 /// Rows of the shortest windows in which the equations are fitted first.
 const FIRST_WINDOW: usize = 40;
+/// What happens in windows that are too long: to the motion, or to a fit of it.
+const GROWS: &str = "a small deviation of the start grows until the motion tells nothing of the physics";
+const STRAYS: &str = "the fit of the equations settles on another motion";
 
 /// Median time between two rows, s.
 pub(super) fn median_step(recording: &Recording) -> f64 {
@@ -189,13 +192,7 @@ pub(super) fn windows(
         if length > FIRST_WINDOW {
             let sizes = sizes(&free, &cut(recording, followed), &shared)?;
             if too_long(&free, recording, &shared, &sizes.states, length.min(longest)) {
-                return Ok((
-                    shared,
-                    shorter(
-                        followed,
-                        "a small deviation of the start grows until the motion tells nothing of the physics",
-                    ),
-                ));
+                return Ok((shared, shorter(followed, GROWS)));
             }
         }
         let mut windowed = if whole { recording.clone() } else { cut(recording, length) };
@@ -210,7 +207,7 @@ pub(super) fn windows(
         if let Ok(fit) = least_squares(model, &windowed, &shared) {
             let missed = missed(model, recording, &windowed, &fit);
             if lost(missed, missed_before) {
-                return Ok((shared, shorter(followed, "the fit of the equations settles on another motion")));
+                return Ok((shared, shorter(followed, STRAYS)));
             }
             (shared, missed_before) = (fit.shared, missed);
         }

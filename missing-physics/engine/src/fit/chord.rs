@@ -53,13 +53,10 @@ impl<'a> Chords<'a> {
         selection: &Selection,
         from: Point,
     ) -> Result<Point, PredictError> {
-        let from = match &self.columns {
-            Some(columns) => match self.along(columns, (part, runs), selection, from)? {
-                (settled, true) => return Ok(settled),
-                (from, false) => from,
-            },
-            None => from,
-        };
+        let (from, settled) = self.along((part, runs), selection, from)?;
+        if settled {
+            return Ok(from);
+        }
         let fit = solve_again(part, selection, self.noise, &from.0, &from.1)?;
         Ok((fit.shared, fit.nuisance))
     }
@@ -71,21 +68,18 @@ impl<'a> Chords<'a> {
         selection: &Selection,
         from: Point,
     ) -> Result<Fit, PredictError> {
-        let from = match &self.columns {
-            Some(columns) => self.along(columns, (part, runs), selection, from)?.0,
-            None => from,
-        };
+        let (from, _) = self.along((part, runs), selection, from)?;
         solve_again(part, selection, self.noise, &from.0, &from.1)
     }
 
-    /// Where steps along the derivatives lead, and whether they settle there.
+    /// Where steps along the derivatives lead, and whether they settle there; nowhere without derivatives.
     fn along(
         &self,
-        columns: &[Vec<Vec<f64>>],
         (part, runs): (&Problem<'_>, &[usize]),
         selection: &Selection,
         (mut shared, mut nuisance): Point,
     ) -> Result<(Point, bool), PredictError> {
+        let Some(columns) = &self.columns else { return Ok(((shared, nuisance), false)) };
         let free = self.n_nuisance + selection.shared.len();
         let mine: Vec<&[Vec<f64>]> = runs.iter().map(|&run| &columns[run][..free]).collect();
         let normals = |shared: &[f64], nuisance: &[Vec<f64>]| {

@@ -77,11 +77,8 @@ pub(crate) fn unseen_misfit(
         let trained = solve_again(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
         Ok(miss(residuals_at(&without(false), &trained.shared, &trained.nuisance)?))
     };
-    let misfits: Vec<f64> = if runs > 1 {
-        let chords = Chords::new(problem, selection, white, fit)?;
-        (0..folds).into_par_iter().map(|fold| of_runs(&chords, fold)).collect::<Result<_, _>>()?
-    } else {
-        (0..folds).into_par_iter().map(of_rows).collect::<Result<_, _>>()?
-    };
+    let chords = (runs > 1).then(|| Chords::new(problem, selection, white, fit)).transpose()?;
+    let of_fold = |fold: usize| chords.as_ref().map_or_else(|| of_rows(fold), |chords| of_runs(chords, fold));
+    let misfits: Vec<f64> = (0..folds).into_par_iter().map(of_fold).collect::<Result<_, _>>()?;
     Ok(misfits.into_iter().sum::<f64>().max(0.0))
 }
