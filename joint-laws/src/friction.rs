@@ -39,10 +39,16 @@ impl<T: Number> DryFriction<T> {
     ///
     /// May be below 0 where the asymmetry exceeds the rest.
     pub fn resistance(&self, forward: bool, velocity: T, load: T) -> T {
-        let half = self.forward_less_backward * 0.5;
-        let steady = if forward { self.level + half } else { self.level - half };
-        let mut all = steady + self.load_fraction * load.modulus();
-        if self.stribeck_level != T::from(0.0) {
+        // Most joints have few of these, and each costs its derivatives.
+        let zero = T::from(0.0);
+        let mut all = self.level;
+        if self.forward_less_backward != zero {
+            all += self.forward_less_backward * if forward { 0.5 } else { -0.5 };
+        }
+        if self.load_fraction != zero {
+            all += self.load_fraction * load.modulus();
+        }
+        if self.stribeck_level != zero {
             let ratio = velocity / self.stribeck_speed;
             all += self.stribeck_level * (-ratio * ratio).exp();
         }

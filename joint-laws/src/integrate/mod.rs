@@ -58,8 +58,8 @@ pub trait Machine<T: Number> {
     /// The states' derivatives without dry friction.
     fn smooth(&mut self, t: f64, x: &[T], rates: &mut [T]);
 
-    /// By how much a unit of a contact's force changes each state's derivative; 1 for its own velocity.
-    fn direction(&mut self, contact: usize, t: f64, x: &[T], direction: &mut [T]);
+    /// Adds what a contact's force does to the states' derivatives: as much as it is to that of its own velocity.
+    fn push(&mut self, contact: usize, force: T, t: f64, x: &[T], rates: &mut [T]);
 
     /// The friction that opposes sliding forward or backward.
     fn resistance(&mut self, contact: usize, forward: bool, t: f64, x: &[T]) -> T;
@@ -143,7 +143,6 @@ pub struct Integrator<T> {
     /// Whether the first of them are those at the present point.
     fresh: bool,
     stage: Vec<T>,
-    direction: Vec<T>,
     trial: Vec<T>,
     point: Vec<T>,
     spare: Vec<T>,
@@ -165,7 +164,6 @@ impl<T: Number> Integrator<T> {
             rates: scheme.nodes.iter().map(|_| room()).collect(),
             fresh: false,
             stage: room(),
-            direction: room(),
             trial: room(),
             point: room(),
             spare: room(),
@@ -282,23 +280,10 @@ impl<T: Number> Integrator<T> {
     }
 
     /// Adds the friction of a sliding contact.
-    fn slide(&mut self, machine: &mut impl Machine<T>, c: usize, t: f64, x: &[T], rates: &mut [T]) {
+    fn slide(&self, machine: &mut impl Machine<T>, c: usize, t: f64, x: &[T], rates: &mut [T]) {
         let forward = self.modes[c] == Mode::Forward;
         let friction = machine.resistance(c, forward, t, x);
-        self.push(machine, c, if forward { -friction } else { friction }, (t, x), rates);
-    }
-
-    /// Adds a force of a contact.
-    fn push(
-        &mut self,
-        machine: &mut impl Machine<T>,
-        c: usize,
-        force: T,
-        (t, x): (f64, &[T]),
-        rates: &mut [T],
-    ) {
-        machine.direction(c, t, x, &mut self.direction);
-        rates.iter_mut().zip(&self.direction).for_each(|(rate, d)| *rate += *d * force);
+        machine.push(c, if forward { -friction } else { friction }, t, x, rates);
     }
 
     /// The states' derivatives, friction and ceilings included.
@@ -315,7 +300,7 @@ impl<T: Number> Integrator<T> {
             for c in 0..self.modes.len() {
                 if self.modes[c] == Mode::Rest {
                     let force = -rates[machine.contacts()[c].velocity];
-                    self.push(machine, c, force, (t, x), rates);
+                    machine.push(c, force, t, x, rates);
                 }
             }
         }

@@ -32,8 +32,8 @@ impl<T: Number> Machine<T> for Rubbing<T> {
         rates[0] = x[1];
         rates[1] = self.push - self.omega * self.omega * x[0];
     }
-    fn direction(&mut self, _: usize, _: f64, _: &[T], direction: &mut [T]) {
-        direction.copy_from_slice(&[T::from(0.0), T::from(1.0)]);
+    fn push(&mut self, _: usize, force: T, _: f64, _: &[T], rates: &mut [T]) {
+        rates[1] += force;
     }
     fn resistance(&mut self, _: usize, forward: bool, _: f64, x: &[T]) -> T {
         self.law.resistance(forward, x[1], T::from(0.0))
@@ -130,7 +130,7 @@ impl Machine<f64> for Tank {
     fn smooth(&mut self, t: f64, x: &[f64], rates: &mut [f64]) {
         rates[0] = self.inflow * (1.0 - t) - 0.1 * x[0];
     }
-    fn direction(&mut self, _: usize, _: f64, _: &[f64], _: &mut [f64]) {}
+    fn push(&mut self, _: usize, _: f64, _: f64, _: &[f64], _: &mut [f64]) {}
     fn resistance(&mut self, _: usize, _: bool, _: f64, _: &[f64]) -> f64 {
         0.0
     }
@@ -229,7 +229,7 @@ impl<T: Number> Machine<T> for Stopped<T> {
         rates[0] = x[1];
         rates[1] = if self.beyond { -self.stiffness * (x[0] - self.edge[0].at) } else { T::from(0.0) };
     }
-    fn direction(&mut self, _: usize, _: f64, _: &[T], _: &mut [T]) {}
+    fn push(&mut self, _: usize, _: T, _: f64, _: &[T], _: &mut [T]) {}
     fn resistance(&mut self, _: usize, _: bool, _: f64, _: &[T]) -> T {
         T::from(0.0)
     }

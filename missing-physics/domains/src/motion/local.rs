@@ -134,7 +134,8 @@ impl MotionModel {
             let mut direction = vec![0.0; x.len()];
             for (k, push) in here.pushes.iter_mut().enumerate() {
                 if k < joints {
-                    machine.pushed(k, t, x, &mut direction);
+                    direction.fill(0.0);
+                    machine.act(k, 1.0, t, x, &mut direction);
                     push.copy_from_slice(&direction[..states]);
                 } else {
                     push[levels[k - joints]] = 1.0;

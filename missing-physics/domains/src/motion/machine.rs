@@ -70,8 +70,9 @@ pub(super) struct Driven<'a, T> {
     /// Rates of leaks, by level.
     pub(super) leaks: Vec<Option<T>>,
     pub(super) signals: Vec<Signal<T>>,
-    /// How many pieces of each signal have begun.
+    /// How many pieces of each signal have begun, and of all signals so far.
     pub(super) begun: Vec<usize>,
+    pub(super) all_begun: usize,
     /// True seconds in a second of the clock, where the two differ.
     pub(super) pace: Option<T>,
     pub(super) contacts: Vec<Contact>,
@@ -89,19 +90,24 @@ pub(super) struct Driven<'a, T> {
     pub(super) other: Vec<T>,
     /// By joint: operations of the rates' tape that its drive enters.
     pub(super) driven: Vec<Vec<usize>>,
-    /// Time and pieces of inputs for which the rates' registers hold.
-    pub(super) looked: (f64, Vec<usize>),
+    /// Time and number of pieces of inputs for which the rates' registers hold.
+    pub(super) looked: (f64, usize),
 }
 
 impl<T: Number> Driven<'_, T> {
+    /// The next piece of an input begins.
+    pub(super) fn begin(&mut self, input: usize) {
+        self.begun[input] += 1;
+        self.all_begun += 1;
+    }
+
     /// Puts states, inputs and time where expressions find them, and computes the equations' derivatives, unless they are there.
     fn look(&mut self, t: f64, x: &[T]) {
         let states = self.equations.states.len();
-        if self.looked.0 == t && self.looked.1 == self.begun && self.values[..states] == x[..states] {
+        if self.looked == (t, self.all_begun) && self.values[..states] == x[..states] {
             return;
         }
-        self.looked.0 = t;
-        self.looked.1.clone_from(&self.begun);
+        self.looked = (t, self.all_begun);
         self.values[..states].copy_from_slice(&x[..states]);
         for (k, signal) in self.signals.iter().enumerate() {
             self.values[states + k] = signal.value(self.begun[k], t);
@@ -173,16 +179,15 @@ impl<T: Number> Driven<'_, T> {
 }
 
 impl<T: Number> Driven<'_, T> {
-    /// By how much each state's derivative changes with a force on a joint, whose velocity's changes by one.
-    pub(super) fn pushed(&mut self, number: usize, t: f64, x: &[T], direction: &mut [T]) {
+    /// Adds what a force on a joint does to the states' derivatives: as much as it is to that of the joint's velocity.
+    pub(super) fn act(&mut self, number: usize, force: T, t: f64, x: &[T], rates: &mut [T]) {
         let joint = &self.equations.joints[number];
-        direction.fill(T::from(0.0));
+        rates[joint.velocity] += force;
         if !joint.reacts.is_empty() {
             self.look(t, x);
             self.shares(number);
-            joint.reacts.iter().for_each(|&state| direction[state] = self.other[state]);
+            joint.reacts.iter().for_each(|&state| rates[state] += self.other[state] * force);
         }
-        direction[joint.velocity] = T::from(1.0);
     }
 }
 
@@ -213,11 +218,7 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
             if !self.laws[k].forces.is_empty() {
                 let v = x[joint.velocity];
                 let force = self.laws[k].force(x[joint.position], v, x, &self.beyond);
-                rates[joint.velocity] += force;
-                if !joint.reacts.is_empty() {
-                    self.shares(k);
-                    joint.reacts.iter().for_each(|&state| rates[state] += self.other[state] * force);
-                }
+                self.act(k, force, t, x, rates);
                 for law in &self.laws[k].forces {
                     if let Force::Yielding(_, yields, state, [forward, stretched]) = *law {
                         let signs = (self.beyond[forward], self.beyond[stretched]);
@@ -239,20 +240,21 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         }
     }
 
-    fn direction(&mut self, contact: usize, t: f64, x: &[T], direction: &mut [T]) {
-        self.pushed(self.joint_of[contact], t, x, direction);
+    fn push(&mut self, contact: usize, force: T, t: f64, x: &[T], rates: &mut [T]) {
+        self.act(self.joint_of[contact], force, t, x, rates);
     }
 
     fn resistance(&mut self, contact: usize, forward: bool, t: f64, x: &[T]) -> T {
         let k = self.joint_of[contact];
-        let Some(dry) = self.laws[k].dry else { return T::from(0.0) };
-        let joint = &self.equations.joints[k];
-        let load = if dry.load_fraction == T::from(0.0) {
-            T::from(0.0)
-        } else {
+        let rests_on_load = |dry: &DryFriction<T>| dry.load_fraction != T::from(0.0);
+        let load = if self.laws[k].dry.as_ref().is_some_and(rests_on_load) {
             self.look(t, x);
             self.load(k)
+        } else {
+            T::from(0.0)
         };
+        let Some(dry) = &self.laws[k].dry else { return T::from(0.0) };
+        let joint = &self.equations.joints[k];
         let mut resistance = dry.resistance(forward, x[joint.velocity], load);
         if let Some(inertia) = self.laws[k].inertia {
             resistance = resistance / (inertia + 1.0);

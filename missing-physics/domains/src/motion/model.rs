@@ -350,7 +350,7 @@ impl MotionModel {
             if let Some(change) = change {
                 let late = change.t.infinitesimal();
                 integrator.nudge(&mut machine, t, &mut x, late);
-                machine.begun[change.input] += 1;
+                machine.begin(change.input);
                 integrator.settle(&mut machine, t, &mut x);
                 integrator.nudge(&mut machine, t, &mut x, -late);
             }
@@ -405,9 +405,10 @@ impl MotionModel {
             equations,
             laws: setting.laws,
             leaks: setting.leaks,
-            looked: (f64::NAN, Vec::new()),
+            looked: (f64::NAN, 0),
             driven: equations.joints.iter().map(|joint| of_drive(joint).unwrap_or_default()).collect(),
             begun: vec![0; signals.len()],
+            all_begun: 0,
             signals,
             pace: setting.pace,
             contacts,
