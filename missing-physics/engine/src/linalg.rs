@@ -37,6 +37,27 @@ fn dot_four(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
     dots
 }
 
+/// [`dot`] of a column with each of some others.
+pub(crate) fn dots(a: &[f64], others: &[&[f64]]) -> Vec<f64> {
+    dots_of_each(&[a], others).pop().unwrap_or_default()
+}
+
+/// The same of each of several columns, one list for each: the others are taken from memory once for all of them.
+pub(crate) fn dots_of_each(columns: &[&[f64]], others: &[&[f64]]) -> Vec<Vec<f64>> {
+    let mut dots: Vec<Vec<f64>> = columns.iter().map(|_| Vec::with_capacity(others.len())).collect();
+    let fours = others.chunks_exact(4);
+    let rest = fours.remainder();
+    for four in fours {
+        for (dots, a) in dots.iter_mut().zip(columns) {
+            dots.extend(dot_four(a, [four[0], four[1], four[2], four[3]]));
+        }
+    }
+    for (dots, a) in dots.iter_mut().zip(columns) {
+        dots.extend(rest.iter().map(|b| dot(a, b)));
+    }
+    dots
+}
+
 /// Dot products of columns with each other; those that are zero all through cost nothing.
 pub(crate) fn gram<C: AsRef<[f64]>>(columns: &[C]) -> DMatrix<f64> {
     let columns: Vec<&[f64]> = columns.iter().map(AsRef::as_ref).collect();
@@ -45,14 +66,8 @@ pub(crate) fn gram<C: AsRef<[f64]>>(columns: &[C]) -> DMatrix<f64> {
     let full: Vec<usize> = (0..n).filter(|&i| columns[i].iter().any(|v| *v != 0.0)).collect();
     for (k, &i) in full.iter().enumerate() {
         let before = &full[..=k];
-        for four in before.chunks_exact(4) {
-            let dots = dot_four(columns[i], [0, 1, 2, 3].map(|j| columns[four[j]]));
-            for (&j, dot) in four.iter().zip(dots) {
-                (gram[(i, j)], gram[(j, i)]) = (dot, dot);
-            }
-        }
-        for &j in before.chunks_exact(4).remainder() {
-            let dot = dot(columns[i], columns[j]);
+        let others: Vec<&[f64]> = before.iter().map(|&j| columns[j]).collect();
+        for (&j, dot) in before.iter().zip(dots(columns[i], &others)) {
             (gram[(i, j)], gram[(j, i)]) = (dot, dot);
         }
     }
@@ -240,5 +255,18 @@ mod tests {
         assert_eq!((factor.kept.as_slice(), factor.rank()), ([true, false, true].as_slice(), 2));
         factor.solve(&mut b);
         approx::assert_relative_eq!(b.as_slice(), [1.0, 0.0, 1.0].as_slice(), epsilon = 1e-12);
+    }
+
+    /// Whatever is taken from memory together, each product is the same to the last digit.
+    #[test]
+    fn dot_products_of_many_are_those_of_each() {
+        let column = |k: usize| -> Vec<f64> { (0..23).map(|i| ((k * 7 + i) as f64).sin()).collect() };
+        let all: Vec<Vec<f64>> = (0..10).map(column).collect();
+        let all: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+        let of_each = dots_of_each(&all[..3], &all[3..]);
+        for (a, dots) in all.iter().zip(&of_each) {
+            assert_eq!(*dots, all[3..].iter().map(|b| dot(a, b)).collect::<Vec<f64>>());
+        }
+        assert!(of_each.len() == 3 && dots(all[0], &[]).is_empty());
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::adequacy::linearised::Linearised;
+use crate::adequacy::linearised::{Linearised, Reading};
 use crate::adequacy::null::draw;
 use crate::adequacy::omnibus::{Law, Omnibus};
 use crate::adequacy::tail::Null;
@@ -23,6 +23,8 @@ pub(crate) struct Adequacy {
 
 /// Worlds in which is seen which shapes of noise are chosen at all.
 const PILOTS: u64 = 12;
+/// Worlds that are read together: as many as stay near the processor beside the columns that they are multiplied with.
+const READ_TOGETHER: usize = 8;
 /// A test that looks for nothing in particular must be this much surer than one that looks for a listed mechanism ...
 const UNDIRECTED_WEIGHT: f64 = 3.0;
 /// ... and one that looks for it in one run, one stretch or at one frequency only, so much.
@@ -50,16 +52,22 @@ pub(crate) fn test(
     linearised.play(&sorted(chosen.into_iter().chain(truth.iter().map(|&(shape, _)| shape)).chain([0])));
 
     let omnibus = Omnibus::new(problem, rule);
-    let statistics = |data: &[Vec<Vec<f64>>]| -> Vec<f64> {
-        let reading = linearised.read(data);
+    let statistics = |(reading, data): (Reading, &[Vec<Vec<f64>>])| -> Vec<f64> {
         let left = linearised.residual(data, &reading);
         let undirected = omnibus.statistics(&linearised, &reading, &left);
         reading.gains.into_iter().chain(undirected).collect()
     };
-    let seen = statistics(&observed);
-    let null: Vec<Vec<f64>> = (0..replicates as u64)
+    let seen = statistics((linearised.read(&observed), &observed));
+    let null: Vec<Vec<f64>> = (0..replicates)
         .into_par_iter()
-        .map(|k| statistics(&draw(problem, &truth, rule, seed, k)))
+        .chunks(READ_TOGETHER)
+        .flat_map_iter(|some| {
+            let drawn = some.into_iter().map(|k| draw(problem, &truth, rule, seed, k as u64));
+            let worlds: Vec<Vec<Vec<Vec<f64>>>> = drawn.collect();
+            let worlds: Vec<&[Vec<Vec<f64>>]> = worlds.iter().map(Vec::as_slice).collect();
+            let read = linearised.read_each(&worlds).into_iter().zip(worlds);
+            read.map(statistics).collect::<Vec<_>>()
+        })
         .collect();
     let undirected = omnibus.tests();
     let first = seen.len() - undirected.len();

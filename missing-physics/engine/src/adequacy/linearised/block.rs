@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::gram::Gram;
 use crate::fit::bordered::Eliminated;
-use crate::linalg::rank;
+use crate::linalg::{dots_of_each, rank};
 use crate::noise::process::Whitener;
 
 /// One run and channel: whitened columns for each shape that is in play.
@@ -39,6 +39,21 @@ pub(super) struct Product {
     pub(super) left: f64,
     /// Sum of squares.
     pub(super) total: f64,
+}
+
+impl Whitened {
+    /// Products of whitened data vectors with each column, a list for each of them; those of columns that do not act are nothing.
+    pub(super) fn products(&self, data: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let acting: Vec<usize> = (0..self.columns.len()).filter(|&i| self.gram.place(i).is_some()).collect();
+        let columns: Vec<&[f64]> = acting.iter().map(|&i| self.columns[i].as_slice()).collect();
+        let data: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+        let with_all = |dots: Vec<f64>| {
+            let mut products = vec![0.0; self.columns.len()];
+            acting.iter().zip(dots).for_each(|(&i, dot)| products[i] = dot);
+            products
+        };
+        dots_of_each(&data, &columns).into_iter().map(with_all).collect()
+    }
 }
 
 impl Block {

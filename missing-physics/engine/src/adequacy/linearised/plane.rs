@@ -40,6 +40,7 @@ pub(crate) struct Linearised<'a> {
 }
 
 /// Products of a data vector with every block's columns, `[run][channel][shape]`, and with those of all runs, `[channel][shape]`.
+#[derive(Default)]
 pub(super) struct Products {
     pub(super) values: Vec<Vec<Vec<Product>>>,
     pub(super) pooled: Vec<Vec<PooledProduct>>,

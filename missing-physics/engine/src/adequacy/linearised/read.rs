@@ -5,18 +5,26 @@ use super::plane::{Alternative, Linearised, Products, Reading};
 impl Linearised<'_> {
     /// Fits the model and every alternative to a data vector (`[run][channel]`, measured rows).
     pub(crate) fn read(&self, data: &[Vec<Vec<f64>>]) -> Reading {
-        let products = self.products(data);
+        self.read_products(&self.products(data))
+    }
+
+    /// The same of several data vectors.
+    pub(crate) fn read_each(&self, data: &[&[Vec<Vec<f64>>]]) -> Vec<Reading> {
+        self.products_of_each(data).iter().map(|products| self.read_products(products)).collect()
+    }
+
+    fn read_products(&self, products: &Products) -> Reading {
         let (nuisance, shared) = self.columns_with(0);
-        let start = self.white_start(&products);
-        let (score, noise, coefficients) = self.alternate(&products, &nuisance, &shared, &start, 8);
+        let start = self.white_start(products);
+        let (score, noise, coefficients) = self.alternate(products, &nuisance, &shared, &start, 8);
         let gain = |(alternative, measurable): (_, &bool)| {
             // Beside an alternative that leaves nothing of the data there is no noise to measure it by.
-            if *measurable { self.gain(&products, (&nuisance, &shared), &noise, alternative) } else { 0.0 }
+            if *measurable { self.gain(products, (&nuisance, &shared), &noise, alternative) } else { 0.0 }
         };
         let gains = self.alternatives.iter().zip(&self.measurable).map(gain).collect();
-        let of_channel = |channel| self.noises(&products, channel, (&nuisance, &shared), &coefficients);
+        let of_channel = |channel| self.noises(products, channel, (&nuisance, &shared), &coefficients);
         let noises = (0..self.problem.channels()).map(of_channel).collect();
-        let coefficients = self.solve_by_run(&products, &coefficients.noise, &nuisance, &shared);
+        let coefficients = self.solve_by_run(products, &coefficients.noise, &nuisance, &shared);
         Reading { score, gains, noise, noises, coefficients }
     }
 

@@ -37,33 +37,44 @@ pub(super) fn normal(row: &[Block], noise: &[(usize, f64)], ids: &[usize]) -> DM
 }
 
 impl Linearised<'_> {
-    /// Products of a data vector with all columns.
+    /// Products of a data vector (`[run][channel]`) with all columns.
     pub(super) fn products(&self, data: &[Vec<Vec<f64>>]) -> Products {
-        let of_block = |run: usize, channel: usize| -> Vec<Product> {
-            let shapes = self.blocks[run][channel].shapes.iter().zip(&self.in_play);
-            shapes
-                .map(|(whitened, &shape)| {
-                    let mut y = data[run][channel].clone();
-                    self.problem.whitener(run, channel, shape).whiten(&mut y);
-                    let with = |(i, column): (usize, &Vec<f64>)| {
-                        whitened.gram.place(i).map_or(0.0, |_| dot(column, &y))
+        self.products_of_each(&[data]).pop().unwrap_or_default()
+    }
+
+    /// The same of several data vectors: the columns, which are many, are taken from memory once for all of them.
+    pub(super) fn products_of_each(&self, data: &[&[Vec<Vec<f64>>]]) -> Vec<Products> {
+        let mut values: Vec<Vec<Vec<Vec<Product>>>> = data.iter().map(|_| Vec::new()).collect();
+        for (run, row) in self.blocks.iter().enumerate() {
+            values.iter_mut().for_each(|values| values.push(row.iter().map(|_| Vec::new()).collect()));
+            for (channel, block) in row.iter().enumerate() {
+                for (whitened, &shape) in block.shapes.iter().zip(&self.in_play) {
+                    let whitener = self.problem.whitener(run, channel, shape);
+                    let white = |data: &&[Vec<Vec<f64>>]| {
+                        let mut y = data[run][channel].clone();
+                        whitener.whiten(&mut y);
+                        y
                     };
-                    let with: Vec<f64> = whitened.columns.iter().enumerate().map(with).collect();
-                    let mine = &self.blocks[run][channel].mine;
-                    let mut nuisance: Vec<f64> = mine.iter().map(|&i| with[i]).collect();
-                    whitened.eliminated.forward(&mut nuisance);
-                    let total = dot(&y, &y);
-                    Product { with, left: total - dot(&nuisance, &nuisance), nuisance, total }
-                })
-                .collect()
+                    let white: Vec<Vec<f64>> = data.iter().map(white).collect();
+                    let with = whitened.products(&white);
+                    for ((values, y), with) in values.iter_mut().zip(&white).zip(with) {
+                        let mut nuisance: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
+                        whitened.eliminated.forward(&mut nuisance);
+                        let total = dot(y, y);
+                        let left = total - dot(&nuisance, &nuisance);
+                        values[run][channel].push(Product { with, left, nuisance, total });
+                    }
+                }
+            }
+        }
+        let pooled = |values: Vec<Vec<Vec<Product>>>| {
+            let of_channel = |(channel, shapes): (usize, &Vec<Pooled>)| -> Vec<PooledProduct> {
+                let shapes = shapes.iter().enumerate();
+                shapes.map(|(shape, pooled)| pooled.products(&self.blocks, &values, channel, shape)).collect()
+            };
+            Products { pooled: self.pooled.iter().enumerate().map(of_channel).collect(), values }
         };
-        let of_run = |run: usize| (0..data[run].len()).map(|channel| of_block(run, channel)).collect();
-        let values: Vec<Vec<Vec<Product>>> = (0..data.len()).map(of_run).collect();
-        let of_channel = |(channel, shapes): (usize, &Vec<Pooled>)| -> Vec<PooledProduct> {
-            let shapes = shapes.iter().enumerate();
-            shapes.map(|(shape, pooled)| pooled.products(&self.blocks, &values, channel, shape)).collect()
-        };
-        Products { pooled: self.pooled.iter().enumerate().map(of_channel).collect(), values }
+        values.into_iter().map(pooled).collect()
     }
 
     /// Whether each of these nuisance columns acts on one channel of each run at most, which eliminates it.
