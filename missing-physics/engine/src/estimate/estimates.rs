@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::diagnosis::Estimate;
 use crate::estimate::over_runs::over_runs;
-use crate::estimate::profile::Profile;
+use crate::estimate::profile::{Profile, at_fit};
 use crate::estimate::propagate::{errors, quadratic, slopes};
 use crate::estimate::reach::reach;
 use crate::fit::optimum::covariance;
@@ -58,6 +58,7 @@ pub(crate) fn estimates(
     let selection = &candidate.selection;
     let reach = reach(problem, selection, rule);
     let covariance = covariance(&candidate.fit.information);
+    let linear = if profile { at_fit(problem, candidate) } else { None };
     let place = |slot: usize| selection.shared.iter().position(|&s| s == slot);
     let mut estimates: Vec<Estimate> = parameters
         .iter()
@@ -79,7 +80,7 @@ pub(crate) fn estimates(
                 let half = reach * covariance[(i, i)].max(0.0).sqrt();
                 ci95 = [value - half, value + half];
                 if profile {
-                    let profile = Profile::new(problem, candidate, i);
+                    let profile = Profile::new(problem, candidate, linear.as_ref(), i);
                     let between = profile
                         .between(problem.model.extensions().modes.map_or(&[], |modes| modes.jumps(slot)));
                     ci95 = between.unwrap_or_else(|| profile.interval(half, reach));

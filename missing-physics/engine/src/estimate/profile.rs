@@ -1,8 +1,9 @@
 //! Intervals by profile likelihood.
 
 use crate::estimate::reach::{END, Z95};
-use crate::fit::gauss_newton::{solve, solve_below};
+use crate::fit::gauss_newton::{linearise, solve, solve_below, sum_of_squares};
 use crate::fit::optimum::{Fit, covariance};
+use crate::fit::step::{NormalEquations, Step};
 use crate::problem::{Problem, Selection};
 use crate::selection::candidate::Candidate;
 
@@ -10,6 +11,11 @@ use crate::selection::candidate::Candidate;
 const LOOK: [f64; 6] = [0.75, 1.5, 3.0, 6.0, 12.0, 24.0];
 /// A top is a better one where the sum of squares is lower by this.
 const BETTER: f64 = 0.05;
+/// The same of a model that knows many mechanisms: less moves neither a choice nor an interval, and dry friction leaves many such tops.
+const BETTER_OF_MANY: f64 = 0.5;
+
+/// A sum of squares rises as the linearised model foresees where it does so to this part.
+const AS_FORESEEN: f64 = 0.1;
 
 /// A stair of the likelihood is looked at until this many treads in a row have a sum of squares that is higher by so much.
 const UNLIKELY: f64 = 30.0;
@@ -23,27 +29,70 @@ pub(crate) struct Profile<'a> {
     all: &'a Selection,
     others: Selection,
     slot: usize,
+    /// Where it stands among those that are free, and what the model is at the fit to first order, if that is of use.
+    number: usize,
+    linear: Option<&'a NormalEquations>,
+}
+
+/// The model at a candidate's fit to first order, where it knows so many mechanisms that profiles go by what that foresees.
+pub(crate) fn at_fit(problem: &Problem<'_>, candidate: &Candidate) -> Option<NormalEquations> {
+    let Candidate { selection, fit, .. } = candidate;
+    let linear = || linearise(problem, selection, &fit.noise, &fit.shared, &fit.nuisance).ok();
+    problem.knows_many().then(linear).flatten()
 }
 
 impl<'a> Profile<'a> {
-    /// The profile of the `i`-th free shared parameter of a candidate.
-    pub(crate) fn new(problem: &'a Problem<'a>, candidate: &'a Candidate, i: usize) -> Self {
+    /// The profile of the `i`-th free shared parameter of a candidate, and the model [`at_fit`].
+    pub(crate) fn new(
+        problem: &'a Problem<'a>,
+        candidate: &'a Candidate,
+        linear: Option<&'a NormalEquations>,
+        i: usize,
+    ) -> Self {
         let mut others = candidate.selection.clone();
         let slot = others.shared.remove(i);
         others.added_shared.remove(i);
-        Self { problem, fit: &candidate.fit, all: &candidate.selection, others, slot }
+        Self { problem, fit: &candidate.fit, all: &candidate.selection, others, slot, number: i, linear }
     }
 
-    fn at(&self, value: f64) -> Option<Fit> {
-        self.at_below(value, f64::INFINITY)
-    }
-
-    /// The same, given up where the sum of squares will hardly get below `most`.
-    fn at_below(&self, value: f64, most: f64) -> Option<Fit> {
+    /// The shared parameters with this one at a value, the others at the fit.
+    fn moved(&self, value: f64) -> Vec<f64> {
         let mut shared = self.fit.shared.clone();
         shared[self.slot] = value;
-        let start = (&shared[..], &self.fit.nuisance[..]);
-        solve_below(most, self.problem, &self.others, &self.fit.noise, start).ok()
+        shared
+    }
+
+    /// Where all others go when the parameter is moved to a value, and by how much the sum of squares rises, as the linearised model
+    /// foresees.
+    fn foresee(&self, value: f64) -> Option<(Step, f64)> {
+        let linear = self.linear?;
+        let column = self.all.nuisance.len() + self.number;
+        let moved = linear.moved(column, value - self.fit.shared[self.slot]);
+        let shared = self.moved(value);
+        let step = Step::new(self.problem, &self.others, &moved, (&shared, &self.fit.nuisance), 0.0);
+        let rise = moved.chi2 - step.predicted - linear.chi2;
+        Some((step, rise))
+    }
+
+    /// Whether the sum of squares rises as foreseen where that leads.
+    fn rises_so(&self, step: &Step, rise: f64) -> bool {
+        let (noise, at) = (&self.fit.noise, (&step.shared[..], &step.nuisance[..]));
+        let there = sum_of_squares(self.problem, &self.others, noise, at.0, at.1);
+        there.is_ok_and(|there| self.is_as_foreseen(there, rise))
+    }
+
+    /// Whether a sum of squares is as high as foreseen.
+    fn is_as_foreseen(&self, there: f64, rise: f64) -> bool {
+        self.linear.is_some_and(|linear| (there - linear.chi2 - rise).abs() <= AS_FORESEEN * rise)
+    }
+
+    /// The fit of the others at a value.
+    fn at(&self, value: f64) -> Option<Fit> {
+        let (shared, nuisance) = match self.foresee(value) {
+            Some((step, rise)) if self.rises_so(&step, rise) => (step.shared, step.nuisance),
+            _ => (self.moved(value), self.fit.nuisance.clone()),
+        };
+        solve(self.problem, &self.others, &self.fit.noise, &shared, &nuisance).ok()
     }
 
     /// By how much a standard error is wider than that of the fit's own noise.
@@ -60,9 +109,18 @@ impl<'a> Profile<'a> {
     }
 
     /// The top of the likelihood to which a fit climbs from a value, the parameter being free again; none where the sum of squares
-    /// at the value is `most` or more.
+    /// at the value is `most` or more, or as high as the linearised model foresees: from there the way leads back.
     fn top_from(&self, value: f64, most: f64) -> Option<Fit> {
-        let near = self.at_below(value, most).filter(|f| f.chi2 < most)?;
+        let foreseen = self.foresee(value);
+        if foreseen.as_ref().is_some_and(|(step, rise)| self.rises_so(step, *rise)) {
+            return None;
+        }
+        let start = (&self.moved(value)[..], &self.fit.nuisance[..]);
+        let near = solve_below(most, self.problem, &self.others, &self.fit.noise, start).ok();
+        let near = near.filter(|f| f.chi2 < most)?;
+        if foreseen.is_some_and(|(_, rise)| self.is_as_foreseen(near.chi2, rise)) {
+            return None;
+        }
         solve(self.problem, self.all, &near.noise, &near.shared, &near.nuisance).ok()
     }
 
@@ -152,8 +210,10 @@ impl<'a> Profile<'a> {
     /// The end of the interval about other tops beyond the first fall, if one is as likely as the interval's own end.
     fn end_beyond(&self, side: f64, half: f64, error: f64, most: f64) -> Option<f64> {
         let (bound, quadratic) = (self.bound(side), self.fit.shared[self.slot] + side * half);
+        // A top within reach of values that are as unlikely as that would be a needle.
+        let most_there = if self.linear.is_some() { self.fit.chi2 + UNLIKELY } else { f64::INFINITY };
         let end = |value: f64| {
-            let top = self.top_from(value, f64::INFINITY)?;
+            let top = self.top_from(value, most_there)?;
             let (at, risen) = (top.shared[self.slot], top.chi2 - self.fit.chi2);
             let reach = at + side * half * (1.0 - risen / most).min(1.0).sqrt();
             (risen < most).then_some(if (reach - bound) * side < 0.0 { reach } else { bound })
@@ -168,15 +228,17 @@ impl<'a> Profile<'a> {
 pub(crate) fn better_top(problem: &Problem<'_>, candidate: &Candidate) -> Option<Fit> {
     let selection = &candidate.selection;
     let covariance = covariance(&candidate.fit.information);
+    let linear = at_fit(problem, candidate);
+    let better = if linear.is_some() { BETTER_OF_MANY } else { BETTER };
     let mut best: Option<Fit> = None;
     for i in (0..selection.shared.len()).filter(|&i| selection.added_shared[i]) {
         let error = covariance[(i, i)].max(0.0).sqrt();
         if !(error > 0.0 && error.is_finite()) {
             continue;
         }
-        let profile = Profile::new(problem, candidate, i);
+        let profile = Profile::new(problem, candidate, linear.as_ref(), i);
         for value in [-1.0, 1.0].into_iter().flat_map(|side| profile.looks(side, error)) {
-            let least = best.as_ref().map_or(candidate.fit.chi2, |b| b.chi2) - BETTER;
+            let least = best.as_ref().map_or(candidate.fit.chi2, |b| b.chi2) - better;
             if let Some(top) = profile.top_from(value, least + Z95 * Z95).filter(|f| f.chi2 < least) {
                 best = Some(top);
             }

@@ -52,7 +52,7 @@ pub(crate) fn linearise(
 }
 
 /// The sum of squares alone, without derivatives.
-fn sum_of_squares(
+pub(crate) fn sum_of_squares(
     problem: &Problem<'_>,
     selection: &Selection,
     noise: &NoiseState,

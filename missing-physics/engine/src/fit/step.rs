@@ -26,6 +26,23 @@ impl NormalEquations {
         Ok(Self { normals, chi2 })
     }
 
+    /// Those of the other parameters where one of them (a column of each run's) is moved by so much, as the linearised model has it.
+    pub(crate) fn moved(&self, column: usize, by: f64) -> Self {
+        let of_run = |normal: &DMatrix<f64>| {
+            let last = normal.nrows() - 1;
+            let mut moved = normal.clone();
+            for i in (0..last).filter(|i| *i != column) {
+                let with_residual = normal[(last, i)] - by * normal[(column.max(i), column.min(i))];
+                (moved[(last, i)], moved[(i, last)]) = (with_residual, with_residual);
+            }
+            moved[(last, last)] += by * (by * normal[(column, column)] - 2.0 * normal[(last, column)]);
+            moved.remove_row(column).remove_column(column)
+        };
+        let normals: Vec<DMatrix<f64>> = self.normals.iter().map(of_run).collect();
+        let chi2 = normals.iter().map(|normal| normal[(normal.nrows() - 1, normal.nrows() - 1)]).sum();
+        Self { normals, chi2 }
+    }
+
     /// The nuisance parameters of all runs eliminated.
     pub(crate) fn bordered(&self, n_shared: usize) -> BorderedNormal {
         let mut bordered = BorderedNormal::new(n_shared);
@@ -130,5 +147,30 @@ impl Step {
             }
         }
         (Self { shared: next_shared, nuisance: next_nuisance, predicted, held }, pushing)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::gram;
+
+    /// A column that is moved by so much and held takes as much of itself from the residual.
+    #[test]
+    fn equations_of_a_moved_parameter_are_those_of_the_rest() {
+        let column = |k: usize| -> Vec<f64> { (0..9).map(|i| ((3 * k + i * i) as f64).sin()).collect() };
+        let columns: Vec<Vec<f64>> = (0..4).map(column).collect();
+        let whole = gram(&columns);
+        let chi2 = whole[(3, 3)];
+        let equations = NormalEquations { normals: vec![whole.clone(), whole], chi2: 2.0 * chi2 };
+        for (held, by) in [(0, 0.7), (1, -2.0), (2, 0.3)] {
+            let moved = equations.moved(held, by);
+            let mut others = columns.clone();
+            let gone = others.remove(held);
+            others[2].iter_mut().zip(&gone).for_each(|(residual, c)| *residual -= by * c);
+            let expected = gram(&others);
+            approx::assert_relative_eq!(moved.normals[1], expected, epsilon = 1e-12);
+            approx::assert_relative_eq!(moved.chi2, 2.0 * expected[(2, 2)], epsilon = 1e-12);
+        }
     }
 }

@@ -56,6 +56,38 @@ fn none_of_many_is_named_for_nothing() {
     assert!(answer(&waves(), &draw(|_| 1.0)).chosen.is_empty());
 }
 
+/// An interval by profile likelihood, which is longer on one side, is the same beside many mechanisms, where profiles go by what the linearised
+/// model foresees, as beside none.
+#[test]
+fn intervals_of_one_of_many_are_those_of_one_alone() {
+    let decay = |s: &[f64], _: &[f64], x: f64| s[0] + s[1] * (-s[2] * x).exp();
+    let among_waves = |s: &[f64], _: &[f64], x: f64| {
+        let waves: f64 = (1..=WAVES).map(|k| s[k + 2] * (k as f64 * x).sin()).sum();
+        s[0] + s[1] * (-s[2] * x).exp() + waves
+    };
+    let decays = |waves: usize, law| {
+        let mut parameters = vec![parameter("offset", 0.0, ANY), parameter("size", 0.0, ANY)];
+        parameters.push(parameter("rate", 1.0, [0.0, 50.0]));
+        parameters.extend((1..=waves).map(|k| parameter(&format!("amplitude_{k}"), 0.0, ANY)));
+        let mut mechanisms = vec![mechanism("decay", vec![1, 2])];
+        mechanisms.extend((1..=waves).map(|k| mechanism(&format!("wave-{k}"), vec![k + 2])));
+        Curve::new(parameters, mechanisms, law)
+    };
+    let recording = draw(|x| 1.0 + 0.4 * (-3.0 * x).exp());
+    let [alone, of_many] = [decays(0, decay), decays(WAVES, among_waves)].map(|model| {
+        let found = answer(&model, &recording);
+        assert_eq!(found.chosen, ["decay"]);
+        let rate = found.mechanisms.iter().find(|m| m.id == "decay").unwrap().parameters[1].clone();
+        assert_eq!(rate.name, "rate");
+        rate
+    });
+    let [below, above] = [of_many.value - of_many.ci95[0], of_many.ci95[1] - of_many.value];
+    assert!(above > 1.3 * below, "{of_many:?}");
+    for (a, b) in alone.ci95.iter().zip(&of_many.ci95) {
+        assert!((a - b).abs() < 0.05 * (above + below), "{alone:?}, {of_many:?}");
+    }
+}
+
 /// A sine that is cut at its top alone: the upper bound is reported, the lower one stays open and unsaid.
 #[test]
 fn a_bound_that_nothing_reaches_stays_open() {
