@@ -70,9 +70,8 @@ pub(super) struct Driven<'a, T> {
     /// Rates of leaks, by level.
     pub(super) leaks: Vec<Option<T>>,
     pub(super) signals: Vec<Signal<T>>,
-    /// How many pieces of each signal have begun, and of all signals so far.
+    /// How many pieces of each signal have begun.
     pub(super) begun: Vec<usize>,
-    pub(super) all_begun: usize,
     /// True seconds in a second of the clock, where the two differ.
     pub(super) pace: Option<T>,
     pub(super) contacts: Vec<Contact>,
@@ -95,19 +94,15 @@ pub(super) struct Driven<'a, T> {
 }
 
 impl<T: Number> Driven<'_, T> {
-    /// The next piece of an input begins.
-    pub(super) fn begin(&mut self, input: usize) {
-        self.begun[input] += 1;
-        self.all_begun += 1;
-    }
-
     /// Puts states, inputs and time where expressions find them, and computes the equations' derivatives, unless they are there.
     fn look(&mut self, t: f64, x: &[T]) {
         let states = self.equations.states.len();
-        if self.looked == (t, self.all_begun) && self.values[..states] == x[..states] {
+        // Pieces begin one after the other and none is taken back: their number tells which have.
+        let now = (t, self.begun.iter().sum());
+        if self.looked == now && self.values[..states] == x[..states] {
             return;
         }
-        self.looked = (t, self.all_begun);
+        self.looked = now;
         self.values[..states].copy_from_slice(&x[..states]);
         for (k, signal) in self.signals.iter().enumerate() {
             self.values[states + k] = signal.value(self.begun[k], t);

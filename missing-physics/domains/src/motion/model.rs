@@ -350,7 +350,7 @@ impl MotionModel {
             if let Some(change) = change {
                 let late = change.t.infinitesimal();
                 integrator.nudge(&mut machine, t, &mut x, late);
-                machine.begin(change.input);
+                machine.begun[change.input] += 1;
                 integrator.settle(&mut machine, t, &mut x);
                 integrator.nudge(&mut machine, t, &mut x, -late);
             }
@@ -408,7 +408,6 @@ impl MotionModel {
             looked: (f64::NAN, 0),
             driven: equations.joints.iter().map(|joint| of_drive(joint).unwrap_or_default()).collect(),
             begun: vec![0; signals.len()],
-            all_begun: 0,
             signals,
             pace: setting.pace,
             contacts,

@@ -97,9 +97,9 @@ impl<'a> Profile<'a> {
 
     /// By how much a standard error is wider than that of the fit's own noise.
     fn wider(&self, error: f64) -> f64 {
-        let at = self.all.shared.iter().position(|&slot| slot == self.slot);
-        let there = solve(self.problem, self.all, &self.fit.noise, &self.fit.shared, &self.fit.nuisance).ok();
-        let fitted = at.zip(there).map_or(f64::NAN, |(i, fit)| covariance(&fit.information)[(i, i)].sqrt());
+        let there = solve(self.problem, self.all, &self.fit.noise, &self.fit.shared, &self.fit.nuisance);
+        let variance = |fit: Fit| covariance(&fit.information)[(self.number, self.number)];
+        let fitted = there.map_or(f64::NAN, |fit| variance(fit).sqrt());
         if fitted > 0.0 && fitted.is_finite() { error / fitted } else { 1.0 }
     }
 

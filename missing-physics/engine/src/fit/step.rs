@@ -21,9 +21,12 @@ impl NormalEquations {
         problem: &Problem<'_>,
         of_run: impl Fn(usize) -> Result<DMatrix<f64>, PredictError> + Sync + Send,
     ) -> Result<Self, PredictError> {
-        let normals = problem.by_run(of_run)?;
+        Ok(Self::of_runs(problem.by_run(of_run)?))
+    }
+
+    fn of_runs(normals: Vec<DMatrix<f64>>) -> Self {
         let chi2 = normals.iter().map(|normal| normal[(normal.nrows() - 1, normal.nrows() - 1)]).sum();
-        Ok(Self { normals, chi2 })
+        Self { normals, chi2 }
     }
 
     /// Those of the other parameters where one of them (a column of each run's) is moved by so much, as the linearised model has it.
@@ -38,9 +41,7 @@ impl NormalEquations {
             moved[(last, last)] += by * (by * normal[(column, column)] - 2.0 * normal[(last, column)]);
             moved.remove_row(column).remove_column(column)
         };
-        let normals: Vec<DMatrix<f64>> = self.normals.iter().map(of_run).collect();
-        let chi2 = normals.iter().map(|normal| normal[(normal.nrows() - 1, normal.nrows() - 1)]).sum();
-        Self { normals, chi2 }
+        Self::of_runs(self.normals.iter().map(of_run).collect())
     }
 
     /// The nuisance parameters of all runs eliminated.
