@@ -20,6 +20,8 @@ const FINEST: f64 = 256.0;
 const OFTEN: f64 = 3.0;
 /// Errors of the integration that are put up with, in sigmas of all rows together.
 const UNSEEN: f64 = 0.3;
+/// The same of a scheme of a lower order, whose errors grow faster with what a mechanism adds.
+const UNSEEN_OF_CHEAPER: f64 = 0.1;
 /// The least noise of a channel that is reckoned with, in parts of its range.
 const LEAST_SIGMA: f64 = 3e-5;
 /// Rows by which the step is judged.
@@ -85,14 +87,16 @@ fn resolve_by(
         let mut out = vec![0.0; n * recording.channels.len()];
         model.predict(run, shared, &start, &mut out).map(|()| out).map_err(|e| e.reason)
     };
-    // Whether two predictions are the same to all tests.
-    let alike = |a: &[f64], b: &[f64]| {
+    // How far two predictions are apart in sigmas of all rows together, squared.
+    let apart = |a: &[f64], b: &[f64]| {
         let columns = a.chunks(n).zip(b.chunks(n)).zip(&sigmas);
         let seen: f64 = columns
             .map(|((a, b), sigma)| a.iter().zip(b).map(|(a, b)| ((a - b) / sigma).powi(2)).sum::<f64>())
             .sum();
-        seen * rows as f64 / n as f64 <= UNSEEN.powi(2)
+        seen * rows as f64 / n as f64
     };
+    // Whether they are the same to all tests.
+    let alike = |a: &[f64], b: &[f64]| apart(a, b) <= UNSEEN.powi(2);
     model.set_pace(first);
     let mut before = predict(model);
     let finest = median_step(recording) / FINEST;
@@ -107,10 +111,17 @@ fn resolve_by(
         {
             model.set_pace(Pace::fixed(first.method, coarser));
             let fixed = evaluations(model, run, shared, &start);
-            // Where few places ask for short steps, only those get them.
             if let Ok(course) = model.course(run, shared, &start) {
                 model.set_state_sizes(course.states.iter().map(|state| rms(state)).collect());
             }
+            // Where inputs end every step, a cheaper scheme may do as well.
+            if first.method == Method::Kutta && coarser == first.step_s {
+                model.set_pace(Pace::fixed(Method::Heun, coarser));
+                if predict(model).is_ok_and(|cheaper| apart(&cheaper, now) <= UNSEEN_OF_CHEAPER.powi(2)) {
+                    return Ok(());
+                }
+            }
+            // Where few places ask for short steps, only those get them.
             model.set_pace(Pace { finest_s: step_s, ..first });
             let cheaper = evaluations(model, run, shared, &start) < fixed;
             if !(cheaper && predict(model).is_ok_and(|cut| alike(&cut, now))) {

@@ -18,6 +18,8 @@ use crate::mechanics::JointEffect;
 
 /// Steps of the integration in the shortest time in which a law changes.
 const STEPS_IN_SHORTEST: f64 = 2.0;
+/// The same for Heun's method, whose order is lower.
+const STEPS_OF_HEUN: f64 = 10.0;
 /// The largest error of a state in a step that is cut for a law's sake, in parts of its typical size.
 const ERROR: f64 = 1e-6;
 /// The same of the deflection of a spring that yields, in parts of where it yields.
@@ -28,6 +30,9 @@ const FINEST_FOR_LAWS: f64 = 0.125;
 /// An end stop is stiffer by this factor than what it takes to bring the joint to its largest position with its typical acceleration: what
 /// yields more is a spring.
 const STIFFER: f64 = 3.0;
+
+/// Derivatives that a number carries at the most.
+const MOST_DERIVATIVES: usize = 12;
 
 /// Some dry friction, in parts of a joint's typical acceleration.
 const RUBS: f64 = 0.1;
@@ -291,6 +296,8 @@ impl MotionModel {
         let Pace { method, step_s, .. } = self.pace;
         let finest_s = self.step_s(setting);
         if finest_s >= step_s {
+            let smooth = setting.shortest_s >= STEPS_OF_HEUN * step_s;
+            let method = if method == Method::Heun && !smooth { Method::Kutta } else { method };
             return Integrator::new(method, states, step_s);
         }
         let mut errors: Vec<f64> = self.scales.states.iter().map(|size| ERROR * size).collect();
@@ -576,14 +583,17 @@ impl Model for MotionModel {
             return self.predict(run, shared, nuisance, out);
         }
         let at = (run, shared, nuisance);
-        // Numbers no longer than needed: most time goes into their derivatives.
-        for chunk in free.chunks(8) {
+        // Numbers no longer than needed: most time goes into their derivatives. Several times through a run, each with as many.
+        let times = free.len().div_ceil(MOST_DERIVATIVES);
+        for chunk in free.chunks(free.len().div_ceil(times)) {
             match chunk.len() {
                 1 => self.columns::<1>(at, chunk, out, jacobian),
                 2 | 3 => self.columns::<3>(at, chunk, out, jacobian),
                 4 | 5 => self.columns::<5>(at, chunk, out, jacobian),
                 6 => self.columns::<6>(at, chunk, out, jacobian),
-                _ => self.columns::<8>(at, chunk, out, jacobian),
+                7 | 8 => self.columns::<8>(at, chunk, out, jacobian),
+                9 | 10 => self.columns::<10>(at, chunk, out, jacobian),
+                _ => self.columns::<MOST_DERIVATIVES>(at, chunk, out, jacobian),
             }
             .map_err(|reason| PredictError { run: run.label.clone(), reason })?;
         }
