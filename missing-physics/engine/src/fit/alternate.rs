@@ -22,7 +22,28 @@ pub(crate) fn fit(
             NoiseState { shape: vec![0; problem.channels()], sigma }
         }
     };
-    let mut best = solve(problem, selection, &first, start.0, start.1)?;
+    let best = solve(problem, selection, &first, start.0, start.1)?;
+    in_turn(problem, selection, rule, best)
+}
+
+/// The same from a rough fit for a given noise.
+pub(crate) fn fit_from(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    rule: &NoiseRule,
+    rough: &Fit,
+) -> Result<Fit, PredictError> {
+    let noise = estimate_noise(problem, selection, rule, &rough.shared, &rough.nuisance)?;
+    let best = solve(problem, selection, &noise, &rough.shared, &rough.nuisance)?;
+    in_turn(problem, selection, rule, best)
+}
+
+fn in_turn(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    rule: &NoiseRule,
+    mut best: Fit,
+) -> Result<Fit, PredictError> {
     for _ in 0..6 {
         let noise = estimate_noise(problem, selection, rule, &best.shared, &best.nuisance)?;
         let still = noise.shape == best.noise.shape

@@ -17,6 +17,8 @@ const ITERATIONS_AGAIN: usize = 6;
 /// Gain in the sum of squares that a step promises, in units of what is left of a value, below which it is not taken by a model that knows
 /// many mechanisms: it would move no parameter by more than a tenth of its error.
 pub(crate) const NOT_WORTH: f64 = 1e-2;
+/// The same of a fit that only shows where a better one begins.
+const NOT_WORTH_ROUGHLY: f64 = 0.5;
 /// What a step may promise at most, in parts of the sum of squares, where a fit that does not go down any more is at its end.
 const STALLED: f64 = 1e-4;
 /// Gain in the sum of squares that a step promises, in the same units, below which one that does not go down shortened either is at a
@@ -38,6 +40,10 @@ const PATIENCE: usize = 3;
 const POOR: f64 = 0.1;
 /// ... and one that gains less than this next to nothing: for a model that knows many mechanisms, where dry friction leaves creases.
 const CREASE: f64 = 0.02;
+/// So many damped steps of such a model ...
+const CREEPING: usize = 5;
+/// ... that gain less than this together, in units of what is left of a value, end a fit: no likelihood is compared so finely.
+const CREEP: f64 = 0.5;
 
 pub(crate) fn linearise(
     problem: &Problem<'_>,
@@ -149,6 +155,32 @@ impl Damping {
     }
 }
 
+/// When a fit ends.
+#[derive(Clone, Copy)]
+struct End {
+    iterations: usize,
+    /// Where the sum of squares will hardly get below this, the fit is given up; by a model that knows many mechanisms.
+    hopeless_above: f64,
+    /// Gain of a step that is not taken by such a model, in units of what is left of a value.
+    not_worth: f64,
+}
+
+impl End {
+    /// In so many iterations at most.
+    fn after(iterations: usize) -> Self {
+        Self { iterations, hopeless_above: f64::INFINITY, not_worth: NOT_WORTH }
+    }
+
+    /// In as many as a fit to all data may take.
+    fn of(problem: &Problem<'_>) -> Self {
+        Self::after(if problem.knows_many() { ITERATIONS_OF_MANY } else { MAX_ITERATIONS })
+    }
+
+    fn roughly(self) -> Self {
+        Self { not_worth: NOT_WORTH_ROUGHLY, ..self }
+    }
+}
+
 /// Fits the free parameters for a given noise, from a given start.
 pub(crate) fn solve(
     problem: &Problem<'_>,
@@ -157,8 +189,18 @@ pub(crate) fn solve(
     shared: &[f64],
     nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
-    let most = if problem.knows_many() { ITERATIONS_OF_MANY } else { MAX_ITERATIONS };
-    solve_within(most, problem, selection, noise, (shared, nuisance))
+    solve_until(End::of(problem), problem, selection, noise, (shared, nuisance))
+}
+
+/// The same as well as another fit needs that goes on from there.
+pub(crate) fn solve_roughly(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    shared: &[f64],
+    nuisance: &[Vec<f64>],
+) -> Result<Fit, PredictError> {
+    solve_until(End::of(problem).roughly(), problem, selection, noise, (shared, nuisance))
 }
 
 /// The same to a part of the data, from where a fit to all of them ends.
@@ -170,7 +212,7 @@ pub(crate) fn solve_again(
     nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
     let most = if problem.knows_many() { ITERATIONS_AGAIN } else { MAX_ITERATIONS };
-    solve_within(most, problem, selection, noise, (shared, nuisance))
+    solve_until(End::after(most), problem, selection, noise, (shared, nuisance))
 }
 
 /// The same in at most so many iterations.
@@ -181,7 +223,19 @@ pub(crate) fn solve_within(
     noise: &NoiseState,
     start: (&[f64], &[Vec<f64>]),
 ) -> Result<Fit, PredictError> {
-    descend((iterations, f64::INFINITY), problem, selection, noise, start)
+    solve_until(End::after(iterations), problem, selection, noise, start)
+}
+
+/// The same roughly, where the normal equations at the start are known.
+pub(crate) fn solve_from(
+    iterations: usize,
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    start: (&[f64], &[Vec<f64>]),
+    linear: NormalEquations,
+) -> Fit {
+    descend(End::after(iterations).roughly(), problem, selection, noise, start, linear)
 }
 
 /// The same, given up where the sum of squares will hardly get below `most`, by a model that knows many mechanisms.
@@ -192,21 +246,34 @@ pub(crate) fn solve_below(
     noise: &NoiseState,
     start: (&[f64], &[Vec<f64>]),
 ) -> Result<Fit, PredictError> {
-    let (iterations, most) =
-        if problem.knows_many() { (ITERATIONS_OF_MANY, most) } else { (MAX_ITERATIONS, f64::INFINITY) };
-    descend((iterations, most), problem, selection, noise, start)
+    let mut end = End::of(problem);
+    if problem.knows_many() {
+        end.hopeless_above = most;
+    }
+    solve_until(end, problem, selection, noise, start)
+}
+
+fn solve_until(
+    end: End,
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    start: (&[f64], &[Vec<f64>]),
+) -> Result<Fit, PredictError> {
+    let linear = linearise(problem, selection, noise, start.0, start.1)?;
+    Ok(descend(end, problem, selection, noise, start, linear))
 }
 
 fn descend(
-    (iterations, most): (usize, f64),
+    end: End,
     problem: &Problem<'_>,
     selection: &Selection,
     noise: &NoiseState,
     (shared, nuisance): (&[f64], &[Vec<f64>]),
-) -> Result<Fit, PredictError> {
+    mut linear: NormalEquations,
+) -> Fit {
     let n_shared = selection.shared.len();
     let (mut shared, mut nuisance) = (shared.to_vec(), nuisance.to_vec());
-    let mut linear = linearise(problem, selection, noise, &shared, &nuisance)?;
     let many = problem.knows_many();
     let mut damping = Damping::none(many);
     let mut converged = false;
@@ -214,22 +281,29 @@ fn descend(
     // What part of a step is taken, whether one from here failed, and whether it was shortened since.
     let (mut length, mut failed, mut shortened) = (1.0, false, false);
     let (mut hardly, mut promised) = (0, f64::INFINITY);
+    // The sum of squares before each step, of such a model.
+    let mut course = Vec::new();
     let values: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
-    for iteration in 0..iterations {
+    for iteration in 0..end.iterations {
         // Where a fit leaves many times the noise, what a step gains counts in units of that.
         let left = (linear.chi2 / values.max(1) as f64).max(1.0);
         let step = Step::new(problem, selection, &linear, (&shared, &nuisance), damping.part);
         let predicted = step.predicted;
         promised = predicted;
         held.clone_from(&step.held);
-        let least = if many { NOT_WORTH * left } else { 1e-9 * (1.0 + 1e-6 * linear.chi2) };
+        let least = if many { end.not_worth * left } else { 1e-9 * (1.0 + 1e-6 * linear.chi2) };
         if !(predicted > least) {
             converged = true;
             break;
         }
-        if iteration > 0 && linear.chi2 - HOPE * predicted > most {
+        if iteration > 0 && linear.chi2 - HOPE * predicted > end.hopeless_above {
             break;
         }
+        let before = course.len().checked_sub(CREEPING).map(|k| course[k]);
+        if many && damping.part > 0.0 && before.is_some_and(|chi2: f64| chi2 - linear.chi2 < CREEP * left) {
+            break;
+        }
+        course.push(linear.chi2);
         let step = step.part(length, &shared, &nuisance);
         let (next, reached) = tried(problem, selection, noise, &step, failed.then_some(linear.chi2));
         let gained = linear.chi2 - reached;
@@ -276,7 +350,7 @@ fn descend(
     let log_likelihood = log_likelihood(problem, noise, &bordered, linear.chi2);
     let nuisance_errors = bordered.runs().iter().map(|run| run.errors(n_shared)).collect();
     let at_bound = (0..n_shared).filter(|&i| held[i]).map(|i| selection.shared[i]).collect();
-    Ok(Fit {
+    Fit {
         shared,
         nuisance,
         noise: noise.clone(),
@@ -286,7 +360,7 @@ fn descend(
         information: bordered.information(),
         converged,
         at_bound,
-    })
+    }
 }
 
 /// Log likelihood of the noise at a sum of squares, up to a constant, the nuisance parameters integrated out.

@@ -75,7 +75,7 @@ pub(crate) fn open_shapes(
     Ok((0..problem.channels()).map(open).collect())
 }
 
-/// What a fit leaves in all channels, not yet whitened.
+/// What a fit leaves in all channels, and the columns of its nuisance parameters, not yet whitened.
 struct Leftovers {
     raw: Vec<Vec<Vec<f64>>>,
     nuisance_columns: Vec<Vec<Vec<usize>>>,
@@ -90,8 +90,9 @@ impl Leftovers {
     ) -> Result<Self, PredictError> {
         let channels = problem.channels();
         let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
-        let raw = problem
-            .by_run(|run| whitened_columns(problem, selection, &white, run, shared, &nuisance[run]))?;
+        let alone = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+        let raw =
+            problem.by_run(|run| whitened_columns(problem, &alone, &white, run, shared, &nuisance[run]))?;
         let nuisance_columns = (0..nuisance.len())
             .map(|run| channel_columns(problem, run, &raw[run][..selection.nuisance.len()]))
             .collect();

@@ -1,10 +1,12 @@
 //! Which mechanisms are worth a fit beside others, by what the first steps of a fit gain: for models that know so many that fitting each
 //! in every company would take too long.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
-use crate::fit::gauss_newton::{linearise, solve_within};
-use crate::fit::step::Step;
+use crate::fit::gauss_newton::{linearise, solve_from};
+use crate::fit::step::{NormalEquations, Step};
 use crate::model::Scope;
 use crate::problem::Problem;
 use crate::selection::candidate::{Candidate, Guess};
@@ -43,13 +45,15 @@ impl Screening {
             .filter(|&k| !parent.set.contains(&self.0[k].0))
             .flat_map(|k| (0..self.0[k].1.len()).map(move |start| (k, start)))
             .collect();
-        let mut scored: Vec<(f64, usize, usize)> = tried
+        let mut scored: Vec<(f64, usize, usize)> = Vec::new();
+        let mut linearised: HashMap<(usize, usize), NormalEquations> = HashMap::new();
+        let first_steps = tried
             .into_par_iter()
-            .map(|(k, start)| {
-                let left = after_one_step(problem, parent, self.0[k].0, &self.0[k].1[start]);
-                (left.unwrap_or(f64::INFINITY), k, start)
-            })
-            .collect();
+            .map(|(k, start)| (after_one_step(problem, parent, self.0[k].0, &self.0[k].1[start]), k, start));
+        for (step, k, start) in first_steps.collect::<Vec<_>>() {
+            scored.push((step.as_ref().map_or(f64::INFINITY, |(left, _)| *left), k, start));
+            linearised.extend(step.map(|(_, linear)| ((k, start), linear)));
+        }
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut first: Vec<(usize, usize)> = Vec::new();
         let mut mechanisms = 0;
@@ -65,9 +69,12 @@ impl Screening {
                 first.push((k, start));
             }
         }
-        let mut followed: Vec<(f64, Promising)> = first
+        let known: Vec<_> = first.into_iter().filter_map(|at| Some((at, linearised.remove(&at)?))).collect();
+        let mut followed: Vec<(f64, Promising)> = known
             .into_par_iter()
-            .filter_map(|(k, start)| follow(problem, parent, self.0[k].0, &self.0[k].1[start]))
+            .filter_map(|((k, start), linear)| {
+                follow(problem, parent, self.0[k].0, &self.0[k].1[start], linear)
+            })
             .collect();
         self.forget(problem, &scored);
         followed.retain(|(left, _)| *left < parent.fit.chi2 - 1.0);
@@ -111,13 +118,13 @@ impl Screening {
     }
 }
 
-/// The sum of squares that is left after one step from a start, as the linearised model has it.
+/// The sum of squares that is left after one step from a start, as the linearised model has it, and that model.
 fn after_one_step(
     problem: &Problem<'_>,
     parent: &Candidate,
     mechanism: usize,
     start: &[(usize, f64)],
-) -> Option<f64> {
+) -> Option<(f64, NormalEquations)> {
     let set: Vec<usize> = parent.set.iter().copied().chain([mechanism]).collect();
     let selection = problem.select(&set, &[]);
     let mut shared = parent.fit.shared.clone();
@@ -127,7 +134,7 @@ fn after_one_step(
     let linear = linearise(problem, &selection, &parent.fit.noise, &shared, &parent.fit.nuisance).ok()?;
     let step = Step::new(problem, &selection, &linear, (&shared, &parent.fit.nuisance), 0.0);
     let left = linear.chi2 - step.predicted;
-    left.is_finite().then_some(left)
+    left.is_finite().then_some((left, linear))
 }
 
 /// The sum of squares that is left after some steps from a start, and where they lead the mechanism.
@@ -136,13 +143,14 @@ fn follow(
     parent: &Candidate,
     mechanism: usize,
     start: &[(usize, f64)],
+    linear: NormalEquations,
 ) -> Option<(f64, Promising)> {
     let set: Vec<usize> = parent.set.iter().copied().chain([mechanism]).collect();
     let selection = problem.select(&set, &[]);
     let mut shared = parent.fit.shared.clone();
     start.iter().for_each(|&(slot, value)| shared[slot] = value);
     let at = (&shared[..], &parent.fit.nuisance[..]);
-    let fit = solve_within(STEPS, problem, &selection, &parent.fit.noise, at).ok()?;
+    let fit = solve_from(STEPS, problem, &selection, &parent.fit.noise, at, linear);
     let of = &problem.spec().mechanisms[mechanism];
     let shared = |p: &&usize| problem.spec().parameters[**p].scope == Scope::Shared;
     let slots = of.parameters.iter().chain(&of.companions).filter(shared).map(|&p| problem.slots[p]);
