@@ -140,7 +140,7 @@ mod tests {
         let methods =
             [(Method::Heun, 4.0, 3.0), (Method::Kutta, 5.0, 4.0), (Method::DormandPrince, 6.0, 5.0)];
         for (method, at_end, within) in methods {
-            let (coarse, fine) = (errors(method, 0.2), errors(method, 0.1));
+            let (coarse, fine) = (errors(method, 0.1), errors(method, 0.05));
             assert!((coarse[0] / fine[0]).log2() > at_end - 0.4, "{method:?}: {coarse:?}, {fine:?}");
             assert!((coarse[1] / fine[1]).log2() > within - 0.4, "{method:?}: {coarse:?}, {fine:?}");
         }
