@@ -31,7 +31,7 @@ const FINEST_FOR_LAWS: f64 = 0.125;
 /// yields more is a spring.
 const STIFFER: f64 = 3.0;
 
-/// Derivatives that a number carries at the most.
+/// Derivatives that a number carries at the most; of more parameters eight at a time.
 const MOST_DERIVATIVES: usize = 12;
 
 /// Some dry friction, in parts of a joint's typical acceleration.
@@ -583,9 +583,9 @@ impl Model for MotionModel {
             return self.predict(run, shared, nuisance, out);
         }
         let at = (run, shared, nuisance);
-        // Numbers no longer than needed: most time goes into their derivatives. Several times through a run, each with as many.
-        let times = free.len().div_ceil(MOST_DERIVATIVES);
-        for chunk in free.chunks(free.len().div_ceil(times)) {
+        // Numbers no longer than needed: most time goes into their derivatives.
+        let together = if free.len() <= MOST_DERIVATIVES { MOST_DERIVATIVES } else { 8 };
+        for chunk in free.chunks(together) {
             match chunk.len() {
                 1 => self.columns::<1>(at, chunk, out, jacobian),
                 2 | 3 => self.columns::<3>(at, chunk, out, jacobian),

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use crate::fit::columns::{add_nuisance_prior, whitened_columns};
-use crate::fit::gauss_newton::{NOT_WORTH, solve_again};
+use crate::fit::gauss_newton::{NOT_WORTH_ROUGHLY, solve_again};
 use crate::fit::optimum::Fit;
 use crate::fit::step::{NormalEquations, Step};
 use crate::linalg::gram;
@@ -92,7 +92,7 @@ impl<'a> Chords<'a> {
         for _ in 0..MOST {
             let step = Step::new(part, selection, &linear, (&shared, &nuisance), 0.0);
             let left = (linear.chi2 / values.max(1) as f64).max(1.0);
-            if !(step.predicted > NOT_WORTH * left) {
+            if !(step.predicted > NOT_WORTH_ROUGHLY * left) {
                 return Ok(((shared, nuisance), true));
             }
             match normals(&step.shared, &step.nuisance) {

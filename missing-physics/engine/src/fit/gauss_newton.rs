@@ -16,9 +16,9 @@ const ITERATIONS_OF_MANY: usize = 24;
 const ITERATIONS_AGAIN: usize = 6;
 /// Gain in the sum of squares that a step promises, in units of what is left of a value, below which it is not taken by a model that knows
 /// many mechanisms: it would move no parameter by more than a tenth of its error.
-pub(crate) const NOT_WORTH: f64 = 1e-2;
-/// The same of a fit that only shows where a better one begins.
-const NOT_WORTH_ROUGHLY: f64 = 0.5;
+const NOT_WORTH: f64 = 1e-2;
+/// The same of a fit that only shows where a better one begins, or what is left of the data.
+pub(crate) const NOT_WORTH_ROUGHLY: f64 = 0.5;
 /// What a step may promise at most, in parts of the sum of squares, where a fit that does not go down any more is at its end.
 const STALLED: f64 = 1e-4;
 /// Gain in the sum of squares that a step promises, in the same units, below which one that does not go down shortened either is at a
@@ -212,7 +212,7 @@ pub(crate) fn solve_again(
     nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
     let most = if problem.knows_many() { ITERATIONS_AGAIN } else { MAX_ITERATIONS };
-    solve_until(End::after(most), problem, selection, noise, (shared, nuisance))
+    solve_until(End::after(most).roughly(), problem, selection, noise, (shared, nuisance))
 }
 
 /// The same in at most so many iterations.
