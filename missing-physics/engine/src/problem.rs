@@ -351,6 +351,11 @@ pub(crate) struct Selection {
 }
 
 impl Selection {
+    /// The nuisance parameters alone.
+    pub(crate) fn without_shared(&self) -> Self {
+        Self { shared: Vec::new(), added_shared: Vec::new(), ..self.clone() }
+    }
+
     /// Slots among the shared parameters that a mechanism or term added to the baseline.
     pub(crate) fn added(&self) -> impl Iterator<Item = usize> {
         self.shared.iter().zip(&self.added_shared).filter(|(_, added)| **added).map(|(&slot, _)| slot)

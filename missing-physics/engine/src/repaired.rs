@@ -166,7 +166,7 @@ impl Repaired {
             }
         }
         let shared = self.shared(&problem);
-        let still = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+        let still = selection.without_shared();
         let nuisance = solve(&problem, &still, &noise, &shared, &problem.nuisance_start)?.nuisance;
         (0..recording.runs.len())
             .map(|run| self.predict_run(&problem, &selection, &noise, run, &shared, &nuisance[run]))

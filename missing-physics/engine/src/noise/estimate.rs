@@ -90,7 +90,7 @@ impl Leftovers {
     ) -> Result<Self, PredictError> {
         let channels = problem.channels();
         let white = NoiseState { shape: vec![0; channels], sigma: vec![1.0; channels] };
-        let alone = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+        let alone = selection.without_shared();
         let raw =
             problem.by_run(|run| whitened_columns(problem, &alone, &white, run, shared, &nuisance[run]))?;
         let nuisance_columns = (0..nuisance.len())

@@ -40,7 +40,7 @@ pub(crate) fn contradicting(
         return Ok(None);
     }
     let white = NoiseState { shape: vec![0; sigma.len()], sigma: sigma.to_vec() };
-    let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+    let known = selection.without_shared();
     let mut found: Vec<usize> = Vec::new();
     for _ in 0..ROUNDS {
         let others: Vec<usize> = (0..runs).filter(|r| !found.contains(r)).collect();

@@ -1,7 +1,7 @@
 //! A set of mechanisms, fitted from several starts.
 
 use crate::fit::alternate::{fit, fit_from};
-use crate::fit::gauss_newton::{solve, solve_roughly, solve_within};
+use crate::fit::gauss_newton::{solve_roughly, solve_within};
 use crate::fit::optimum::Fit;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
@@ -124,10 +124,9 @@ fn fits(
     let mut best_of: Vec<(Vec<f64>, Fit)> = Vec::new();
     let mut failure = None;
     let begun = begun(problem, selection, integers, near, starts);
-    let first = if problem.knows_many() { solve_roughly } else { solve };
     for (start, nuisance) in &begun {
         let numbers: Vec<f64> = integers.iter().map(|&slot| start[slot]).collect();
-        match first(problem, selection, &near.noise, start, nuisance) {
+        match solve_roughly(problem, selection, &near.noise, start, nuisance) {
             Ok(fit) => match best_of.iter_mut().find(|(n, _)| *n == numbers) {
                 Some((_, best)) if fit.chi2 < best.chi2 - 1e-9 => *best = fit,
                 Some(_) => {}

@@ -30,7 +30,7 @@ pub(crate) struct HeldOut {
 /// of a recording cannot size loses to a baseline whose noise is as large as its misfit.
 pub(crate) fn held_out(problem: &Problem<'_>, candidate: &Candidate) -> Result<HeldOut, PredictError> {
     let noise = &candidate.fit.noise;
-    let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..candidate.selection.clone() };
+    let known = candidate.selection.without_shared();
     let mut out = LeavingOut { problem, candidate, noise, known, log_score: 0.0, squares: Vec::new() };
     out.squares = vec![(0.0, 0); problem.channels()];
     if problem.recording.runs.len() > 1 {

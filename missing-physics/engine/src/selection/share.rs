@@ -51,7 +51,7 @@ pub(crate) fn unseen_misfit(
         residual.iter().flat_map(|run| run.iter().enumerate()).map(of_column).sum()
     };
     let runs = problem.recording.runs.len();
-    let known = Selection { shared: Vec::new(), added_shared: Vec::new(), ..selection.clone() };
+    let known = selection.without_shared();
     let folds = if runs > 1 { runs.min(FOLDS) } else { FOLDS };
     let of_runs = |chords: &Chords<'_>, fold: usize| -> Result<f64, PredictError> {
         let (test, train): (Vec<usize>, Vec<usize>) = (0..runs).partition(|r| r % folds == fold);

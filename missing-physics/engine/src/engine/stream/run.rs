@@ -60,7 +60,7 @@ impl<'a> Setting<'a> {
         recording.runs = vec![run.clone()];
         recording.check()?;
         let problem = self.problem.with(recording);
-        let alone = Selection { shared: Vec::new(), added_shared: Vec::new(), ..self.wide.clone() };
+        let alone = self.wide.without_shared();
         let fit = solve(&problem, &alone, &self.noise, &self.shared, &problem.nuisance_start)?;
         let nuisance = fit.nuisance.first().map_or(&[][..], Vec::as_slice);
         Ok(self.of(&problem, 0, nuisance)?)
