@@ -10,6 +10,7 @@ use crate::law::added::AddedLaw;
 use crate::linalg::dot;
 use crate::model::{Model, Parameter, PredictError, Quantity, Scope, Spec};
 use crate::problem::Problem;
+use crate::statistics::median;
 
 /// Degree of a curved scale.
 const CURVED: usize = 3;
@@ -124,7 +125,7 @@ impl<'a> Extended<'a> {
             .filter_map(|p| Some(p.last()? - p.first()?))
             .fold(0.0, f64::max);
         let lowest = std::f64::consts::TAU * 1.5 / span.max(f64::MIN_POSITIVE);
-        let highest = std::f64::consts::PI / problem.step;
+        let highest = std::f64::consts::PI / measured_step(problem);
         if highest <= lowest {
             return Ok(None);
         }
@@ -189,6 +190,16 @@ impl<'a> Extended<'a> {
         let term = Added::Smooth { channel, variable, centre: 0.5 * (low + high), half_width };
         Some(Self::new(problem.model, &problem.recording, parameters, term))
     }
+}
+
+/// The shortest, of all channels, median step between measured rows: what oscillates faster than twice in it is the alias of something
+/// slower.
+fn measured_step(problem: &Problem<'_>) -> f64 {
+    let of_channel = |channel: usize| {
+        let gaps = problem.rows.iter().flat_map(|r| r.positions[channel].windows(2).map(|w| w[1] - w[0]));
+        median(&mut gaps.filter(|gap| *gap > 0.0).collect::<Vec<f64>>())
+    };
+    (0..problem.channels()).filter_map(of_channel).fold(f64::INFINITY, f64::min)
 }
 
 /// A shared parameter that starts at zero and is free in both directions up to a bound.

@@ -141,6 +141,18 @@ fn an_oscillation_predicts() {
     assert_eq!(kept.law, Some(AddedLaw::Periodic));
 }
 
+/// Where every other row was measured, an oscillation is not its alias, of which these rows show the same.
+#[test]
+fn an_oscillation_of_every_other_row_is_the_slow_one() {
+    let mut every_other = draw(|x| x + 0.6 * (5.0 * x).sin(), 5);
+    for run in &mut every_other.runs {
+        run.outputs[0].iter_mut().skip(1).step_by(2).for_each(|v| *v = f64::NAN);
+    }
+    let law = answer(&Line::new().0, &every_other).law.unwrap();
+    let omega = &law.coefficients[0];
+    assert!(omega.name == "omega" && (omega.value - 5.0).abs() < 0.05, "{omega:?}");
+}
+
 #[test]
 fn terms_predict() {
     let kept = kept(&WithTerm::new(), |x| x + 0.004 * x.powi(4));
