@@ -38,6 +38,7 @@ impl<T: Number> DryFriction<T> {
     /// The friction `F(s, v)` that opposes sliding in the direction `forward` with a velocity, under a driving force.
     ///
     /// May be below 0 where the asymmetry exceeds the rest.
+    #[inline(always)]
     pub fn resistance(&self, forward: bool, velocity: T, load: T) -> T {
         // Most joints have few of these, and each costs its derivatives.
         let zero = T::from(0.0);

@@ -7,6 +7,7 @@ use crate::Number;
 /// `dz/dt = v - (|v| z + v |z|) / (2 yield)`: `z` follows the motion, saturates at `yield_displacement` (above 0) and relaxes at once
 /// when the motion turns. `forward` and `stretched` are the signs of velocity and deflection: the rate has no kink but where one of them
 /// changes. The element's force is `-stiffness z` (Wen 1976, doi:10.1061/JMCEA3.0002106).
+#[inline(always)]
 pub fn bouc_wen_rate<T: Number>(
     velocity: T,
     deflection: T,

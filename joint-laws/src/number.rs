@@ -190,6 +190,15 @@ impl Number for f64 {
     fn add_scaled(&mut self, other: Self, factor: f64) {
         *self += other * factor;
     }
+
+    // Without derivatives one of the two will do.
+    fn sin(self) -> Self {
+        Self::sin(self)
+    }
+
+    fn cos(self) -> Self {
+        Self::cos(self)
+    }
 }
 
 /// A number with its derivatives by `N` parameters, first order.
@@ -210,6 +219,7 @@ impl<const N: usize> Dual<N> {
     }
 
     /// `a` times these derivatives plus `b` times others.
+    #[inline(always)]
     fn mixed(&self, a: f64, other: &Self, b: f64) -> [f64; N] {
         let mut eps = [0.0; N];
         for (k, e) in eps.iter_mut().enumerate() {
@@ -218,27 +228,31 @@ impl<const N: usize> Dual<N> {
         eps
     }
 
+    #[inline(always)]
     fn scaled(&self, factor: f64) -> [f64; N] {
         self.eps.map(|e| e * factor)
     }
 }
 
 impl<const N: usize> From<f64> for Dual<N> {
+    #[inline(always)]
     fn from(re: f64) -> Self {
         Self { re, eps: [0.0; N] }
     }
 }
 
 impl<const N: usize> Number for Dual<N> {
+    #[inline(always)]
     fn re(&self) -> f64 {
         self.re
     }
 
+    #[inline(always)]
     fn chain(self, value: f64, derivative: f64) -> Self {
         Self { re: value, eps: self.scaled(derivative) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn add_scaled(&mut self, other: Self, factor: f64) {
         self.re += other.re * factor;
         for (a, b) in self.eps.iter_mut().zip(&other.eps) {
@@ -246,7 +260,7 @@ impl<const N: usize> Number for Dual<N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_sum(&mut self, a: &Self, b: &Self) {
         self.re = a.re + b.re;
         for (k, e) in self.eps.iter_mut().enumerate() {
@@ -254,7 +268,7 @@ impl<const N: usize> Number for Dual<N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_difference(&mut self, a: &Self, b: &Self) {
         self.re = a.re - b.re;
         for (k, e) in self.eps.iter_mut().enumerate() {
@@ -262,7 +276,7 @@ impl<const N: usize> Number for Dual<N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_product(&mut self, a: &Self, b: &Self) {
         self.re = a.re * b.re;
         for (k, e) in self.eps.iter_mut().enumerate() {
@@ -270,7 +284,7 @@ impl<const N: usize> Number for Dual<N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn set_scaled(&mut self, a: &Self, factor: f64) {
         self.re = a.re * factor;
         for (k, e) in self.eps.iter_mut().enumerate() {
@@ -281,6 +295,7 @@ impl<const N: usize> Number for Dual<N> {
 
 impl<const N: usize> Neg for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn neg(self) -> Self {
         Self { re: -self.re, eps: self.eps.map(|e| -e) }
     }
@@ -288,6 +303,7 @@ impl<const N: usize> Neg for Dual<N> {
 
 impl<const N: usize> Add for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn add(mut self, other: Self) -> Self {
         self += other;
         self
@@ -296,6 +312,7 @@ impl<const N: usize> Add for Dual<N> {
 
 impl<const N: usize> Sub for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
         self -= other;
         self
@@ -304,7 +321,7 @@ impl<const N: usize> Sub for Dual<N> {
 
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self { re: self.re * other.re, eps: self.mixed(other.re, &other, self.re) }
     }
@@ -312,6 +329,7 @@ impl<const N: usize> Mul for Dual<N> {
 
 impl<const N: usize> Div for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn div(self, other: Self) -> Self {
         let inverse = other.re.recip();
         let re = self.re * inverse;
@@ -321,6 +339,7 @@ impl<const N: usize> Div for Dual<N> {
 
 impl<const N: usize> Add<f64> for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn add(self, other: f64) -> Self {
         Self { re: self.re + other, ..self }
     }
@@ -328,6 +347,7 @@ impl<const N: usize> Add<f64> for Dual<N> {
 
 impl<const N: usize> Sub<f64> for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn sub(self, other: f64) -> Self {
         Self { re: self.re - other, ..self }
     }
@@ -335,6 +355,7 @@ impl<const N: usize> Sub<f64> for Dual<N> {
 
 impl<const N: usize> Mul<f64> for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn mul(self, other: f64) -> Self {
         Self { re: self.re * other, eps: self.scaled(other) }
     }
@@ -342,12 +363,14 @@ impl<const N: usize> Mul<f64> for Dual<N> {
 
 impl<const N: usize> Div<f64> for Dual<N> {
     type Output = Self;
+    #[inline(always)]
     fn div(self, other: f64) -> Self {
         Self { re: self.re / other, eps: self.eps.map(|e| e / other) }
     }
 }
 
 impl<const N: usize> AddAssign for Dual<N> {
+    #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         self.re += other.re;
         for (a, b) in self.eps.iter_mut().zip(&other.eps) {
@@ -357,6 +380,7 @@ impl<const N: usize> AddAssign for Dual<N> {
 }
 
 impl<const N: usize> SubAssign for Dual<N> {
+    #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         self.re -= other.re;
         for (a, b) in self.eps.iter_mut().zip(&other.eps) {

@@ -129,7 +129,13 @@ impl<T: Number> Signal<T> {
         self.pieces.is_empty()
     }
 
+    /// Whether every piece is one value.
+    pub fn is_flat(&self) -> bool {
+        self.flat
+    }
+
     /// The value at a time, by the piece of a number: 0 before the first begins, `k` after the `k`-th has begun.
+    #[inline(always)]
     pub fn value(&self, piece: usize, t: f64) -> T {
         let Some(p) = self.pieces.get(piece.saturating_sub(1)) else { return T::from(0.0) };
         if self.flat {

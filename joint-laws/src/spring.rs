@@ -3,11 +3,13 @@
 use crate::Number;
 
 /// The force of a stop of a stiffness at a position, on a joint that has passed it or not.
+#[inline(always)]
 pub fn end_stop<T: Number>(x: T, position: T, stiffness: T, beyond: bool) -> T {
     if beyond { -stiffness * (x - position) } else { T::from(0.0) }
 }
 
 /// The cogging of a drive: `amplitude sin(periods angle + phase)`, `periods` a turn.
+#[inline(always)]
 pub fn cogging<T: Number>(angle: T, amplitude: T, phase_rad: T, periods: T) -> T {
     amplitude * (angle * periods + phase_rad).sin()
 }

@@ -8,6 +8,7 @@
 //! back by those behind it, so that its derivatives are exact across the event (the saltation matrix; Leine and Nijmeijer 2004,
 //! doi:10.1007/978-3-540-44398-8).
 
+mod events;
 mod scheme;
 
 use crate::Number;
@@ -40,6 +41,9 @@ pub struct Edge<T> {
 }
 
 /// The equations of motion of a machine.
+///
+/// `smooth`, `push` and `resistance` are where the time goes. What of them is `#[inline(always)]` is compiled for the vector instructions
+/// that the processor turns out to have.
 pub trait Machine<T: Number> {
     /// Joints with dry friction.
     fn contacts(&self) -> &[Contact];
@@ -95,21 +99,6 @@ enum Mode {
     Rest,
 }
 
-/// What ends a smooth stretch.
-#[derive(Debug, Clone, Copy)]
-enum Event {
-    /// A sliding contact comes to rest.
-    Stops(usize),
-    /// A resting contact is overcome, forward or backward.
-    Slips(usize, bool),
-    /// A state reaches its ceiling.
-    Fills(usize),
-    /// A state leaves its ceiling.
-    Falls(usize),
-    /// A state passes an edge.
-    Crosses(usize),
-}
-
 /// Events in one step that are located; more are a chatter below the step's resolution.
 const MOST_EVENTS: usize = 40;
 /// A state beyond this has blown up.
@@ -135,6 +124,8 @@ pub struct Integrator<T> {
     control: Option<Control>,
     /// Trial steps made.
     tried: usize,
+    /// What this processor can do.
+    arch: pulp::Arch,
     modes: Vec<Mode>,
     full: Vec<bool>,
     beyond: Vec<bool>,
@@ -148,6 +139,24 @@ pub struct Integrator<T> {
     spare: Vec<T>,
 }
 
+/// One step, compiled for each kind of processor.
+struct Trial<'a, T, M> {
+    integrator: &'a mut Integrator<T>,
+    machine: &'a mut M,
+    t: f64,
+    x: &'a [T],
+    h: f64,
+}
+
+impl<T: Number, M: Machine<T>> pulp::NullaryFnOnce for Trial<'_, T, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.integrator.try_step(self.machine, self.t, self.x, self.h);
+    }
+}
+
 impl<T: Number> Integrator<T> {
     /// An integrator with steps of at most `step_s` for a machine of `states` states.
     pub fn new(method: Method, states: usize, step_s: f64) -> Self {
@@ -158,6 +167,7 @@ impl<T: Number> Integrator<T> {
             step_s,
             control: None,
             tried: 0,
+            arch: pulp::Arch::new(),
             modes: Vec::new(),
             full: Vec::new(),
             beyond: Vec::new(),
@@ -280,6 +290,7 @@ impl<T: Number> Integrator<T> {
     }
 
     /// Adds the friction of a sliding contact.
+    #[inline(always)]
     fn slide(&self, machine: &mut impl Machine<T>, c: usize, t: f64, x: &[T], rates: &mut [T]) {
         let forward = self.modes[c] == Mode::Forward;
         let friction = machine.resistance(c, forward, t, x);
@@ -288,6 +299,12 @@ impl<T: Number> Integrator<T> {
 
     /// The states' derivatives, friction and ceilings included.
     fn derivative(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], rates: &mut [T]) {
+        self.derivative_here(machine, t, x, rates);
+    }
+
+    /// The same, compiled for whatever processor the caller is compiled for.
+    #[inline(always)]
+    fn derivative_here(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], rates: &mut [T]) {
         machine.smooth(t, x, rates);
         for c in 0..self.modes.len() {
             if self.modes[c] != Mode::Rest {
@@ -318,21 +335,22 @@ impl<T: Number> Integrator<T> {
 
     /// One step, whatever happens in it, into `trial`.
     fn step(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], h: f64) {
+        self.arch.dispatch(Trial { integrator: self, machine, t, x, h });
+    }
+
+    /// The same, compiled for whatever processor the caller is compiled for.
+    #[inline(always)]
+    fn try_step(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], h: f64) {
         self.tried += 1;
         let mut rates = std::mem::take(&mut self.rates);
         let mut stage = std::mem::take(&mut self.stage);
-        if !self.fresh {
-            self.derivative(machine, t, x, &mut rates[0]);
-            self.fresh = true;
+        for k in usize::from(self.fresh)..rates.len() {
+            let (before, at) = rates.split_at_mut(k);
+            let row = k.checked_sub(1).map_or(&[][..], |k| self.scheme.stages[k]);
+            combine(x, before, row.iter().map(|part| part * h), &mut stage);
+            self.derivative_here(machine, t + self.scheme.nodes[k] * h, &stage, &mut at[0]);
         }
-        for (k, row) in self.scheme.stages.iter().enumerate() {
-            stage.copy_from_slice(x);
-            let (before, at) = rates.split_at_mut(k + 1);
-            for (rates, part) in before.iter().zip(*row).filter(|(_, part)| **part != 0.0) {
-                stage.iter_mut().zip(rates).for_each(|(s, r)| s.add_scaled(*r, part * h));
-            }
-            self.derivative(machine, t + self.scheme.nodes[k + 1] * h, &stage, &mut at[0]);
-        }
+        self.fresh = true;
         self.rates = rates;
         self.stage = stage;
         if self.scheme.last_is_end {
@@ -345,14 +363,9 @@ impl<T: Number> Integrator<T> {
     }
 
     /// The states a part of the way through the trial step.
+    #[inline]
     fn within(&self, x: &[T], h: f64, part: f64, into: &mut [T]) {
-        into.copy_from_slice(x);
-        for (w, rates) in self.scheme.weights.iter().zip(&self.rates) {
-            let weight = h * part * (w[0] + part * (w[1] + part * (w[2] + part * w[3])));
-            if weight != 0.0 {
-                into.iter_mut().zip(rates).for_each(|(s, r)| s.add_scaled(*r, weight));
-            }
-        }
+        combine(x, &self.rates, self.scheme.weights.iter().map(|w| h * Scheme::weight(w, part)), into);
     }
 
     /// The same, moved on by an infinitesimal time.
@@ -360,54 +373,10 @@ impl<T: Number> Integrator<T> {
         self.within(x, h, part, into);
         if by != T::from(0.0) {
             for (w, rates) in self.scheme.weights.iter().zip(&self.rates) {
-                let slope = w[0] + part * (2.0 * w[1] + part * (3.0 * w[2] + part * 4.0 * w[3]));
+                let slope = Scheme::slope(w, part);
                 into.iter_mut().zip(rates).for_each(|(s, r)| *s += *r * by * slope);
             }
         }
-    }
-
-    /// What an event's sign says at a point: above 0 before it, below 0 after.
-    fn sign(&mut self, machine: &mut impl Machine<T>, event: Event, t: f64, x: &[T]) -> T {
-        match event {
-            Event::Stops(c) => {
-                let v = x[machine.contacts()[c].velocity];
-                if self.modes[c] == Mode::Forward { v } else { -v }
-            }
-            Event::Slips(c, forward) => {
-                let held = self.holding(machine, c, t, x);
-                let most = machine.resistance(c, forward, t, x);
-                if forward { most + held } else { most - held }
-            }
-            Event::Fills(c) => {
-                let Ceiling { state, height } = machine.ceilings()[c];
-                height - x[state]
-            }
-            Event::Falls(c) => {
-                let state = machine.ceilings()[c].state;
-                self.smooth_rate(machine, t, x, state)
-            }
-            Event::Crosses(e) => {
-                let Edge { state, at } = machine.edges()[e];
-                if self.beyond[e] { x[state] - at } else { at - x[state] }
-            }
-        }
-    }
-
-    /// The `k`-th of the events that may end a step.
-    fn possible(&self, k: usize) -> Option<Event> {
-        let (contacts, ceilings) = (self.modes.len(), self.full.len());
-        if k < 2 * contacts {
-            let (c, forward) = (k / 2, k.is_multiple_of(2));
-            return match self.modes[c] {
-                Mode::Rest => Some(Event::Slips(c, forward)),
-                _ => forward.then_some(Event::Stops(c)),
-            };
-        }
-        let c = k - 2 * contacts;
-        if c < ceilings {
-            return Some(if self.full[c] { Event::Falls(c) } else { Event::Fills(c) });
-        }
-        Some(Event::Crosses(c - ceilings))
     }
 
     /// Moves the states from `*t` to `to`, between which inputs must not jump, and reads them on the way.
@@ -531,133 +500,17 @@ impl<T: Number> Integrator<T> {
         control.next_s = wanted;
         Some(wanted)
     }
+}
 
-    /// The first event within the trial step, and in which part of it.
-    fn first(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], h: f64) -> Option<(Event, f64)> {
-        let mut first: Option<(Event, f64)> = None;
-        for k in 0..2 * self.modes.len() + self.full.len() + self.beyond.len() {
-            let Some(event) = self.possible(k) else { continue };
-            let trial = std::mem::take(&mut self.trial);
-            let end = self.sign(machine, event, t + h, &trial).re();
-            self.trial = trial;
-            if end < 0.0 {
-                let at = self.root(machine, event, (t, x, h), end);
-                if first.is_none_or(|(_, before)| at < before) {
-                    first = Some((event, at));
-                }
-            }
+/// States and their rates, each of these so many times.
+#[inline(always)]
+fn combine<T: Number>(x: &[T], rates: &[Vec<T>], weights: impl Iterator<Item = f64> + Clone, into: &mut [T]) {
+    for (state, into) in into.iter_mut().enumerate() {
+        let mut sum = x[state];
+        for (rates, weight) in rates.iter().zip(weights.clone()).filter(|(_, weight)| *weight != 0.0) {
+            sum.add_scaled(rates[state], weight);
         }
-        first
-    }
-
-    /// In which part of the trial step the sign of an event vanishes that is below zero at its end (the Illinois method).
-    fn root(
-        &mut self,
-        machine: &mut impl Machine<T>,
-        event: Event,
-        (t, x, h): (f64, &[T], f64),
-        end: f64,
-    ) -> f64 {
-        let mut point = std::mem::take(&mut self.point);
-        let mut at = |this: &mut Self, part: f64| {
-            this.within(x, h, part, &mut point);
-            this.sign(machine, event, t + part * h, &point).re()
-        };
-        let (mut a, mut b, mut fb) = (0.0, 1.0, end);
-        let mut fa = at(self, a);
-        if fa <= 0.0 {
-            // A joint that has just begun to slip has no velocity yet, but will have in a moment.
-            a = 1e-3;
-            fa = at(self, a);
-        }
-        let mut found = if fa <= 0.0 { Some(0.0) } else { None };
-        let mut side = 0;
-        for _ in 0..60 {
-            if found.is_some() || b - a <= 1e-12 {
-                break;
-            }
-            let mid = (a * fb - b * fa) / (fb - fa);
-            let f = at(self, mid);
-            if f.abs() < 1e-13 * end.abs() {
-                found = Some(mid);
-            } else if f < 0.0 {
-                (b, fb) = (mid, f);
-                if side == -1 {
-                    fa *= 0.5;
-                }
-                side = -1;
-            } else {
-                (a, fa) = (mid, f);
-                if side == 1 {
-                    fb *= 0.5;
-                }
-                side = 1;
-            }
-        }
-        self.point = point;
-        found.unwrap_or(b)
-    }
-
-    /// Lets an event happen near `t`; how much later it was.
-    fn happen(&mut self, machine: &mut impl Machine<T>, event: Event, t: f64, x: &mut [T], h: f64) -> f64 {
-        let zero = T::from(0.0);
-        let miss = self.sign(machine, event, t, x);
-        let slope = self.slope(machine, event, t, x, h);
-        let mut late = if slope != 0.0 && slope.is_finite() { -miss / slope } else { zero };
-        if !(late.re().abs() <= 1e-3 * h) {
-            late = late.infinitesimal();
-        }
-        self.nudge(machine, t, x, late);
-        match event {
-            Event::Stops(c) => {
-                x[machine.contacts()[c].velocity] = zero;
-                self.modes[c] = self.at_rest(machine, c, t, x);
-            }
-            Event::Slips(c, forward) => self.modes[c] = if forward { Mode::Forward } else { Mode::Backward },
-            Event::Fills(c) => {
-                let Ceiling { state, height } = machine.ceilings()[c];
-                x[state] = height;
-                self.full[c] = true;
-            }
-            Event::Falls(c) => self.full[c] = false,
-            Event::Crosses(e) => {
-                self.beyond[e] = !self.beyond[e];
-                machine.cross(e, self.beyond[e]);
-            }
-        }
-        self.nudge(machine, t, x, -late.infinitesimal());
-        late.re()
-    }
-
-    /// How fast the sign of an event changes.
-    fn slope(&mut self, machine: &mut impl Machine<T>, event: Event, t: f64, x: &[T], h: f64) -> f64 {
-        let mut rates = std::mem::take(&mut self.stage);
-        self.derivative(machine, t, x, &mut rates);
-        let slope = match event {
-            Event::Stops(c) => {
-                let rate = rates[machine.contacts()[c].velocity].re();
-                if self.modes[c] == Mode::Forward { rate } else { -rate }
-            }
-            Event::Fills(c) => -rates[machine.ceilings()[c].state].re(),
-            Event::Crosses(e) => {
-                let rate = rates[machine.edges()[e].state].re();
-                if self.beyond[e] { rate } else { -rate }
-            }
-            Event::Slips(..) | Event::Falls(_) => {
-                let d = (1e-4 * h).max(1e-10);
-                let mut moved = std::mem::take(&mut self.point);
-                let mut at = |this: &mut Self, d: f64| {
-                    moved.copy_from_slice(x);
-                    moved.iter_mut().zip(&rates).for_each(|(m, r)| m.add_scaled(*r, d));
-                    this.sign(machine, event, t + d, &moved).re()
-                };
-                let slope = (at(self, d) - at(self, -d)) / (2.0 * d);
-                self.point = moved;
-                slope
-            }
-        };
-        self.stage = rates;
-        slope
+        *into = sum;
     }
 }
 

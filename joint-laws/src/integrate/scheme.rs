@@ -27,6 +27,18 @@ pub(super) struct Scheme {
     pub(super) last_is_end: bool,
 }
 
+impl Scheme {
+    /// A stage's weight in the change of the state up to a part of the step.
+    pub(super) fn weight(w: &[f64; 4], part: f64) -> f64 {
+        part * (w[0] + part * (w[1] + part * (w[2] + part * w[3])))
+    }
+
+    /// A stage's weight in the interpolant's rate of change at a part of the step.
+    pub(super) fn slope(w: &[f64; 4], part: f64) -> f64 {
+        w[0] + part * (2.0 * w[1] + part * (3.0 * w[2] + part * 4.0 * w[3]))
+    }
+}
+
 impl Method {
     pub(super) fn scheme(self) -> Scheme {
         match self {
@@ -109,8 +121,8 @@ mod tests {
             rates.push(rate(h * scheme.nodes[k + 1], x));
         }
         let error = |part: f64| {
-            let weight = |w: &[f64; 4]| part * (w[0] + part * (w[1] + part * (w[2] + part * w[3])));
-            let x = 1.0 + h * scheme.weights.iter().zip(&rates).map(|(w, r)| weight(w) * r).sum::<f64>();
+            let change = scheme.weights.iter().zip(&rates).map(|(w, r)| Scheme::weight(w, part) * r);
+            let x = 1.0 + h * change.sum::<f64>();
             (x - (part * h).sin().exp()).abs()
         };
         [error(1.0), (1..20).map(|k| error(f64::from(k) / 20.0)).fold(0.0, f64::max)]

@@ -205,8 +205,9 @@ fn controlled_steps_are_short_only_where_a_law_changes() {
     assert!(5 * of_found < of_fine, "{of_found} of {of_fine}");
 }
 
-/// A mass that bounces on a stop: its law changes at the stop's position.
+/// A mass under a constant pull that bounces on a stop: its law changes at the stop's position.
 struct Stopped<T> {
+    pull: T,
     stiffness: T,
     edge: [Edge<T>; 1],
     beyond: bool,
@@ -227,7 +228,10 @@ impl<T: Number> Machine<T> for Stopped<T> {
     }
     fn smooth(&mut self, _: f64, x: &[T], rates: &mut [T]) {
         rates[0] = x[1];
-        rates[1] = if self.beyond { -self.stiffness * (x[0] - self.edge[0].at) } else { T::from(0.0) };
+        rates[1] = -self.pull;
+        if self.beyond {
+            rates[1] -= self.stiffness * (x[0] - self.edge[0].at);
+        }
     }
     fn push(&mut self, _: usize, _: T, _: f64, _: &[T], _: &mut [T]) {}
     fn resistance(&mut self, _: usize, _: bool, _: f64, _: &[T]) -> T {
@@ -241,6 +245,7 @@ impl<T: Number> Machine<T> for Stopped<T> {
 fn a_law_that_changes_its_form_is_followed_across_the_edge() {
     let (v, at, k, until) = (2.0, 0.5, 400.0_f64, 1.0);
     let mut machine = Stopped {
+        pull: Dual::from(0.0),
         stiffness: Dual::parameter(k, 0),
         edge: [Edge { state: 0, at: Dual::<2>::parameter(at, 1) }],
         beyond: false,
@@ -254,4 +259,32 @@ fn a_law_that_changes_its_form_is_followed_across_the_edge() {
     assert_relative_eq!(x[1].re, -v, epsilon = 1e-6);
     assert_relative_eq!(x[0].eps[0], -v * 0.5 * half / k, max_relative = 1e-4);
     assert_relative_eq!(x[0].eps[1], 2.0, epsilon = 1e-5);
+}
+
+/// Thrown so that it turns back just behind the stop, within one long step, the mass is pushed back all the same; where it turns back
+/// before the stop, nothing happens.
+#[test]
+fn a_stop_that_is_left_within_the_step_that_reaches_it_is_felt() {
+    let (v, pull, k) = (2.0, 8.0, 400.0);
+    let follow = |method: Method, step_s: f64, at: f64| {
+        let mut machine = Stopped { pull, stiffness: k, edge: [Edge { state: 0, at }], beyond: false };
+        let mut integrator = Integrator::new(method, 2, step_s);
+        let (mut t, mut x) = (0.0, [0.0, v]);
+        integrator.settle(&mut machine, t, &mut x);
+        // It would turn back at 0.25 s; one step of the longer ones holds that.
+        integrator.advance(&mut machine, &mut t, &mut x, 0.4, &[], &[], |_, _, _| ()).unwrap();
+        x
+    };
+    let free = [v * 0.4 - 0.5 * pull * 0.16, v - pull * 0.4];
+    for method in [Method::Heun, Method::Kutta, Method::DormandPrince] {
+        let behind = 0.5 * v * v / pull - 4e-3;
+        let (fine, found) = (follow(method, 1e-4, behind), follow(method, 0.1, behind));
+        assert!(fine[1] < free[1] - 0.05, "the stop is passed by: {fine:?}");
+        // A third of a period of the spring is one step.
+        assert_relative_eq!(found[0], fine[0], epsilon = 2e-3);
+        assert_relative_eq!(found[1], fine[1], epsilon = 2e-2);
+        let before = follow(method, 0.1, 0.5 * v * v / pull + 1e-3);
+        assert_relative_eq!(before[0], free[0], epsilon = 1e-9);
+        assert_relative_eq!(before[1], free[1], epsilon = 1e-9);
+    }
 }

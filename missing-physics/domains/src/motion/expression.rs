@@ -141,6 +141,7 @@ fn change<T: Number>(stack: &mut [T], f: impl FnOnce(T) -> T) {
 }
 
 /// A function of one number.
+#[inline(never)]
 pub(super) fn one<T: Number>(f: One, a: T) -> T {
     match f {
         One::Sin => a.sin(),

@@ -41,6 +41,7 @@ impl<T: Number> JointLaws<T> {
     }
 
     /// The smooth force on the joint at a position with a velocity.
+    #[inline(always)]
     fn force(&self, x: T, v: T, states: &[T], beyond: &[bool]) -> T {
         let mut sum = T::from(0.0);
         for force in &self.forces {
@@ -89,29 +90,39 @@ pub(super) struct Driven<'a, T> {
     pub(super) other: Vec<T>,
     /// By joint: operations of the rates' tape that its drive enters.
     pub(super) driven: Vec<Vec<usize>>,
-    /// Time and number of pieces of inputs for which the rates' registers hold.
+    /// Time and number of pieces of inputs for which the rates' registers hold, if they do for any.
     pub(super) looked: (f64, usize),
 }
 
 impl<T: Number> Driven<'_, T> {
     /// Puts states, inputs and time where expressions find them, and computes the equations' derivatives, unless they are there.
     fn look(&mut self, t: f64, x: &[T]) {
+        self.look_here(t, x);
+    }
+
+    /// The same, compiled for whatever processor the caller is compiled for.
+    #[inline(always)]
+    fn look_here(&mut self, t: f64, x: &[T]) {
         let states = self.equations.states.len();
         // Pieces begin one after the other and none is taken back: their number tells which have.
         let now = (t, self.begun.iter().sum());
         if self.looked == now && self.values[..states] == x[..states] {
             return;
         }
+        let begins = self.looked.1 != now.1;
         self.looked = now;
         self.values[..states].copy_from_slice(&x[..states]);
         for (k, signal) in self.signals.iter().enumerate() {
-            self.values[states + k] = signal.value(self.begun[k], t);
+            if begins || !signal.is_flat() {
+                self.values[states + k] = signal.value(self.begun[k], t);
+            }
         }
         let last = self.equations.names() - 1;
         self.values[last] = T::from(t);
         self.equations.rates.run(&mut self.values);
     }
 
+    #[inline(always)]
     fn rate(&self, state: usize) -> T {
         self.equations.rates.result(&self.values, state)
     }
@@ -175,6 +186,7 @@ impl<T: Number> Driven<'_, T> {
 
 impl<T: Number> Driven<'_, T> {
     /// Adds what a force on a joint does to the states' derivatives: as much as it is to that of the joint's velocity.
+    #[inline(always)]
     pub(super) fn act(&mut self, number: usize, force: T, t: f64, x: &[T], rates: &mut [T]) {
         let joint = &self.equations.joints[number];
         rates[joint.velocity] += force;
@@ -203,8 +215,9 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         self.beyond[edge] = beyond;
     }
 
+    #[inline(always)]
     fn smooth(&mut self, t: f64, x: &[T], rates: &mut [T]) {
-        self.look(t, x);
+        self.look_here(t, x);
         let equations = self.equations;
         for (state, rate) in rates.iter_mut().enumerate().take(equations.states.len()) {
             *rate = self.rate(state);
@@ -235,10 +248,12 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         }
     }
 
+    #[inline(always)]
     fn push(&mut self, contact: usize, force: T, t: f64, x: &[T], rates: &mut [T]) {
         self.act(self.joint_of[contact], force, t, x, rates);
     }
 
+    #[inline(always)]
     fn resistance(&mut self, contact: usize, forward: bool, t: f64, x: &[T]) -> T {
         let k = self.joint_of[contact];
         let rests_on_load = |dry: &DryFriction<T>| dry.load_fraction != T::from(0.0);

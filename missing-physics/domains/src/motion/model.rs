@@ -412,7 +412,7 @@ impl MotionModel {
             equations,
             laws: setting.laws,
             leaks: setting.leaks,
-            looked: (f64::NAN, 0),
+            looked: (f64::NAN, usize::MAX),
             driven: equations.joints.iter().map(|joint| of_drive(joint).unwrap_or_default()).collect(),
             begun: vec![0; signals.len()],
             signals,

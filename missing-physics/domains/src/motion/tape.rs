@@ -154,8 +154,11 @@ impl Tape {
     }
 
     /// Computes all else.
+    #[inline(always)]
     pub(super) fn run<T: Number>(&self, registers: &mut [T]) {
-        self.moving.iter().for_each(|&k| self.compute(k, registers));
+        for &k in &self.moving {
+            self.compute(k, registers);
+        }
     }
 
     /// The operations that a name enters, in order.
@@ -174,7 +177,7 @@ impl Tape {
         operations.iter().for_each(|&k| self.compute(k, registers));
     }
 
-    #[inline]
+    #[inline(always)]
     fn compute<T: Number>(&self, k: usize, registers: &mut [T]) {
         let (r, rest) = registers.split_at_mut(self.names + k);
         let Some(out) = rest.first_mut() else { return };
@@ -194,6 +197,7 @@ impl Tape {
     }
 
     /// The value of an expression, once all is computed.
+    #[inline(always)]
     pub(super) fn result<T: Number>(&self, registers: &[T], expression: usize) -> T {
         match self.results[expression] {
             Place::Number(v) => T::from(v),
