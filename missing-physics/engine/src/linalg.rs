@@ -1,61 +1,92 @@
 //! Small dense helpers for normal equations.
 
 use nalgebra::{DMatrix, SymmetricEigen};
+use pulp::bytemuck::cast_slice;
+use pulp::{Arch, Simd, WithSimd};
+use std::array::from_fn;
 
 /// Dot product.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four partial sums, so that the loop vectorises and the order of additions is fixed.
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a4.zip(b4) {
-        for i in 0..4 {
-            sums[i] += x[i] * y[i];
+    struct Dot<'a>(&'a [f64], &'a [f64]);
+    impl WithSimd for Dot<'_> {
+        type Output = f64;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> f64 {
+            tile(simd, [self.0], [self.1])[0][0]
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+    Arch::new().dispatch(Dot(a, b))
 }
 
-/// [`dot`] of one column with four others, which takes it from memory once.
-fn dot_four(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
-    let n = a.len();
-    let others = others.map(|b| &b[..n]);
-    let mut sums = [[0.0; 4]; 4];
-    let whole = n - n % 4;
-    for k in (0..whole).step_by(4) {
-        for (sums, b) in sums.iter_mut().zip(&others) {
-            for i in 0..4 {
-                sums[i] += a[k + i] * b[k + i];
+/// Dot products of a few columns of one length with a few others, by the vector instructions of the processor: each number that is taken
+/// from memory serves several products. Each of them adds in the same order however many there are.
+#[inline(always)]
+fn tile<S: Simd, const A: usize, const B: usize>(
+    simd: S,
+    columns: [&[f64]; A],
+    others: [&[f64]; B],
+) -> [[f64; B]; A] {
+    let (columns, others) = (columns.map(S::as_simd_f64s), others.map(S::as_simd_f64s));
+    let length = columns.iter().chain(&others).map(|c| c.0.len()).min().unwrap_or(0);
+    let (a, b) = (columns.map(|c| &c.0[..length]), others.map(|c| &c.0[..length]));
+    let mut sums = [[simd.splat_f64s(0.0); B]; A];
+    for k in 0..length {
+        for (sums, a) in sums.iter_mut().zip(&a) {
+            for (sum, b) in sums.iter_mut().zip(&b) {
+                *sum = simd.add_f64s(*sum, simd.mul_f64s(a[k], b[k]));
             }
         }
     }
-    let mut dots = [0.0; 4];
-    for ((dot, s), b) in dots.iter_mut().zip(&sums).zip(&others) {
-        let tail: f64 = a[whole..].iter().zip(&b[whole..]).map(|(x, y)| x * y).sum();
-        *dot = (s[0] + s[1]) + (s[2] + s[3]) + tail;
-    }
+    let whole = |sum: S::f64s| -> f64 {
+        let lanes: &[f64] = cast_slice(std::slice::from_ref(&sum));
+        lanes.chunks(2).map(|pair| pair.iter().sum::<f64>()).sum()
+    };
+    let tail = |i: usize, j: usize| columns[i].1.iter().zip(others[j].1).map(|(x, y)| x * y).sum::<f64>();
+    from_fn(|i| from_fn(|j| whole(sums[i][j]) + tail(i, j)))
+}
+
+/// [`dot`] of each of several columns with each of some others, one list for each column.
+pub(crate) fn dots_of_each(columns: &[&[f64]], others: &[&[f64]]) -> Vec<Vec<f64>> {
+    let mut dots: Vec<Vec<f64>> = columns.iter().map(|_| vec![0.0; others.len()]).collect();
+    Arch::new().dispatch(DotsOfEach { columns, others, dots: &mut dots });
     dots
 }
 
-/// [`dot`] of a column with each of some others.
-pub(crate) fn dots(a: &[f64], others: &[&[f64]]) -> Vec<f64> {
-    dots_of_each(&[a], others).pop().unwrap_or_default()
+/// Dot products of many columns with many others.
+struct DotsOfEach<'a> {
+    columns: &'a [&'a [f64]],
+    others: &'a [&'a [f64]],
+    dots: &'a mut [Vec<f64>],
 }
 
-/// The same of each of several columns, one list for each: the others are taken from memory once for all of them.
-pub(crate) fn dots_of_each(columns: &[&[f64]], others: &[&[f64]]) -> Vec<Vec<f64>> {
-    let mut dots: Vec<Vec<f64>> = columns.iter().map(|_| Vec::with_capacity(others.len())).collect();
-    let fours = others.chunks_exact(4);
-    let rest = fours.remainder();
-    for four in fours {
-        for (dots, a) in dots.iter_mut().zip(columns) {
-            dots.extend(dot_four(a, [four[0], four[1], four[2], four[3]]));
+impl WithSimd for DotsOfEach<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { columns, others, dots } = self;
+        for (j, others) in others.chunks(4).enumerate() {
+            for (columns, dots) in columns.chunks(2).zip(dots.chunks_mut(2)) {
+                match (columns, others) {
+                    (&[a, b], &[c, d, e, f]) => {
+                        let [of_a, of_b] = tile(simd, [a, b], [c, d, e, f]);
+                        dots[0][4 * j..][..4].copy_from_slice(&of_a);
+                        dots[1][4 * j..][..4].copy_from_slice(&of_b);
+                    }
+                    (&[a], &[c, d, e, f]) => {
+                        dots[0][4 * j..][..4].copy_from_slice(&tile(simd, [a], [c, d, e, f])[0]);
+                    }
+                    _ => {
+                        for (dots, a) in dots.iter_mut().zip(columns) {
+                            for (dot, b) in dots[4 * j..].iter_mut().zip(others) {
+                                *dot = tile(simd, [*a], [*b])[0][0];
+                            }
+                        }
+                    }
+                }
+            }
         }
     }
-    for (dots, a) in dots.iter_mut().zip(columns) {
-        dots.extend(rest.iter().map(|b| dot(a, b)));
-    }
-    dots
 }
 
 /// Dot products of columns with each other; those that are zero all through cost nothing.
@@ -64,11 +95,14 @@ pub(crate) fn gram<C: AsRef<[f64]>>(columns: &[C]) -> DMatrix<f64> {
     let n = columns.len();
     let mut gram = DMatrix::zeros(n, n);
     let full: Vec<usize> = (0..n).filter(|&i| columns[i].iter().any(|v| *v != 0.0)).collect();
-    for (k, &i) in full.iter().enumerate() {
-        let before = &full[..=k];
-        let others: Vec<&[f64]> = before.iter().map(|&j| columns[j]).collect();
-        for (&j, dot) in before.iter().zip(dots(columns[i], &others)) {
-            (gram[(i, j)], gram[(j, i)]) = (dot, dot);
+    let acting: Vec<&[f64]> = full.iter().map(|&i| columns[i]).collect();
+    // Two rows of the lower triangle at a time.
+    for first in (0..full.len()).step_by(2) {
+        let end = (first + 2).min(full.len());
+        for (&i, dots) in full[first..end].iter().zip(dots_of_each(&acting[first..end], &acting[..end])) {
+            for (&j, dot) in full.iter().zip(dots) {
+                (gram[(i, j)], gram[(j, i)]) = (dot, dot);
+            }
         }
     }
     gram
@@ -267,6 +301,6 @@ mod tests {
         for (a, dots) in all.iter().zip(&of_each) {
             assert_eq!(*dots, all[3..].iter().map(|b| dot(a, b)).collect::<Vec<f64>>());
         }
-        assert!(of_each.len() == 3 && dots(all[0], &[]).is_empty());
+        assert!(of_each.len() == 3 && dots_of_each(&all[..1], &[])[0].is_empty());
     }
 }

@@ -3,9 +3,13 @@
 
 use crate::adequacy::linearised::{Linearised, Reading, ScoredNoise};
 use crate::adequacy::spectrum::{Lines, highest};
+use crate::linalg::dot;
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::statistics::median;
+
+/// Lags up to which neighbouring rows are compared.
+const LAGS: [usize; 2] = [8, 24];
 
 /// A test that looks for nothing in particular.
 pub(crate) struct OmnibusTest {
@@ -47,8 +51,9 @@ impl<'a> Omnibus<'a> {
             let mut test = |what: &str, law: Law, narrow: bool| {
                 tests.push(OmnibusTest { name: format!("{}: {what}", channel.name), law, narrow });
             };
-            test("neighbouring rows (8 lags)", Law::Sum, false);
-            test("neighbouring rows (24 lags)", Law::Sum, false);
+            for lags in LAGS {
+                test(&format!("neighbouring rows ({lags} lags)"), Law::Sum, false);
+            }
             test("shifts between runs", Law::Sum, false);
             test("shifts of intervals of rows", Law::Largest, false);
             test("a shift within one run", Law::Largest, true);
@@ -78,11 +83,10 @@ impl<'a> Omnibus<'a> {
         for c in 0..self.problem.channels() {
             let white = linearised.whitened(left, c, reading.noise[c]);
             let runs: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
-            let total: f64 = runs.iter().flat_map(|r| r.iter()).map(|v| v * v).sum();
+            let total: f64 = runs.iter().map(|r| dot(r, r)).sum();
             let rows: usize = runs.iter().map(|r| r.len()).sum();
-            for lags in [8, 24] {
-                statistics.push(portmanteau(&runs, total, rows, lags));
-            }
+            let of_lags = of_lags(&runs, total, rows, LAGS[1]);
+            statistics.extend(LAGS.map(|lags| of_lags[..lags].iter().sum::<f64>()));
             statistics.push(
                 runs.iter()
                     .filter(|r| !r.is_empty())
@@ -123,8 +127,8 @@ fn odd_run(left: &[Vec<Vec<f64>>], channel: usize) -> f64 {
     }
 }
 
-/// Ljung and Box 1978 (doi:10.1093/biomet/65.2.297), correlations pooled over runs.
-fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
+/// What each lag adds to Ljung and Box's statistic (1978, doi:10.1093/biomet/65.2.297), correlations pooled over runs.
+fn of_lags(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> Vec<f64> {
     let n = rows as f64;
     (1..=lags)
         .map(|lag| {
@@ -132,11 +136,10 @@ fn portmanteau(runs: &[&[f64]], total: f64, rows: usize, lags: usize) -> f64 {
             if pairs < 4 || total <= 0.0 {
                 return 0.0;
             }
-            let sum: f64 =
-                runs.iter().map(|r| r.iter().zip(r.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>()).sum();
-            n * n * (sum / total).powi(2) / pairs as f64
+            let pairs_of = |r: &&[f64]| r.get(lag..).map_or(0.0, |later| dot(&r[..later.len()], later));
+            n * n * (runs.iter().map(pairs_of).sum::<f64>() / total).powi(2) / pairs as f64
         })
-        .sum()
+        .collect()
 }
 
 /// A channel's residual under one of the noises that it may have.
@@ -180,7 +183,7 @@ fn powers_beside_noise(lines: &Lines, noises: &[UnderNoise]) -> Vec<f64> {
     let mut best = lines.nothing();
     for noise in noises {
         let runs = noise.runs();
-        let total = runs.iter().flat_map(|run| run.iter()).map(|v| v * v).sum();
+        let total = runs.iter().map(|run| dot(run, run)).sum();
         let powers = lines.powers(&runs, total);
         best.iter_mut().zip(powers).for_each(|(best, power)| *best = best.max(power - noise.behind));
     }
@@ -203,33 +206,37 @@ fn shift_in_a_run(runs: &[&[f64]]) -> f64 {
         };
         let sums: Vec<f64> = std::iter::once(0.0).chain(run.iter().map(up_to)).collect();
         let (rows, total) = (run.len(), sums[run.len()]);
-        let contrast = |from: usize, length: usize| {
-            let part = length as f64 / rows as f64;
-            let difference = sums[from + length] - sums[from] - part * total;
-            difference * difference / (length as f64 * (1.0 - part))
-        };
+        let part = |length: usize| length as f64 / rows as f64;
+        // What an interval of a length has more than its part of the whole, squared; and the variance of that.
+        let excess = |from: usize, to: usize| (sums[to] - sums[from] - part(to - from) * total).powi(2);
+        let variance = |length: usize| length as f64 * (1.0 - part(length));
         // A run may have no value of this channel.
         let step = rows.div_ceil(CHANGES).max(1);
         for from in (SHORTEST..(rows + 1).saturating_sub(SHORTEST)).step_by(step) {
-            best = best.max(contrast(from, rows - from));
+            best = best.max(excess(from, rows) / variance(rows - from));
         }
         let lengths = std::iter::successors(Some(SHORTEST), |l| Some(2 * l)).take_while(|l| 2 * l <= rows);
         for length in lengths {
-            for from in (0..=rows - length).step_by(length / 4) {
-                best = best.max(contrast(from, length));
-            }
+            // Differences of sums a length apart, at steps of a quarter of it.
+            let (usual, step) = (part(length) * total, length / 4);
+            let begins = sums[..=rows - length].iter().step_by(step);
+            let differences = sums[length..].iter().step_by(step).zip(begins).map(|(end, begin)| end - begin);
+            let largest = differences.fold(0.0, |largest: f64, difference| {
+                let excess = (difference - usual).abs();
+                if excess > largest { excess } else { largest }
+            });
+            best = best.max(largest * largest / variance(length));
         }
     }
     best
 }
 
-/// The root of the largest correlation of neighbouring rows within a stretch of a run, as [`portmanteau`] has it of all rows (a sum of fourth
+/// The root of the largest correlation of neighbouring rows within a stretch of a run, as [`of_lags`] has it of all rows (a sum of fourth
 /// powers, whose root falls off as squares do), over stretches of an
 /// eighth of the run that overlap by half; in units of the stretch's own squares, so that rows that are noisier do not count.
 fn correlated_stretch(runs: &[&[f64]]) -> f64 {
     const STRETCHES: usize = 8;
     const SHORTEST: usize = 24;
-    const LAGS: usize = 8;
     let mut best: f64 = 0.0;
     for run in runs {
         let length = run.len().div_ceil(STRETCHES).max(SHORTEST);
@@ -238,8 +245,8 @@ fn correlated_stretch(runs: &[&[f64]]) -> f64 {
         }
         for from in (0..=run.len() - length).step_by(length / 2) {
             let stretch = &run[from..from + length];
-            let squares = stretch.iter().map(|v| v * v).sum();
-            best = best.max(portmanteau(&[stretch], squares, length, LAGS));
+            let of_lags = of_lags(&[stretch], dot(stretch, stretch), length, LAGS[0]);
+            best = best.max(of_lags.iter().sum());
         }
     }
     best.sqrt()
@@ -251,10 +258,12 @@ fn scan(runs: &[&[f64]]) -> f64 {
     let mut sums = [0.0; BINS + 1];
     let mut counts = [0.0; BINS + 1];
     for run in runs {
-        for (i, v) in run.iter().enumerate() {
-            let bin = i * BINS / run.len();
-            sums[bin + 1] += v;
-            counts[bin + 1] += 1.0;
+        // The first row of a bin: row i belongs to the bin floor(i BINS / rows).
+        let first = |bin: usize| (bin * run.len()).div_ceil(BINS);
+        for bin in 0..BINS {
+            let rows = &run[first(bin)..first(bin + 1)];
+            sums[bin + 1] += rows.iter().sum::<f64>();
+            counts[bin + 1] += rows.len() as f64;
         }
     }
     for i in 0..BINS {

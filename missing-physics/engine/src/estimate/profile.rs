@@ -179,11 +179,12 @@ impl<'a> Profile<'a> {
     /// The 95 % interval, where the quadratic one of this half width, so many standard errors, misleads.
     pub(crate) fn interval(&self, half: f64, reach: f64) -> [f64; 2] {
         let most = (reach * self.wider(half / reach)).powi(2);
-        [-1.0, 1.0].map(|side| {
+        let end = |side: f64| {
             let near = self.end(side, half, most);
             let far = self.end_beyond(side, half, half / reach, most);
             far.filter(|far| (far - near) * side > 0.0).unwrap_or(near)
-        })
+        };
+        rayon::join(|| end(-1.0), || end(1.0)).into()
     }
 
     /// Where the sum of squares has risen by `most` on one side; the search begins at the distance `half`.

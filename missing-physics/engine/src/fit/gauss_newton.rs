@@ -44,6 +44,8 @@ const CREASE: f64 = 0.02;
 const CREEPING: usize = 5;
 /// ... that gain less than this together, in units of what is left of a value, end a fit: no likelihood is compared so finely.
 const CREEP: f64 = 0.5;
+/// The same of the last fit of a set that may be named: its estimates move by less than a tenth of their errors.
+const CREEP_AT_LAST: f64 = 1e-2;
 
 pub(crate) fn linearise(
     problem: &Problem<'_>,
@@ -163,12 +165,14 @@ struct End {
     hopeless_above: f64,
     /// Gain of a step that is not taken by such a model, in units of what is left of a value.
     not_worth: f64,
+    /// Gain of damped steps that ends a fit of such a model, in the same units.
+    creep: f64,
 }
 
 impl End {
     /// In so many iterations at most.
     fn after(iterations: usize) -> Self {
-        Self { iterations, hopeless_above: f64::INFINITY, not_worth: NOT_WORTH }
+        Self { iterations, hopeless_above: f64::INFINITY, not_worth: NOT_WORTH, creep: CREEP }
     }
 
     /// In as many as a fit to all data may take.
@@ -190,6 +194,18 @@ pub(crate) fn solve(
     nuisance: &[Vec<f64>],
 ) -> Result<Fit, PredictError> {
     solve_until(End::of(problem), problem, selection, noise, (shared, nuisance))
+}
+
+/// The same from where such a fit ended, as finely as an estimate is told.
+pub(crate) fn solve_at_last(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    shared: &[f64],
+    nuisance: &[Vec<f64>],
+) -> Result<Fit, PredictError> {
+    let end = End { creep: CREEP_AT_LAST, ..End::of(problem) };
+    solve_until(end, problem, selection, noise, (shared, nuisance))
 }
 
 /// The same as well as another fit needs that goes on from there.
@@ -300,7 +316,8 @@ fn descend(
             break;
         }
         let before = course.len().checked_sub(CREEPING).map(|k| course[k]);
-        if many && damping.part > 0.0 && before.is_some_and(|chi2: f64| chi2 - linear.chi2 < CREEP * left) {
+        if many && damping.part > 0.0 && before.is_some_and(|chi2: f64| chi2 - linear.chi2 < end.creep * left)
+        {
             break;
         }
         course.push(linear.chi2);

@@ -7,7 +7,8 @@
 
 use statrs::function::erf::erfc;
 
-use crate::locate::projection::{Projection, dot};
+use crate::linalg::dot;
+use crate::locate::projection::Projection;
 
 /// Rows change sides within so many standard errors of an edge.
 const REACH: f64 = 4.0;

@@ -3,8 +3,9 @@
 use nalgebra::DMatrix;
 
 use crate::fit::optimum::Fit;
+use crate::linalg::{dot, gram};
 use crate::locate::bins::{Along, Bins};
-use crate::locate::projection::{Projection, dot};
+use crate::locate::projection::Projection;
 use crate::locate::unknowns::Unknown;
 use crate::model::PredictError;
 use crate::problem::Problem;
@@ -214,9 +215,16 @@ impl Responses {
         let edges = bins.len() + 1;
         let runs = problem.rows.len();
         let mut columns: Vec<Vec<Vec<f64>>> = vec![Vec::with_capacity(POWERS * edges); runs];
-        let only = |power: usize, bin: usize| amounts(along, bins, |x| x.powi(power as i32), |_, b| b == bin);
-        let all_bins: Vec<Vec<Vec<f64>>> =
-            (0..POWERS).flat_map(|power| (0..bins.len()).map(move |bin| only(power, bin))).collect();
+        let placed = |values: &Vec<f64>| values.iter().map(|x| (bins.of(*x), bins.along(*x))).collect();
+        let rows: Vec<Vec<(usize, f64)>> = along.values.iter().map(placed).collect();
+        let only = |power: usize, bin: usize| -> Vec<Vec<f64>> {
+            let size = |&(b, x): &(usize, f64)| if b == bin { x.powi(power as i32) } else { 0.0 };
+            rows.iter().map(|run| run.iter().map(size).collect()).collect()
+        };
+        let all_bins: Vec<Vec<Vec<f64>>> = (0..POWERS)
+            .flat_map(|power| (0..bins.len()).map(move |bin| (power, bin)))
+            .map(|(power, bin)| only(power, bin))
+            .collect();
         let mut by_bin = unknown.responses(problem, fit, sigma, component, &all_bins)?.into_iter();
         drop(all_bins);
         for _ in 0..POWERS {
@@ -231,13 +239,11 @@ impl Responses {
             }
         }
         let of_run = |(run, columns): (usize, Vec<Vec<f64>>)| {
-            let rows = projection.residual[run].len();
-            let matrix = DMatrix::from_fn(rows, columns.len(), |i, j| columns[j][i]);
             let products = columns.iter().map(|c| dot(c, &projection.residual[run])).collect();
             let by_column: Vec<Vec<f64>> = columns.iter().map(|c| projection.along_shared(run, c)).collect();
             let shared = by_column.first().map_or(0, Vec::len);
             let along_shared = (0..shared).map(|d| by_column.iter().map(|c| c[d]).collect()).collect();
-            OfRun { squares: matrix.tr_mul(&matrix), products, along_shared }
+            OfRun { squares: gram(&columns), products, along_shared }
         };
         Ok(Self { bins: bins.len(), runs: columns.into_iter().enumerate().map(of_run).collect() })
     }

@@ -74,8 +74,8 @@ impl Shape {
 /// Smallest share of the variance that is white.
 const LEAST_WHITE: f64 = 1e-6;
 
-/// How many columns go through a filter side by side.
-const LANES: usize = 4;
+/// How many columns go through a filter side by side, at the most.
+const LANES: usize = 8;
 
 /// Turns noise of one shape at fixed positions into white noise of unit variance, and back.
 #[derive(Debug, Clone)]
@@ -176,13 +176,19 @@ impl Whitener {
     /// its rows waits for the one before.
     pub fn whiten_all<'c>(&self, columns: impl IntoIterator<Item = &'c mut Vec<f64>>) {
         let mut columns: Vec<&mut [f64]> = columns.into_iter().map(Vec::as_mut_slice).collect();
-        let mut groups = columns.chunks_exact_mut(LANES);
-        for group in &mut groups {
-            if let [a, b, c, d] = group {
-                self.whiten_lanes([a, b, c, d]);
+        for group in columns.chunks_mut(LANES) {
+            match group {
+                [a] => self.whiten_lanes([a]),
+                [a, b] => self.whiten_lanes([a, b]),
+                [a, b, c] => self.whiten_lanes([a, b, c]),
+                [a, b, c, d] => self.whiten_lanes([a, b, c, d]),
+                [a, b, c, d, e] => self.whiten_lanes([a, b, c, d, e]),
+                [a, b, c, d, e, f] => self.whiten_lanes([a, b, c, d, e, f]),
+                [a, b, c, d, e, f, g] => self.whiten_lanes([a, b, c, d, e, f, g]),
+                [a, b, c, d, e, f, g, h] => self.whiten_lanes([a, b, c, d, e, f, g, h]),
+                _ => {}
             }
         }
-        groups.into_remainder().iter_mut().for_each(|column| self.whiten(column));
     }
 
     fn whiten_lanes<const L: usize>(&self, columns: [&mut [f64]; L]) {

@@ -1,7 +1,7 @@
 //! A set of mechanisms, fitted from several starts.
 
 use crate::fit::alternate::{fit, fit_from};
-use crate::fit::gauss_newton::{solve_roughly, solve_within};
+use crate::fit::gauss_newton::{solve_at_last, solve_roughly, solve_within};
 use crate::fit::optimum::Fit;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
@@ -56,6 +56,18 @@ pub(crate) fn candidate(
     let (mut evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
     evidence += log_prior(problem, rule, &fit);
     Ok(Candidate { set: set.to_vec(), selection, fit, alternative_modes, evidence, ruled_out })
+}
+
+/// Takes the fit of a model that knows many mechanisms to its end, which no choice among sets has asked for.
+pub(crate) fn finish(problem: &Problem<'_>, rule: &NoiseRule, candidate: &mut Candidate) {
+    let Candidate { set, selection, fit, .. } = &*candidate;
+    if !problem.knows_many() {
+        return;
+    }
+    let Ok(fit) = solve_at_last(problem, selection, &fit.noise, &fit.shared, &fit.nuisance) else { return };
+    let (worth, ruled_out) = evidence(problem, set, &[], selection, &fit);
+    candidate.evidence = worth + log_prior(problem, rule, &fit);
+    (candidate.fit, candidate.ruled_out) = (fit, ruled_out);
 }
 
 /// A fit with everything off that a set has not.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::adequacy::linearised::curves::Curves;
 use crate::diagnosis::NEARLY_ALL;
-use crate::fit::gauss_newton::solve;
+use crate::fit::gauss_newton::solve_roughly;
 use crate::fit::optimum::{Fit, covariance};
 use crate::leftover::fit::{given, with_leftover};
 use crate::leftover::process::Process;
@@ -103,7 +103,7 @@ impl<'a> Judge<'a> {
         let rows = rough.all_rows(problem);
         let least_squares = |c: &Candidate| -> Option<LeastSquares> {
             (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
-            let fit = solve(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
+            let fit = solve_roughly(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
             let seen = (fit.chi2 - rows).max(0.0);
             Some(LeastSquares { fit, seen, unseen: OnceLock::new() })
         };

@@ -9,7 +9,7 @@ use crate::fit::prediction::residuals;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
-use crate::selection::candidate::{Candidate, Guess, HEAT, candidate, without_more};
+use crate::selection::candidate::{Candidate, Guess, HEAT, candidate, finish, without_more};
 use crate::selection::screening::Screening;
 use crate::statistics::median;
 
@@ -242,6 +242,7 @@ fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
                 _ => break,
             }
         }
+        finish(problem, rule, c);
     });
 }
 

@@ -202,9 +202,7 @@ impl<'a> Linearised<'a> {
         let curves = Curves::new(problem, fit)?;
         alternatives.extend(smooth(problem, &curves, layout.base()));
         alternatives.extend(ordered(problem, layout.ordered(&curves)));
-        let blocks: Vec<Vec<Block>> = (0..problem.rows.len())
-            .map(|run| blocks(problem, fit, &layout, &curves, run))
-            .collect::<Result<_, _>>()?;
+        let blocks = problem.by_run(|run| blocks(problem, fit, &layout, &curves, run))?;
         let Layout { n_nuisance, n_shared, .. } = layout;
         let counted: usize = (0..problem.channels()).map(|c| problem.count(c)).sum();
         let freedom = (0..problem.channels())

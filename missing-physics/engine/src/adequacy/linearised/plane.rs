@@ -1,5 +1,7 @@
 //! The linearised model as a value: blocks of columns, and what is made of them for each shape of noise.
 
+use rayon::prelude::*;
+
 use super::block::{Block, Product};
 use super::pooled::{Pooled, PooledProduct};
 use crate::noise::rule::NoiseRule;
@@ -75,13 +77,16 @@ impl Linearised<'_> {
     pub(crate) fn play(&mut self, shapes: &[usize]) {
         self.in_play = shapes.to_vec();
         let problem = self.problem;
-        for (run, row) in self.blocks.iter_mut().enumerate() {
+        self.blocks.par_iter_mut().enumerate().for_each(|(run, row)| {
             for (channel, block) in row.iter_mut().enumerate() {
                 let whitened = |&shape: &usize| block.whitened(problem.whitener(run, channel, shape));
                 block.shapes = shapes.iter().map(whitened).collect();
             }
-        }
-        let pooled = |channel| (0..shapes.len()).map(|k| Pooled::new(&self.blocks, channel, k)).collect();
+        });
+        let pooled = |channel| {
+            let of_shape = |shape: usize| Pooled::new(&self.blocks, channel, shape);
+            (0..shapes.len()).into_par_iter().map(of_shape).collect()
+        };
         self.pooled = (0..problem.channels()).map(pooled).collect();
     }
 

@@ -50,12 +50,9 @@ impl Linearised<'_> {
             for (channel, block) in row.iter().enumerate() {
                 for (whitened, &shape) in block.shapes.iter().zip(&self.in_play) {
                     let whitener = self.problem.whitener(run, channel, shape);
-                    let white = |data: &&[Vec<Vec<f64>>]| {
-                        let mut y = data[run][channel].clone();
-                        whitener.whiten(&mut y);
-                        y
-                    };
-                    let white: Vec<Vec<f64>> = data.iter().map(white).collect();
+                    let mut white: Vec<Vec<f64>> =
+                        data.iter().map(|data| data[run][channel].clone()).collect();
+                    whitener.whiten_all(&mut white);
                     let with = whitened.products(&white);
                     for ((values, y), with) in values.iter_mut().zip(&white).zip(with) {
                         let mut nuisance: Vec<f64> = block.mine.iter().map(|&i| with[i]).collect();
