@@ -6,11 +6,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::fit::optimum::Fit;
-use crate::linalg::dot;
 use crate::locate::bins::{Along, Bins};
 use crate::locate::intervals::{Best, Found, Scan};
 use crate::locate::membership::{Members, Rows};
-use crate::locate::projection::Projection;
+use crate::locate::projection::{Projection, dot};
 use crate::locate::responses::{Asked, Column, Responses};
 use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;

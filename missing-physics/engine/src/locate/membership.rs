@@ -7,8 +7,7 @@
 
 use statrs::function::erf::erfc;
 
-use crate::linalg::dot;
-use crate::locate::projection::Projection;
+use crate::locate::projection::{Projection, dot};
 
 /// Rows change sides within so many standard errors of an edge.
 const REACH: f64 = 4.0;

@@ -1,7 +1,5 @@
 //! What the baseline's parameters cannot take away.
 
-use crate::linalg::dot;
-
 /// The baseline's columns made orthonormal: those of each run's nuisance parameters by themselves, those of shared parameters over all
 /// runs; and what is left of the residual beside them.
 #[derive(Clone)]
@@ -80,6 +78,10 @@ impl Projection {
         self.residual = self.rest(residual);
         before * before - norm(&self.residual).powi(2)
     }
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn add(to: &mut [f64], what: &[f64], times: f64) {

@@ -3,9 +3,8 @@
 use nalgebra::DMatrix;
 
 use crate::fit::optimum::Fit;
-use crate::linalg::{dot, gram};
 use crate::locate::bins::{Along, Bins};
-use crate::locate::projection::Projection;
+use crate::locate::projection::{Projection, dot};
 use crate::locate::unknowns::Unknown;
 use crate::model::PredictError;
 use crate::problem::Problem;
@@ -239,11 +238,13 @@ impl Responses {
             }
         }
         let of_run = |(run, columns): (usize, Vec<Vec<f64>>)| {
+            let rows = projection.residual[run].len();
+            let matrix = DMatrix::from_fn(rows, columns.len(), |i, j| columns[j][i]);
             let products = columns.iter().map(|c| dot(c, &projection.residual[run])).collect();
             let by_column: Vec<Vec<f64>> = columns.iter().map(|c| projection.along_shared(run, c)).collect();
             let shared = by_column.first().map_or(0, Vec::len);
             let along_shared = (0..shared).map(|d| by_column.iter().map(|c| c[d]).collect()).collect();
-            OfRun { squares: gram(&columns), products, along_shared }
+            OfRun { squares: matrix.tr_mul(&matrix), products, along_shared }
         };
         Ok(Self { bins: bins.len(), runs: columns.into_iter().enumerate().map(of_run).collect() })
     }

@@ -1,9 +1,8 @@
 //! Where an unknown acts at a few single rows (the impacts that went unheard), each by an amount of its own.
 
 use crate::fit::optimum::Fit;
-use crate::linalg::dot;
 use crate::locate::cause::{SIMPLER, gains};
-use crate::locate::projection::Projection;
+use crate::locate::projection::{Projection, dot};
 use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
 use crate::problem::Problem;
