@@ -1,7 +1,7 @@
 //! Intervals by profile likelihood.
 
 use crate::estimate::reach::{END, Z95};
-use crate::fit::gauss_newton::{linearise, solve, solve_below, sum_of_squares};
+use crate::fit::gauss_newton::{End, linearise, solve, solve_until, sum_of_squares};
 use crate::fit::optimum::{Fit, covariance};
 use crate::fit::step::{NormalEquations, Step};
 use crate::problem::{Problem, Selection};
@@ -116,7 +116,14 @@ impl<'a> Profile<'a> {
             return None;
         }
         let start = (&self.moved(value)[..], &self.fit.nuisance[..]);
-        let near = solve_below(most, self.problem, &self.others, &self.fit.noise, start).ok();
+        let near = solve_until(
+            End::of(self.problem).below(most),
+            self.problem,
+            &self.others,
+            &self.fit.noise,
+            start,
+        )
+        .ok();
         let near = near.filter(|f| f.chi2 < most)?;
         if foreseen.is_some_and(|(_, rise)| self.is_as_foreseen(near.chi2, rise)) {
             return None;

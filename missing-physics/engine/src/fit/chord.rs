@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use crate::fit::columns::{add_nuisance_prior, whitened_columns};
-use crate::fit::gauss_newton::{NOT_WORTH_ROUGHLY, solve_again};
+use crate::fit::gauss_newton::{End, NOT_WORTH_ROUGHLY, solve_until};
 use crate::fit::optimum::Fit;
 use crate::fit::step::{NormalEquations, Step};
 use crate::linalg::gram;
@@ -57,7 +57,7 @@ impl<'a> Chords<'a> {
         if settled {
             return Ok(from);
         }
-        let fit = solve_again(part, selection, self.noise, &from.0, &from.1)?;
+        let fit = solve_until(End::again(part), part, selection, self.noise, (&from.0, &from.1))?;
         Ok((fit.shared, fit.nuisance))
     }
 
@@ -69,7 +69,7 @@ impl<'a> Chords<'a> {
         from: Point,
     ) -> Result<Fit, PredictError> {
         let (from, _) = self.along((part, runs), selection, from)?;
-        solve_again(part, selection, self.noise, &from.0, &from.1)
+        solve_until(End::again(part), part, selection, self.noise, (&from.0, &from.1))
     }
 
     /// Where steps along the derivatives lead, and whether they settle there; nowhere without derivatives.

@@ -159,7 +159,7 @@ impl Damping {
 
 /// When a fit ends.
 #[derive(Clone, Copy)]
-struct End {
+pub(crate) struct End {
     iterations: usize,
     /// Where the sum of squares will hardly get below this, the fit is given up; by a model that knows many mechanisms.
     hopeless_above: f64,
@@ -171,17 +171,33 @@ struct End {
 
 impl End {
     /// In so many iterations at most.
-    fn after(iterations: usize) -> Self {
+    pub(crate) fn after(iterations: usize) -> Self {
         Self { iterations, hopeless_above: f64::INFINITY, not_worth: NOT_WORTH, creep: CREEP }
     }
 
     /// In as many as a fit to all data may take.
-    fn of(problem: &Problem<'_>) -> Self {
+    pub(crate) fn of(problem: &Problem<'_>) -> Self {
         Self::after(if problem.knows_many() { ITERATIONS_OF_MANY } else { MAX_ITERATIONS })
     }
 
-    fn roughly(self) -> Self {
+    /// Of a fit to a part of the data, from where one to all of them ended.
+    pub(crate) fn again(problem: &Problem<'_>) -> Self {
+        Self::after(if problem.knows_many() { ITERATIONS_AGAIN } else { MAX_ITERATIONS }).roughly()
+    }
+
+    /// As well as another fit needs that goes on from there.
+    pub(crate) fn roughly(self) -> Self {
         Self { not_worth: NOT_WORTH_ROUGHLY, ..self }
+    }
+
+    /// As finely as an estimate is reported.
+    pub(crate) fn finely(self) -> Self {
+        Self { creep: CREEP_AT_LAST, ..self }
+    }
+
+    /// Given up where the sum of squares will hardly get below `most`.
+    pub(crate) fn below(self, most: f64) -> Self {
+        Self { hopeless_above: most, ..self }
     }
 }
 
@@ -196,80 +212,8 @@ pub(crate) fn solve(
     solve_until(End::of(problem), problem, selection, noise, (shared, nuisance))
 }
 
-/// The same from where such a fit ended, as finely as an estimate is told.
-pub(crate) fn solve_at_last(
-    problem: &Problem<'_>,
-    selection: &Selection,
-    noise: &NoiseState,
-    shared: &[f64],
-    nuisance: &[Vec<f64>],
-) -> Result<Fit, PredictError> {
-    let end = End { creep: CREEP_AT_LAST, ..End::of(problem) };
-    solve_until(end, problem, selection, noise, (shared, nuisance))
-}
-
-/// The same as well as another fit needs that goes on from there.
-pub(crate) fn solve_roughly(
-    problem: &Problem<'_>,
-    selection: &Selection,
-    noise: &NoiseState,
-    shared: &[f64],
-    nuisance: &[Vec<f64>],
-) -> Result<Fit, PredictError> {
-    solve_until(End::of(problem).roughly(), problem, selection, noise, (shared, nuisance))
-}
-
-/// The same to a part of the data, from where a fit to all of them ends.
-pub(crate) fn solve_again(
-    problem: &Problem<'_>,
-    selection: &Selection,
-    noise: &NoiseState,
-    shared: &[f64],
-    nuisance: &[Vec<f64>],
-) -> Result<Fit, PredictError> {
-    let most = if problem.knows_many() { ITERATIONS_AGAIN } else { MAX_ITERATIONS };
-    solve_until(End::after(most).roughly(), problem, selection, noise, (shared, nuisance))
-}
-
-/// The same in at most so many iterations.
-pub(crate) fn solve_within(
-    iterations: usize,
-    problem: &Problem<'_>,
-    selection: &Selection,
-    noise: &NoiseState,
-    start: (&[f64], &[Vec<f64>]),
-) -> Result<Fit, PredictError> {
-    solve_until(End::after(iterations), problem, selection, noise, start)
-}
-
-/// The same roughly, where the normal equations at the start are known.
-pub(crate) fn solve_from(
-    iterations: usize,
-    problem: &Problem<'_>,
-    selection: &Selection,
-    noise: &NoiseState,
-    start: (&[f64], &[Vec<f64>]),
-    linear: NormalEquations,
-) -> Fit {
-    descend(End::after(iterations).roughly(), problem, selection, noise, start, linear)
-}
-
-/// The same, given up where the sum of squares will hardly get below `most`, by a model that knows many mechanisms.
-pub(crate) fn solve_below(
-    most: f64,
-    problem: &Problem<'_>,
-    selection: &Selection,
-    noise: &NoiseState,
-    start: (&[f64], &[Vec<f64>]),
-) -> Result<Fit, PredictError> {
-    let mut end = End::of(problem);
-    if problem.knows_many() {
-        end.hopeless_above = most;
-    }
-    solve_until(end, problem, selection, noise, start)
-}
-
-fn solve_until(
+/// The same to another end.
+pub(crate) fn solve_until(
     end: End,
     problem: &Problem<'_>,
     selection: &Selection,
@@ -280,7 +224,8 @@ fn solve_until(
     Ok(descend(end, problem, selection, noise, start, linear))
 }
 
-fn descend(
+/// The same, where the normal equations at the start are known.
+pub(crate) fn descend(
     end: End,
     problem: &Problem<'_>,
     selection: &Selection,
@@ -312,7 +257,7 @@ fn descend(
             converged = true;
             break;
         }
-        if iteration > 0 && linear.chi2 - HOPE * predicted > end.hopeless_above {
+        if many && iteration > 0 && linear.chi2 - HOPE * predicted > end.hopeless_above {
             break;
         }
         let before = course.len().checked_sub(CREEPING).map(|k| course[k]);

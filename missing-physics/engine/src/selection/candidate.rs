@@ -1,7 +1,7 @@
 //! A set of mechanisms, fitted from several starts.
 
 use crate::fit::alternate::{fit, fit_from};
-use crate::fit::gauss_newton::{solve_at_last, solve_roughly, solve_within};
+use crate::fit::gauss_newton::{End, solve_until};
 use crate::fit::optimum::Fit;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
@@ -45,7 +45,11 @@ pub(crate) fn candidate(
 ) -> Result<Candidate, PredictError> {
     let selection = problem.select(set, terms);
     let integers = problem.integer_slots(set);
-    let near = without_others(problem, &selection, &integers, near);
+    let mut near = without_others(problem, &selection, &integers, near);
+    if problem.knows_many() {
+        // What a neighbour leaves looks like correlated noise, and that makes of each row at which a joint may come to rest a minimum.
+        near.noise.shape.fill(0);
+    }
     let starts = starts(problem, &selection, &integers, &near, guesses);
     let mut fits = fits(problem, rule, &selection, &integers, &near, &starts)?;
     let likelihood = |fit: &Fit| likelihood(problem, rule, fit);
@@ -53,9 +57,20 @@ pub(crate) fn candidate(
     let mut alternative_modes = fits.split_off(1);
     let fit = fits.remove(0);
     alternative_modes.retain(|other| likelihood(other) > likelihood(&fit) - OPEN);
-    let (mut evidence, ruled_out) = evidence(problem, set, terms, &selection, &fit);
-    evidence += log_prior(problem, rule, &fit);
+    let (evidence, ruled_out) = worth(problem, rule, (set, terms), &selection, &fit);
     Ok(Candidate { set: set.to_vec(), selection, fit, alternative_modes, evidence, ruled_out })
+}
+
+/// The log evidence of a fitted set with the prior weight of its noise, and why it is no explanation, if it is none.
+fn worth(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    (set, terms): (&[usize], &[usize]),
+    selection: &Selection,
+    fit: &Fit,
+) -> (f64, Option<String>) {
+    let (evidence, ruled_out) = evidence(problem, set, terms, selection, fit);
+    (evidence + log_prior(problem, rule, fit), ruled_out)
 }
 
 /// Takes the fit of a model that knows many mechanisms to its end, which no choice among sets has asked for.
@@ -64,10 +79,10 @@ pub(crate) fn finish(problem: &Problem<'_>, rule: &NoiseRule, candidate: &mut Ca
     if !problem.knows_many() {
         return;
     }
-    let Ok(fit) = solve_at_last(problem, selection, &fit.noise, &fit.shared, &fit.nuisance) else { return };
-    let (worth, ruled_out) = evidence(problem, set, &[], selection, &fit);
-    candidate.evidence = worth + log_prior(problem, rule, &fit);
-    (candidate.fit, candidate.ruled_out) = (fit, ruled_out);
+    let (start, end) = ((&fit.shared[..], &fit.nuisance[..]), End::of(problem).finely());
+    let Ok(fit) = solve_until(end, problem, selection, &fit.noise, start) else { return };
+    (candidate.evidence, candidate.ruled_out) = worth(problem, rule, (set, &[]), selection, &fit);
+    candidate.fit = fit;
 }
 
 /// A fit with everything off that a set has not.
@@ -138,7 +153,7 @@ fn fits(
     let begun = begun(problem, selection, integers, near, starts);
     for (start, nuisance) in &begun {
         let numbers: Vec<f64> = integers.iter().map(|&slot| start[slot]).collect();
-        match solve_roughly(problem, selection, &near.noise, start, nuisance) {
+        match solve_until(End::of(problem).roughly(), problem, selection, &near.noise, (start, nuisance)) {
             Ok(fit) => match best_of.iter_mut().find(|(n, _)| *n == numbers) {
                 Some((_, best)) if fit.chi2 < best.chi2 - 1e-9 => *best = fit,
                 Some(_) => {}
@@ -190,7 +205,7 @@ fn begun(
             continue;
         }
         let some = |start: &&Vec<f64>| {
-            solve_within(HEAT, problem, selection, &near.noise, (start, &near.nuisance)).ok()
+            solve_until(End::after(HEAT), problem, selection, &near.noise, (start, &near.nuisance)).ok()
         };
         let mut fits: Vec<Fit> = alike.iter().filter_map(some).collect();
         if fits.is_empty() {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::adequacy::linearised::curves::Curves;
 use crate::diagnosis::NEARLY_ALL;
-use crate::fit::gauss_newton::solve_roughly;
+use crate::fit::gauss_newton::{End, solve_until};
 use crate::fit::optimum::{Fit, covariance};
 use crate::leftover::fit::{given, with_leftover};
 use crate::leftover::process::Process;
@@ -103,7 +103,8 @@ impl<'a> Judge<'a> {
         let rows = rough.all_rows(problem);
         let least_squares = |c: &Candidate| -> Option<LeastSquares> {
             (c.evidence.is_finite() && (c.set.is_empty() || wanted(c))).then_some(())?;
-            let fit = solve_roughly(problem, &c.selection, &white, &c.fit.shared, &c.fit.nuisance).ok()?;
+            let start = (&c.fit.shared[..], &c.fit.nuisance[..]);
+            let fit = solve_until(End::of(problem).roughly(), problem, &c.selection, &white, start).ok()?;
             let seen = (fit.chi2 - rows).max(0.0);
             Some(LeastSquares { fit, seen, unseen: OnceLock::new() })
         };

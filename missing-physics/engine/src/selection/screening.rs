@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::fit::gauss_newton::{linearise, solve_from};
+use crate::fit::gauss_newton::{End, descend, linearise};
 use crate::fit::step::{NormalEquations, Step};
 use crate::model::Scope;
 use crate::problem::Problem;
@@ -150,7 +150,7 @@ fn follow(
     let mut shared = parent.fit.shared.clone();
     start.iter().for_each(|&(slot, value)| shared[slot] = value);
     let at = (&shared[..], &parent.fit.nuisance[..]);
-    let fit = solve_from(STEPS, problem, &selection, &parent.fit.noise, at, linear);
+    let fit = descend(End::after(STEPS).roughly(), problem, &selection, &parent.fit.noise, at, linear);
     let of = &problem.spec().mechanisms[mechanism];
     let shared = |p: &&usize| problem.spec().parameters[**p].scope == Scope::Shared;
     let slots = of.parameters.iter().chain(&of.companions).filter(shared).map(|&p| problem.slots[p]);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::data::Run;
 use crate::estimate::profile::better_top;
-use crate::fit::gauss_newton::{linearise, solve_within};
+use crate::fit::gauss_newton::{End, linearise, solve_until};
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
@@ -209,7 +209,8 @@ fn from_larger(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
             let (selection, noise) = (&part_of.selection, &whole.fit.noise);
             let begins = without_more(problem, &part_of.set, &whole.fit);
             let some =
-                solve_within(HEAT, problem, selection, noise, (&begins.shared, &begins.nuisance)).ok()?;
+                solve_until(End::after(HEAT), problem, selection, noise, (&begins.shared, &begins.nuisance))
+                    .ok()?;
             let stuck = linearise(problem, selection, noise, &part_of.fit.shared, &part_of.fit.nuisance);
             stuck.is_ok_and(|stuck| some.chi2 < stuck.chi2).then_some(())?;
             let found = candidate(problem, rule, &part_of.set, &[], &some, &[vec![]]).ok()?;

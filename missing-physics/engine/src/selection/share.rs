@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::fit::chord::Chords;
-use crate::fit::gauss_newton::solve_again;
+use crate::fit::gauss_newton::{End, solve_until};
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals_at;
 use crate::model::PredictError;
@@ -74,7 +74,8 @@ pub(crate) fn unseen_misfit(
             }
             problem.with(recording)
         };
-        let trained = solve_again(&without(true), selection, white, &fit.shared, &fit.nuisance)?;
+        let (others, start) = (without(true), (&fit.shared[..], &fit.nuisance[..]));
+        let trained = solve_until(End::again(problem), &others, selection, white, start)?;
         Ok(miss(residuals_at(&without(false), &trained.shared, &trained.nuisance)?))
     };
     let chords = (runs > 1).then(|| Chords::new(problem, selection, white, fit)).transpose()?;
