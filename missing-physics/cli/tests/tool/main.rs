@@ -1,5 +1,6 @@
 //! The tool, as a program that is run: one program of tests, linked once.
 
+mod astray;
 mod bad_recordings;
 mod browser;
 mod chromium;
@@ -19,5 +20,4 @@ mod recorded;
 mod repair;
 mod report;
 mod templates;
-mod turning_over;
 mod watch;

@@ -2,11 +2,11 @@
 
 use joint_laws::integrate::Method;
 use missing_physics::data::{Recording, Run};
-use missing_physics::fit::least_squares;
+use missing_physics::fit::reweighted_least_squares;
 use missing_physics::model::Model as _;
 use missing_physics::noise::rough_sigma;
 
-use super::growth::{lost, missed, too_long};
+use super::growth::{lost, missed, strays, too_long};
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range, rms};
 use super::windows::{cut, rows};
@@ -185,12 +185,16 @@ pub(super) struct Longest {
 
 /// Fits the equations in short windows, then in longer ones: a fit over a whole run from far off would lose the phase and settle in a
 /// wrong place. The second are the longest windows that can be followed, where whole runs cannot.
+///
+/// What is left out may lead a fit to short windows to parameters of a motion that runs away (a stop pushes back like a spring that is
+/// negative): where the parameters that the recording states do not, the fit to longer windows begins at these.
 pub(super) fn windows(
     model: &MotionModel,
     recording: &Recording,
     mut shared: Vec<f64>,
 ) -> Result<(Vec<f64>, Option<Longest>), String> {
     let free = model.freed();
+    let stated = shared.clone();
     let longest = recording.runs.iter().map(Run::len).max().unwrap_or(0);
     // What cannot be followed to its end is cut in two at least.
     let shorter =
@@ -201,9 +205,15 @@ pub(super) fn windows(
     loop {
         let whole = length >= longest;
         if length > FIRST_WINDOW {
-            let sizes = sizes(&free, &cut(recording, followed), &shared)?;
-            if too_long(&free, recording, &shared, &sizes.states, length.min(longest)) {
-                return Ok((shared, shorter(followed, GROWS)));
+            let grows = |shared: &[f64]| -> Result<bool, String> {
+                let sizes = sizes(&free, &cut(recording, followed), shared)?;
+                Ok(too_long(&free, recording, shared, &sizes.states, length.min(longest)))
+            };
+            if grows(&shared)? {
+                if grows(&stated)? {
+                    return Ok((shared, shorter(followed, GROWS)));
+                }
+                shared.clone_from(&stated);
             }
         }
         let mut windowed = if whole { recording.clone() } else { cut(recording, length) };
@@ -215,12 +225,20 @@ pub(super) fn windows(
             windowed.runs = (0..most).map(|k| windowed.runs[(k as f64 * every) as usize].clone()).collect();
         }
         let model = if whole { model } else { &free };
-        if let Ok(fit) = least_squares(model, &windowed, &shared) {
-            let missed = missed(model, recording, &windowed, &fit);
+        let fit_from = |shared: &[f64]| {
+            let fit = reweighted_least_squares(model, &windowed, shared).ok()?;
+            Some((missed(model, recording, &windowed, &fit), fit.shared))
+        };
+        let mut fit = fit_from(&shared);
+        if fit.as_ref().is_none_or(|(missed, _)| strays(*missed)) {
+            let other = fit_from(&stated);
+            fit = [fit, other].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        if let Some((missed, fitted)) = fit {
             if lost(missed, missed_before) {
                 return Ok((shared, shorter(followed, STRAYS)));
             }
-            (shared, missed_before) = (fit.shared, missed);
+            (shared, missed_before) = (fitted, missed);
         }
         followed = length;
         if whole {

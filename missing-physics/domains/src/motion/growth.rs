@@ -47,9 +47,14 @@ pub(super) fn missed(
     parts.fold(0.0, f64::max)
 }
 
+/// Whether a fit that misses by so much may have settled on another motion.
+pub(super) fn strays(missed: f64) -> bool {
+    missed > LOST
+}
+
 /// Whether a fit has lost the motion on the way through windows by which it misses so much, and windows half as long by so much.
 pub(super) fn lost(missed: f64, half: f64) -> bool {
-    missed > LOST && missed > FASTER * half
+    strays(missed) && missed > FASTER * half
 }
 
 /// Whether windows of a number of rows are too long: a deviation of their start grows beyond what can be followed. `free` is the model

@@ -8,6 +8,7 @@ mod follow;
 mod growth;
 mod held;
 mod knots;
+mod late;
 mod local;
 mod machine;
 mod model;

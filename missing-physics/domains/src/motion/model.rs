@@ -10,6 +10,7 @@ use missing_physics::model::{
 
 use super::effects::{Effects, Role};
 use super::equations::{Equations, Joint, Start};
+use super::late::{before_run, readings};
 use super::machine::{Driven, Force};
 use super::scales::Scales;
 use super::setting::{Setting, Shared};
@@ -30,6 +31,9 @@ const FINEST_FOR_LAWS: f64 = 0.125;
 /// An end stop is stiffer by this factor than what it takes to bring the joint to its largest position with its typical acceleration: what
 /// yields more is a spring.
 const STIFFER: f64 = 3.0;
+
+/// Rows before a window whose commands may still be on their way at its beginning.
+const BEFORE: usize = 40;
 
 /// Derivatives that a number carries at the most; of more parameters eight at a time.
 const MOST_DERIVATIVES: usize = 12;
@@ -83,7 +87,14 @@ pub struct MotionModel {
 #[derive(Debug, Clone)]
 struct Whole {
     label: String,
-    begin_s: f64,
+    /// Times, and what each input is then.
+    inputs: Vec<Vec<f64>>,
+}
+
+impl Whole {
+    fn begin_s(&self) -> Option<f64> {
+        self.inputs[0].first().copied()
+    }
 }
 
 /// States and their derivatives along a run.
@@ -141,10 +152,7 @@ impl MotionModel {
             equations.parameters.iter().map(|p| slot(p.per_run && !p.known && cut.is_none())).collect();
         let free_states =
             equations.states.iter().map(|s| slot(cut.is_some() || s.start == Start::Free)).collect();
-        let whole = |run: &Run| Whole {
-            label: run.label.clone(),
-            begin_s: run.inputs[0].first().copied().unwrap_or(0.0),
-        };
+        let whole = |run: &Run| Whole { label: run.label.clone(), inputs: run.inputs.clone() };
         let cut = cut.map(|runs| runs.iter().map(whole).collect());
         Self { equations, spec, roles, off, per_run, free_states, pace, scales, cut }
     }
@@ -238,7 +246,7 @@ impl MotionModel {
         let mut setting = self.setting(run, shared, nuisance, &[]);
         // A row is where the machine is then, whatever its sensors are late by.
         setting.delays.fill(None);
-        self.follow(run, setting, nuisance, |machine, reading, x| at_row(machine, reading.t_s, x))
+        self.follow(run, setting, nuisance, |machine, reading, x, _| at_row(machine, reading.t_s, x))
     }
 
     /// A typical size of each state.
@@ -311,13 +319,14 @@ impl MotionModel {
     }
 
     /// Leads a machine through a run; `at_row` is called wherever a row is read: of all outputs without a delay (shift 0), or of one
-    /// output (its number is one less than the shift). How many evaluations of the equations that took.
+    /// output (its number is one less than the shift). Of a reading that is older than the run it gets the states along the tangent of the
+    /// motion and those at the run's beginning. How many evaluations of the equations that took.
     fn follow<T: Number>(
         &self,
         run: &Run,
         setting: Setting<T>,
         nuisance: &[T],
-        mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading, &[T]),
+        mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading, &[T], Option<&[T]>),
     ) -> Result<usize, String> {
         let times = &run.inputs[0];
         let Some(&begin) = times.first() else { return Ok(0) };
@@ -334,14 +343,14 @@ impl MotionModel {
         };
         let mut t = begin;
         integrator.settle(&mut machine, t, &mut x);
-        // Readings that are older than the run: along the tangent.
         let mut next = 0;
         while let Some(read) = reads.get(next).filter(|r| r.t_s < begin) {
             let away = shifts[read.shift] + (read.t_s - begin);
             let early = integrator.along_tangent(&mut machine, t, &x, away);
-            at_row(&mut machine, read, early);
+            at_row(&mut machine, read, early, Some(&x));
             next += 1;
         }
+        let mut at_row = |machine: &mut _, read: &Reading, x: &[T]| at_row(machine, read, x, None);
         // A row is read under its own commands; where jumps may move, what jumps a moment later has not acted yet.
         for change in breaks.iter().map(Some).chain([None]) {
             let until = change.map_or_else(|| reads.last().map_or(begin, |r| r.t_s), |b| b.t.re());
@@ -394,8 +403,12 @@ impl MotionModel {
                 {
                     *follower = x[joint.position];
                 }
-                let between = equations.inputs[k].between;
-                Signal::new(&run.inputs[0], &run.inputs[1 + k], between, &drive, shortest_s)
+                // Play begins where the joint stands at the run's beginning; what is late or slow still has what was before that.
+                let [times, commands] = match drive.play {
+                    Some(_) => [&run.inputs[0][..], &run.inputs[1 + k]],
+                    None => self.commands(run, k),
+                };
+                Signal::new(times, commands, equations.inputs[k].between, &drive, shortest_s)
             })
             .collect();
         let joint_of: Vec<usize> =
@@ -429,12 +442,25 @@ impl MotionModel {
         }
     }
 
+    /// Times, and what an input is then: of a window with some rows before its beginning.
+    fn commands<'a>(&'a self, run: &'a Run, input: usize) -> [&'a [f64]; 2] {
+        let whole = self.cut.as_ref().filter(|_| windows::continues(run));
+        let columns =
+            whole.and_then(|runs| runs.get(windows::of_run(run))).map_or(&run.inputs, |w| &w.inputs);
+        let (Some(first), Some(last)) = (run.inputs[0].first(), run.inputs[0].last()) else {
+            return [&run.inputs[0], &run.inputs[1 + input]];
+        };
+        let from = columns[0].partition_point(|t| t < first).saturating_sub(BEFORE);
+        let to = columns[0].partition_point(|t| t <= last);
+        [&columns[0][from..to], &columns[1 + input][from..to]]
+    }
+
     /// Where pieces of inputs begin behind a run's start, in order; what holds from the start on has begun.
     fn breaks<T: Number>(&self, machine: &mut Driven<'_, T>, begin: f64, delayed: bool) -> Vec<Break<T>> {
         let mut breaks = Vec::new();
         for (input, signal) in machine.signals.iter().enumerate() {
             for t in signal.begins() {
-                if t.re() <= begin && !delayed {
+                if t.re() < begin || t.re() <= begin && !delayed {
                     machine.begun[input] += 1;
                 } else {
                     breaks.push(Break { t, input });
@@ -460,14 +486,26 @@ impl MotionModel {
         let setting = self.setting(run, shared, nuisance, moving);
         let sensors = setting.sensors.clone();
         let delayed: Vec<bool> = setting.delays.iter().map(Option::is_some).collect();
-        self.follow(run, setting, nuisance, |machine, reading, x| {
+        let delays: Vec<f64> = setting.delays.iter().map(|d| d.map_or(0.0, |delay| delay.re())).collect();
+        // Readings of each output that are older than the run, as if the machine had stood still before it: row, value.
+        let mut still: Vec<Vec<(usize, T)>> = vec![Vec::new(); sensors.len()];
+        self.follow(run, setting, nuisance, |machine, reading, x, begins| {
             let wanted = |c: usize| if reading.shift == 0 { !delayed[c] } else { c + 1 == reading.shift };
             machine.outputs(reading.t_s, x, wanted, |c, value| out[c * n + reading.row] = value);
+            if let Some(begins) = begins {
+                machine.outputs(reading.t_s, begins, wanted, |c, value| still[c].push((reading.row, value)));
+            }
         })?;
         let times = &run.inputs[0];
+        for (c, (column, still)) in out.chunks_mut(n.max(1)).zip(&still).enumerate() {
+            before_run(still, (times, delays[c]), &run.outputs[c], &sensors[c], column);
+        }
         let of_run = self.cut.as_ref().and_then(|runs| runs.get(windows::of_run(run)));
-        let begin = of_run.map(|whole| &whole.begin_s).or(times.first()).copied().unwrap_or(0.0);
-        for (sensor, column) in sensors.iter().zip(out.chunks_mut(n.max(1))) {
+        let begin = of_run.and_then(Whole::begin_s).or(times.first().copied()).unwrap_or(0.0);
+        for (c, (mut sensor, column)) in sensors.into_iter().zip(out.chunks_mut(n.max(1))).enumerate() {
+            if sensor.lag_s.is_some() {
+                sensor.first = super::start::beginning(times, &run.outputs[c]).map(|[value, _]| value);
+            }
             sensor.read(begin, times, column);
         }
         match out.iter().position(|v| !v.re().is_finite()) {
@@ -505,25 +543,6 @@ impl MotionModel {
         }
         Ok(())
     }
-}
-
-/// When each row is read, in order, and by which infinitesimals: together where outputs have no delay, else each output by itself.
-fn readings<T: Number>(times: &[f64], delays: &[Option<T>]) -> (Vec<Reading>, Vec<T>) {
-    let mut reads = Vec::with_capacity(times.len());
-    let mut shifts = vec![T::from(0.0)];
-    if delays.iter().any(Option::is_none) {
-        reads.extend(times.iter().enumerate().map(|(row, &t_s)| Reading { t_s, row, shift: 0 }));
-    }
-    for (c, delay) in delays.iter().enumerate() {
-        let delay = delay.unwrap_or(T::from(0.0));
-        shifts.push(-delay.infinitesimal());
-        if delays[c].is_some() {
-            let late = |(row, t): (usize, &f64)| Reading { t_s: t - delay.re(), row, shift: c + 1 };
-            reads.extend(times.iter().enumerate().map(late));
-        }
-    }
-    reads.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-    (reads, shifts)
 }
 
 impl Model for MotionModel {

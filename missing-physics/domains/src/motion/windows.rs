@@ -132,3 +132,72 @@ fn every_measured(column: &[f64], every: usize) -> Vec<bool> {
     };
     column.iter().map(&mut counts).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use missing_physics::model::{Model as _, Quantity, Scope};
+
+    use super::super::follow::{first_pace, sizes};
+    use super::super::model::MotionModel;
+    use super::*;
+    use crate::recording::{Header, Memory, Source};
+
+    const DRIVE: &str = r#"
+format = 1
+[model]
+states = { angle_rad = "rate_rad_s", rate_rad_s = "80*command_v - 9*rate_rad_s" }
+outputs = { encoder_rad = "angle_rad", tacho_rad_s = "rate_rad_s" }
+inputs = { command_v = "hold" }
+"#;
+
+    /// A command that is on its way, or that a slow drive still follows, when a window begins: the motion in each window is that of the
+    /// whole run.
+    #[test]
+    fn a_command_of_the_window_before_acts_in_the_next() {
+        let header = Header::parse(Source::Memory(Memory::new("a drive")), DRIVE, false).unwrap();
+        let times: Vec<f64> = (0..160).map(|k| 0.01 * f64::from(k)).collect();
+        let command: Vec<f64> = times.iter().map(|t| (3.0 * t).sin() + (17.0 * t).cos()).collect();
+        let outputs = vec![command.clone(), command.clone()];
+        let run = Run { label: "1".into(), inputs: vec![times, command], outputs, kind: 0 };
+        let recording = Recording {
+            channels: vec![Quantity::new("encoder_rad", "rad"), Quantity::new("tacho_rad_s", "rad/s")],
+            variables: vec![Quantity::new("t_s", "s"), Quantity::new("command_v", "V")],
+            runs: vec![run],
+            noise_along: Some(0),
+            calibration: vec![None; 2],
+            resolution: vec![0.0; 2],
+        };
+        let equations = Equations::read(&header).unwrap();
+        let baseline = MotionModel::baseline(equations, first_pace(&recording));
+        let scales = sizes(&baseline, &recording, &[]).unwrap();
+        let model = |cut: Option<&[Run]>| baseline.clone().full(scales.clone(), &[], cut);
+        let (whole, windowed) = (model(None), model(Some(&recording.runs)));
+        for (effect, size) in [("input-delay", 0.043), ("input-lag", 0.03)] {
+            let spec = whole.spec();
+            let mechanism = spec.mechanisms.iter().find(|m| m.id == effect).unwrap();
+            let mut shared = spec.starts(Scope::Shared);
+            shared[spec.slots()[mechanism.parameters[0]]] = size;
+            let run = &recording.runs[0];
+            let mut all = vec![0.0; 2 * run.len()];
+            whole.predict(run, &shared, &[0.3, -0.2], &mut all).unwrap();
+            let mut first = 0;
+            for window in &cut(&recording, 50).runs {
+                let mut here = vec![0.0; 2 * window.len()];
+                let begins = [all[first], all[run.len() + first]];
+                windowed.predict(window, &shared, &begins, &mut here).unwrap();
+                for (channel, here) in here.chunks(window.len()).enumerate() {
+                    for (row, value) in here.iter().enumerate() {
+                        let expected = all[channel * run.len() + first + row];
+                        let label = &window.label;
+                        assert!(
+                            (value - expected).abs() < 1e-3,
+                            "{effect} {label} {row}: {value} {expected}"
+                        );
+                    }
+                }
+                first += window.len();
+            }
+        }
+    }
+}

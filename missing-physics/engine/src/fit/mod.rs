@@ -11,4 +11,4 @@ pub(crate) mod prediction;
 pub(crate) mod step;
 
 pub use crate::model::finite_differences;
-pub use least_squares::{LeastSquares, least_squares};
+pub use least_squares::{LeastSquares, least_squares, reweighted_least_squares};
