@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::fit::columns::nuisance_prior_width;
 use crate::fit::optimum::{Fit, covariance};
 use crate::linalg::{SemiCholesky, rank};
 use crate::problem::{Problem, Selection};
@@ -32,7 +33,7 @@ pub(crate) fn evidence(
     }
     let information = within_shape_priors(problem, set, selection, fit);
     let mut evidence = Evidence { problem, selection, fit, covariance, value: 0.0 };
-    evidence.value = marginal(problem, selection, fit, &information);
+    evidence.value = marginal(problem, selection, fit, &information) + undetermined(problem, selection, fit);
     for slot in problem.integer_slots(set) {
         evidence.value -= (problem.shared.upper[slot] - problem.shared.lower[slot] + 1.0).ln();
     }
@@ -48,6 +49,19 @@ pub(crate) fn evidence(
         evidence.pay(&mut left, &[spec.terms[term].parameter], &[]);
     }
     (evidence.value, evidence.ruled_out(set, &added))
+}
+
+/// What is taken back of the likelihood integrated over a nuisance parameter of the baseline where a run tells no more of it than its wide
+/// prior: as if it were as well determined as in the other runs. A ceiling at a run's first level is no better for hiding where it began.
+fn undetermined(problem: &Problem<'_>, selection: &Selection, fit: &Fit) -> f64 {
+    let of_parameter = |i: usize| {
+        let widest = nuisance_prior_width(problem, selection, i);
+        let errors = fit.nuisance_errors.iter().map(|run| run.error[i].min(widest));
+        let (open, known): (Vec<f64>, Vec<f64>) = errors.partition(|error| *error > 0.5 * widest);
+        let log = |errors: &[f64]| errors.iter().map(|error| error.ln()).sum::<f64>();
+        if known.is_empty() { 0.0 } else { open.len() as f64 * log(&known) / known.len() as f64 - log(&open) }
+    };
+    (0..selection.nuisance.len()).filter(|&i| !selection.added_nuisance[i]).map(of_parameter).sum()
 }
 
 /// The information of a fit with what the priors of shape parameters say: no shape fills more than its prior. Where the data say next to
