@@ -8,6 +8,7 @@ use missing_physics::model::{
     Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec, WindowedModel,
 };
 
+use super::detents::detents;
 use super::effects::{Effects, Role};
 use super::equations::{Equations, Joint, Start};
 use super::late::{before_run, readings};
@@ -628,8 +629,21 @@ impl WindowedModel for MotionModel {
 }
 
 impl MultimodalModel for MotionModel {
-    fn starts(&self, mechanism: usize, _: &[Run], _: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
-        super::start::mechanism(&self.spec.mechanisms[mechanism], &self.spec, &self.roles, &self.scales)
+    fn starts(&self, mechanism: usize, runs: &[Run], residual: &[Vec<Vec<f64>>]) -> Vec<Vec<(usize, f64)>> {
+        let mechanism = &self.spec.mechanisms[mechanism];
+        let mut starts = super::start::mechanism(mechanism, &self.spec, &self.roles, &self.scales);
+        if let [amplitude, phase, periods] = mechanism.parameters[..]
+            && let Role::Joint(joint, JointEffect::CogAmplitude) = self.roles[self.spec.slots()[amplitude]]
+        {
+            let position = self.equations.joints[joint].position;
+            if let Some(channel) = self.equations.outputs.iter().position(|o| o.state == Some(position)) {
+                let told = detents(runs, channel, residual).into_iter().map(|detent| {
+                    vec![(amplitude, detent.amplitude), (phase, detent.phase), (periods, detent.periods)]
+                });
+                starts.extend(told);
+            }
+        }
+        starts
     }
 }
 
