@@ -37,11 +37,8 @@ impl<T: Number> Sensor<T> {
         if let Some(lag_s) = self.lag_s {
             let begins = |settled: T, behind: T| {
                 let at = |part: f64| settled + (behind - settled) * part;
-                let apart = |part: &f64, first: f64| (self.value(at(*part), 0.0).re() - first).abs();
-                let nearest = |first: f64| {
-                    QUARTERS.iter().copied().min_by(|a, b| apart(a, first).total_cmp(&apart(b, first)))
-                };
-                at(self.first.and_then(nearest).unwrap_or(1.0))
+                let part = |first: f64| moved_on(|part| (self.value(at(part), 0.0).re() - first).abs());
+                at(self.first.map_or(1.0, part))
             };
             lagging(t, values, lag_s, begins);
         }
@@ -56,8 +53,12 @@ impl<T: Number> Sensor<T> {
     }
 }
 
-/// Parts of the way from one beginning to another.
-const QUARTERS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// By which part, in quarters, what was before a run's first row had moved on as it does then, and not stood still: the part by which the
+/// first rows are missed least, all of it where they do not tell.
+pub fn moved_on(missed: impl Fn(f64) -> f64) -> f64 {
+    let parts = [1.0, 0.0, 0.25, 0.5, 0.75].into_iter();
+    parts.min_by(|a, b| missed(*a).total_cmp(&missed(*b))).unwrap_or(1.0)
+}
 
 /// A first-order lag of values that run along cubics from row to row, through each row with the slope of a parabola through its neighbours.
 /// `begins` says what is read first, of a quantity that was at rest before and of one that moved on with its first slope.

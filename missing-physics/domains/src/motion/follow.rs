@@ -197,21 +197,21 @@ pub(super) fn windows(
     let stated = shared.clone();
     let longest = recording.runs.iter().map(Run::len).max().unwrap_or(0);
     // What cannot be followed to its end is cut in two at least.
-    let shorter =
-        |followed: usize, beyond| Some(Longest { rows: followed.min((longest / 2).max(1)), beyond });
+    let cut_at = |followed: usize, beyond| Some(Longest { rows: followed.min((longest / 2).max(1)), beyond });
     let mut length = FIRST_WINDOW;
     let mut followed = FIRST_WINDOW;
     let mut missed_before = f64::INFINITY;
     loop {
         let whole = length >= longest;
         if length > FIRST_WINDOW {
+            let shorter = cut(recording, followed);
             let grows = |shared: &[f64]| -> Result<bool, String> {
-                let sizes = sizes(&free, &cut(recording, followed), shared)?;
+                let sizes = sizes(&free, &shorter, shared)?;
                 Ok(too_long(&free, recording, shared, &sizes.states, length.min(longest)))
             };
             if grows(&shared)? {
-                if grows(&stated)? {
-                    return Ok((shared, shorter(followed, GROWS)));
+                if shared == stated || grows(&stated)? {
+                    return Ok((shared, cut_at(followed, GROWS)));
                 }
                 shared.clone_from(&stated);
             }
@@ -230,13 +230,13 @@ pub(super) fn windows(
             Some((missed(model, recording, &windowed, &fit), fit.shared))
         };
         let mut fit = fit_from(&shared);
-        if fit.as_ref().is_none_or(|(missed, _)| strays(*missed)) {
+        if shared != stated && fit.as_ref().is_none_or(|(missed, _)| strays(*missed)) {
             let other = fit_from(&stated);
             fit = [fit, other].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
         }
         if let Some((missed, fitted)) = fit {
             if lost(missed, missed_before) {
-                return Ok((shared, shorter(followed, STRAYS)));
+                return Ok((shared, cut_at(followed, STRAYS)));
             }
             (shared, missed_before) = (fitted, missed);
         }
@@ -283,10 +283,10 @@ pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
-    use missing_physics::data::Recording;
-    use missing_physics::model::{Quantity, Scope};
+    use missing_physics::model::Scope;
 
     use super::super::equations::Equations;
+    use super::super::recorded;
     use super::*;
     use crate::recording::{Header, Memory, Source};
 
@@ -315,14 +315,7 @@ start = 2.0
         // Readings in steps of a tenth of a milliradian.
         let encoder = goal.iter().map(|g| (1e4 * g).round() * 1e-4).collect();
         let run = Run { label: "1".into(), inputs: vec![times, goal], outputs: vec![encoder], kind: 0 };
-        let recording = Recording {
-            channels: vec![Quantity::new("encoder_rad", "rad")],
-            variables: vec![Quantity::new("t_s", "s"), Quantity::new("goal_rad", "rad")],
-            runs: vec![run],
-            noise_along: Some(0),
-            calibration: vec![None],
-            resolution: vec![1e-4],
-        };
+        let recording = recorded(&["encoder_rad"], "goal_rad", run, 1e-4);
         let mut model = MotionModel::baseline(equations, first_pace(&recording));
         let shared = model.spec().starts(Scope::Shared);
         resolve(&mut model, &recording, &shared).unwrap();

@@ -2,14 +2,11 @@
 
 use joint_laws::Number;
 use joint_laws::integrate::Reading;
-use joint_laws::sensor::Sensor;
+use joint_laws::sensor::{Sensor, moved_on};
 
-/// Parts of the time before a run that is read late in which the machine may have moved on along its tangent; before that it stood still.
-const MOVED_ON: [f64; 5] = [1.0, 0.0, 0.25, 0.5, 0.75];
-
-/// What a column that is read late says of the time before the run, by the part of that time in which the machine moved that is nearest to
-/// its first rows. `still` are the rows with the values at the run's beginning, the column has those along the tangent; both of which are
-/// apart in proportion to the time.
+/// What a column that is read late says of the time before the run, by the part of that time in which the machine moved on along its
+/// tangent (before that it stood still) that is nearest to its first rows. `still` are the rows with the values at the run's beginning, the
+/// column has those along the tangent; both of which are apart in proportion to the time.
 pub(super) fn before_run<T: Number>(
     still: &[(usize, T)],
     (times, delay_s): (&[f64], f64),
@@ -29,9 +26,9 @@ pub(super) fn before_run<T: Number>(
         let miss = |at: &(usize, T)| sensor.value(value(column, *at, part), 0.0).re() - measured[at.0];
         known.map(|at| miss(at).powi(2)).sum()
     };
-    let nearest = MOVED_ON.into_iter().min_by(|a, b| misses(*a).total_cmp(&misses(*b))).unwrap_or(1.0);
+    let moved = moved_on(misses);
     for at in still {
-        column[at.0] = value(column, *at, nearest);
+        column[at.0] = value(column, *at, moved);
     }
 }
 

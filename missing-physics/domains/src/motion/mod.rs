@@ -23,6 +23,10 @@ mod tune;
 mod units;
 mod windows;
 
+#[cfg(test)]
+use missing_physics::data::Recording;
+#[cfg(test)]
+use missing_physics::model::Quantity;
 use missing_physics::model::{Model as _, Spec};
 
 use crate::recording::{Header, ReadError};
@@ -93,6 +97,20 @@ impl Domain for Motion {
             })?;
             Ok(Loaded::new(tuned.recording, tuned.model, tuned.experiments, tuned.remarks))
         }))
+    }
+}
+
+/// One run of a machine with one input, as tests have it.
+#[cfg(test)]
+fn recorded(channels: &[&str], input: &str, run: missing_physics::data::Run, resolution: f64) -> Recording {
+    let quantity = |name: &str| Quantity::new(name, units::text(name));
+    Recording {
+        channels: channels.iter().map(|name| quantity(name)).collect(),
+        variables: ["t_s", input].map(quantity).to_vec(),
+        runs: vec![run],
+        noise_along: Some(0),
+        calibration: vec![None; channels.len()],
+        resolution: vec![resolution; channels.len()],
     }
 }
 

@@ -486,20 +486,22 @@ impl MotionModel {
         let n = run.len();
         let setting = self.setting(run, shared, nuisance, moving);
         let sensors = setting.sensors.clone();
-        let delayed: Vec<bool> = setting.delays.iter().map(Option::is_some).collect();
-        let delays: Vec<f64> = setting.delays.iter().map(|d| d.map_or(0.0, |delay| delay.re())).collect();
+        let delays: Vec<Option<f64>> = setting.delays.iter().map(|d| d.map(|delay| delay.re())).collect();
         // Readings of each output that are older than the run, as if the machine had stood still before it: row, value.
         let mut still: Vec<Vec<(usize, T)>> = vec![Vec::new(); sensors.len()];
         self.follow(run, setting, nuisance, |machine, reading, x, begins| {
-            let wanted = |c: usize| if reading.shift == 0 { !delayed[c] } else { c + 1 == reading.shift };
+            let wanted =
+                |c: usize| if reading.shift == 0 { delays[c].is_none() } else { c + 1 == reading.shift };
             machine.outputs(reading.t_s, x, wanted, |c, value| out[c * n + reading.row] = value);
             if let Some(begins) = begins {
                 machine.outputs(reading.t_s, begins, wanted, |c, value| still[c].push((reading.row, value)));
             }
         })?;
         let times = &run.inputs[0];
-        for (c, (column, still)) in out.chunks_mut(n.max(1)).zip(&still).enumerate() {
-            before_run(still, (times, delays[c]), &run.outputs[c], &sensors[c], column);
+        for (c, column) in out.chunks_mut(n.max(1)).enumerate() {
+            if let Some(delay_s) = delays[c] {
+                before_run(&still[c], (times, delay_s), &run.outputs[c], &sensors[c], column);
+            }
         }
         let of_run = self.cut.as_ref().and_then(|runs| runs.get(windows::of_run(run)));
         let begin = of_run.and_then(Whole::begin_s).or(times.first().copied()).unwrap_or(0.0);

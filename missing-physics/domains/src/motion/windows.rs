@@ -136,10 +136,11 @@ fn every_measured(column: &[f64], every: usize) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
-    use missing_physics::model::{Model as _, Quantity, Scope};
+    use missing_physics::model::{Model as _, Scope};
 
     use super::super::follow::{first_pace, sizes};
     use super::super::model::MotionModel;
+    use super::super::recorded;
     use super::*;
     use crate::recording::{Header, Memory, Source};
 
@@ -160,14 +161,8 @@ inputs = { command_v = "hold" }
         let command: Vec<f64> = times.iter().map(|t| (3.0 * t).sin() + (17.0 * t).cos()).collect();
         let outputs = vec![command.clone(), command.clone()];
         let run = Run { label: "1".into(), inputs: vec![times, command], outputs, kind: 0 };
-        let recording = Recording {
-            channels: vec![Quantity::new("encoder_rad", "rad"), Quantity::new("tacho_rad_s", "rad/s")],
-            variables: vec![Quantity::new("t_s", "s"), Quantity::new("command_v", "V")],
-            runs: vec![run],
-            noise_along: Some(0),
-            calibration: vec![None; 2],
-            resolution: vec![0.0; 2],
-        };
+        let columns = ["encoder_rad", "tacho_rad_s"];
+        let recording = recorded(&columns, "command_v", run, 0.0);
         let equations = Equations::read(&header).unwrap();
         let baseline = MotionModel::baseline(equations, first_pace(&recording));
         let scales = sizes(&baseline, &recording, &[]).unwrap();

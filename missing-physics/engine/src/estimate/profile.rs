@@ -116,14 +116,8 @@ impl<'a> Profile<'a> {
             return None;
         }
         let start = (&self.moved(value)[..], &self.fit.nuisance[..]);
-        let near = solve_until(
-            End::of(self.problem).below(most),
-            self.problem,
-            &self.others,
-            &self.fit.noise,
-            start,
-        )
-        .ok();
+        let end = End::of(self.problem).below(most);
+        let near = solve_until(end, self.problem, &self.others, &self.fit.noise, start).ok();
         let near = near.filter(|f| f.chi2 < most)?;
         if foreseen.is_some_and(|(_, rise)| self.is_as_foreseen(near.chi2, rise)) {
             return None;

@@ -2,7 +2,6 @@
 
 use crate::data::Recording;
 use crate::fit::gauss_newton::solve;
-use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals_at;
 use crate::model::{Model, PredictError};
 use crate::noise::rule::NoiseState;
@@ -35,8 +34,7 @@ pub fn least_squares(
     shared: &[f64],
 ) -> Result<LeastSquares, PredictError> {
     let problem = Problem::new(model, recording.clone());
-    let fit = weighted(&problem, noise(&problem), shared, &problem.nuisance_start)?;
-    Ok(LeastSquares { shared: fit.shared, nuisance: fit.nuisance, chi2: fit.chi2 })
+    weighted(&problem, noise(&problem), shared, &problem.nuisance_start)
 }
 
 /// The same, each channel weighted by the root mean square that is left of it, where that is more than its noise: at the start, then by
@@ -72,7 +70,7 @@ pub fn reweighted_least_squares(
         sigma = next;
         fit = weighted(&problem, sigma.clone(), &fit.shared, &fit.nuisance)?;
     }
-    Ok(LeastSquares { shared: fit.shared, nuisance: fit.nuisance, chi2: fit.chi2 })
+    Ok(fit)
 }
 
 /// A fit of the baseline beside white noise.
@@ -81,9 +79,10 @@ fn weighted(
     sigma: Vec<f64>,
     shared: &[f64],
     nuisance: &[Vec<f64>],
-) -> Result<Fit, PredictError> {
+) -> Result<LeastSquares, PredictError> {
     let white = NoiseState { shape: vec![0; sigma.len()], sigma };
-    solve(problem, &problem.select(&[], &[]), &white, shared, nuisance)
+    let fit = solve(problem, &problem.select(&[], &[]), &white, shared, nuisance)?;
+    Ok(LeastSquares { shared: fit.shared, nuisance: fit.nuisance, chi2: fit.chi2 })
 }
 
 /// Noise of each channel between its neighbouring rows.

@@ -205,3 +205,79 @@ pub(crate) fn bounded_marginal(problem: &Problem<'_>, selection: &Selection, fit
     }
     marginal(problem, selection, fit, &information)
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+    use rand::SeedableRng as _;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution as _, Normal};
+
+    use crate::data::{Recording, Run};
+    use crate::fit::alternate::fit;
+    use crate::fit::optimum::Fit;
+    use crate::model::{Model, PredictError, Quantity, Spec, SpecBuilder, UNBOUNDED};
+    use crate::noise::rule::noise_rule;
+    use crate::problem::Problem;
+    use crate::selection::candidate::candidate;
+
+    /// A level of its own in each run, under a ceiling.
+    struct Tank(Spec);
+
+    impl Model for Tank {
+        fn spec(&self) -> &Spec {
+            &self.0
+        }
+
+        fn predict(
+            &self,
+            _: &Run,
+            shared: &[f64],
+            level: &[f64],
+            out: &mut [f64],
+        ) -> Result<(), PredictError> {
+            out.fill(level[0].min(shared[0]));
+            Ok(())
+        }
+
+        fn nuisance_start(&self, run: &Run, level: &mut [f64]) {
+            level[0] = run.outputs[0].iter().copied().fold(f64::MIN, f64::max);
+        }
+    }
+
+    /// A ceiling at the highest level hides that run's level, and says no more of the data than the level did.
+    #[test]
+    fn hiding_a_nuisance_parameter_is_no_evidence() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let noise = Normal::new(0.0, 0.01).unwrap();
+        let mut run = |level: f64| Run {
+            label: level.to_string(),
+            inputs: vec![(0..20).map(f64::from).collect()],
+            outputs: vec![(0..20).map(|_| level + noise.sample(&mut rng)).collect()],
+            kind: 0,
+        };
+        let recording = Recording {
+            channels: vec![Quantity::new("level_m", "m")],
+            variables: vec![Quantity::new("t_s", "s")],
+            runs: [1.0, 2.0, 3.0].map(&mut run).to_vec(),
+            noise_along: Some(0),
+            calibration: vec![Some(0.01)],
+            resolution: vec![0.0],
+        };
+        let mut spec = SpecBuilder::new("levels");
+        let ceiling = spec.shared("height_m", "m", 10.0, UNBOUNDED, 1.0);
+        spec.nuisance("level_m", "m", UNBOUNDED, 1.0);
+        spec.mechanism("ceiling", &[ceiling], ["a ceiling", "What is above it is lost.", "", ""], &[]);
+        let model = Tank(spec.build().unwrap());
+        let problem = Problem::new(&model, recording);
+        let rule = noise_rule(&problem);
+        let selection = problem.select(&[], &[]);
+        let start = (&problem.shared.start[..], &problem.nuisance_start[..]);
+        let levels = fit(&problem, &selection, &rule, start, None).unwrap();
+        let without = candidate(&problem, &rule, &[], &[], &levels, &[]).unwrap();
+        let above = Fit { nuisance: problem.nuisance_start.clone(), ..levels };
+        let with = candidate(&problem, &rule, &[0], &[], &above, &[vec![(0, 2.99)]]).unwrap();
+        assert!((with.fit.shared[0] - 3.0).abs() < 0.01, "{:?}", with.fit.shared);
+        assert!(with.ruled_out.is_none() && with.evidence < without.evidence);
+    }
+}
