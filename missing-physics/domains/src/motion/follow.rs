@@ -30,6 +30,8 @@ const RESOLVED_ROWS: usize = 4000;
 const WINDOWED_ROWS: usize = 3000;
 /// Rows of the shortest windows in which the equations are fitted first.
 const FIRST_WINDOW: usize = 40;
+/// A fit misses windows by little, where it misses them by less than this part of an output's spread.
+const NEAR: f64 = 0.05;
 /// What happens in windows that are too long: to the motion, or to a fit of it.
 const GROWS: &str = "a small deviation of the start grows until the motion tells nothing of the physics";
 const STRAYS: &str = "the fit of the equations settles on another motion";
@@ -183,8 +185,18 @@ pub(super) struct Longest {
     pub(super) beyond: &'static str,
 }
 
+/// A fit of the equations to longer and longer windows.
+pub(super) struct Windowed {
+    /// The parameters at its end,
+    pub(super) fitted: Vec<f64>,
+    /// and those of the longest windows that it misses by little: beyond, what is left out may lead it anywhere.
+    pub(super) near: Vec<f64>,
+    /// The longest windows that can be followed, where whole runs cannot.
+    pub(super) followed: Option<Longest>,
+}
+
 /// Fits the equations in short windows, then in longer ones: a fit over a whole run from far off would lose the phase and settle in a
-/// wrong place. The second are the longest windows that can be followed, where whole runs cannot.
+/// wrong place.
 ///
 /// What is left out may lead a fit to short windows to parameters of a motion that runs away (a stop pushes back like a spring that is
 /// negative): where the parameters that the recording states do not, the fit to longer windows begins at these.
@@ -192,7 +204,7 @@ pub(super) fn windows(
     model: &MotionModel,
     recording: &Recording,
     mut shared: Vec<f64>,
-) -> Result<(Vec<f64>, Option<Longest>), String> {
+) -> Result<Windowed, String> {
     let free = model.freed();
     let stated = shared.clone();
     let longest = recording.runs.iter().map(Run::len).max().unwrap_or(0);
@@ -201,6 +213,7 @@ pub(super) fn windows(
     let mut length = FIRST_WINDOW;
     let mut followed = FIRST_WINDOW;
     let mut missed_before = f64::INFINITY;
+    let mut near = shared.clone();
     loop {
         let whole = length >= longest;
         if length > FIRST_WINDOW {
@@ -211,7 +224,7 @@ pub(super) fn windows(
             };
             if grows(&shared)? {
                 if shared == stated || grows(&stated)? {
-                    return Ok((shared, cut_at(followed, GROWS)));
+                    return Ok(Windowed { fitted: shared, near, followed: cut_at(followed, GROWS) });
                 }
                 shared.clone_from(&stated);
             }
@@ -236,13 +249,16 @@ pub(super) fn windows(
         }
         if let Some((missed, fitted)) = fit {
             if lost(missed, missed_before) {
-                return Ok((shared, cut_at(followed, STRAYS)));
+                return Ok(Windowed { fitted: shared, near, followed: cut_at(followed, STRAYS) });
             }
             (shared, missed_before) = (fitted, missed);
+            if missed < NEAR {
+                near.clone_from(&shared);
+            }
         }
         followed = length;
         if whole {
-            return Ok((shared, None));
+            return Ok(Windowed { fitted: shared, near, followed: None });
         }
         length = length.saturating_mul(2);
     }

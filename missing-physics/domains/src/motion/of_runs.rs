@@ -6,7 +6,7 @@ use missing_physics::fit::least_squares;
 use missing_physics::model::{Model as _, Scope};
 
 use super::equations::Equations;
-use super::follow::{first_pace, resolve, windows};
+use super::follow::{Windowed, first_pace, resolve, windows};
 use super::model::MotionModel;
 use super::windows::cut;
 
@@ -63,12 +63,12 @@ fn fitted(equations: Equations, alone: &Recording, places: &[usize]) -> Option<(
     let mut model = MotionModel::baseline(equations, first_pace(alone));
     let starts = model.spec().starts(Scope::Shared);
     resolve(&mut model, alone, &starts).ok()?;
-    let (shared, longest) = windows(&model, alone, starts).ok()?;
-    let fit = match longest {
-        None => least_squares(&model, alone, &shared),
+    let Windowed { fitted, followed, .. } = windows(&model, alone, starts).ok()?;
+    let fit = match followed {
+        None => least_squares(&model, alone, &fitted),
         Some(longest) => {
             let free = model.freed();
-            least_squares(&free, &cut(alone, longest.rows), &shared)
+            least_squares(&free, &cut(alone, longest.rows), &fitted)
         }
     };
     let fit = fit.ok()?;

@@ -7,7 +7,7 @@ use missing_physics::model::{Experiment, Model as _, Scope};
 
 use super::equations::Equations;
 use super::experiments::experiments;
-use super::follow::{first_pace, liveliest, median_step, resolve, sigma, sizes, windows};
+use super::follow::{Windowed, first_pace, liveliest, median_step, resolve, sigma, sizes, windows};
 use super::held;
 use super::model::{MotionModel, Pace};
 use super::of_runs;
@@ -100,7 +100,7 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
     let mut model = MotionModel::baseline(equations, first_pace(&recording));
     let starts: Vec<f64> = model.spec().starts(Scope::Shared);
     resolve(&mut model, &recording, &starts)?;
-    let (mut fitted, followed) = windows(&model, &recording, starts)?;
+    let Windowed { mut fitted, mut near, followed } = windows(&model, &recording, starts)?;
     if let Some(longest) = followed {
         let mut free = model.freed();
         resolve(&mut free, &cut(&recording, longest.rows), &fitted)?;
@@ -110,6 +110,7 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
         resolve(&mut model, &recording, &fitted)?;
         let by_the_rows = steps.then(|| by_the_rows(&mut model, &recording, &fitted)).flatten();
         if let Some(better) = by_the_rows {
+            near.clone_from(&better);
             fitted = better;
             remarks.push(
                 "the motion is followed by one Runge-Kutta step a row, as a simulator may have done it: this fits better than the exact \
@@ -119,9 +120,12 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
         }
     }
     remarks.extend(held::remarks(&model, &recording, &fitted));
-    let stated = model.stated(&fitted);
+    let stated = model.stated(&near);
+    let sizes = |model: &MotionModel, recording: &Recording| {
+        sizes(model, recording, &near).or_else(|_| sizes(model, recording, &fitted))
+    };
     let Some(longest) = followed else {
-        let scales = sizes(&model, &recording, &fitted)?;
+        let scales = sizes(&model, &recording)?;
         let times = [scales.step_s, scales.duration_s];
         let model = model.full(scales, &stated, None);
         let experiments = experiments(&model, &recording, times);
@@ -130,7 +134,7 @@ fn followed(mut equations: Equations, recording: Recording, steps: bool) -> Resu
     let free = model.freed();
     let whole = recording;
     let recording = cut(&whole, longest.rows);
-    let scales = sizes(&free, &recording, &fitted)?;
+    let scales = sizes(&free, &recording)?;
     let span = |r: &Run| r.inputs[0].last().unwrap_or(&0.0) - r.inputs[0].first().unwrap_or(&0.0);
     let span = recording.runs.iter().map(span).fold(0.0, f64::max);
     remarks.push(format!(

@@ -6,6 +6,7 @@ pub(crate) mod evidence;
 pub(crate) mod held_out;
 pub(crate) mod main_cause;
 mod nuisance_prior;
+mod parts;
 mod prior;
 pub(crate) mod ranking;
 mod screening;

@@ -4,21 +4,20 @@ use rayon::prelude::*;
 
 use crate::data::Run;
 use crate::estimate::profile::better_top;
-use crate::fit::gauss_newton::{End, linearise, solve_until};
+use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
-use crate::selection::candidate::{Candidate, Guess, HEAT, candidate, finish, without_more};
-use crate::selection::screening::Screening;
+use crate::selection::candidate::{Candidate, Guess, candidate, finish};
+use crate::selection::parts::{BEAM, MOST, best_evidence, from_larger, unknown_parts, worth};
+use crate::selection::screening::{Promising, Screening};
 use crate::statistics::median;
 
-/// How many sets of one size are tried with one more mechanism.
-const BEAM: usize = 3;
 /// Sets within this log evidence of the best may become it once their best top is found.
 const POLISHED: f64 = 6.0;
-/// The largest set tried.
-const MOST: usize = 3;
+/// A parameter of the baseline's that changes by more than so many of its scales has gone far.
+const FAR: f64 = 3.0;
 /// A set that leaves less than this many sigmas of the data's rough part explains them to the noise.
 const NOISE: f64 = 1.05;
 
@@ -45,25 +44,16 @@ pub(crate) fn search(
         .knows_many()
         .then(|| Screening::new(allowed.iter().map(|&m| (m, guesses(problem, &all[0], &[m])))));
     let mut layer: Vec<usize> = vec![0];
+    // A mechanism that comes with another is two at work.
+    let at_work = |c: &Candidate| problem.at_work(&c.set).len();
     for size in 1..=MOST {
-        let wanted = match &mut screening {
-            Some(screening) => screened(problem, screening, &all, &layer),
-            None => larger(problem, &all, &layer, allowed),
-        };
-        let fitted: Vec<Result<Candidate, PredictError>> =
-            wanted.par_iter().map(|wanted| fitted(problem, rule, &all, wanted)).collect();
+        grow(problem, rule, &mut screening, &mut all, &mut unfitted, (&layer, allowed));
+        if let (1, Some(screening)) = (size, &mut screening) {
+            from_where_it_begins(problem, rule, screening, &mut all);
+        }
         if !tell(size as f64 / MOST as f64) {
             return None;
         }
-        for (Wanted { set, .. }, fitted) in wanted.into_iter().zip(fitted) {
-            match (fitted, &set[..]) {
-                (Ok(fitted), _) => all.push(fitted),
-                (Err(why), &[alone]) => unfitted.push((alone, why)),
-                (Err(_), _) => {}
-            }
-        }
-        // A mechanism that comes with another is two at work.
-        let at_work = |c: &Candidate| problem.at_work(&c.set).len();
         let of_this_size = |c: &Candidate| at_work(c) == size && c.evidence.is_finite();
         let mut order: Vec<usize> = (0..all.len()).filter(|&i| of_this_size(&all[i])).collect();
         order.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
@@ -81,6 +71,15 @@ pub(crate) fn search(
         }
         layer = order;
     }
+    if screening.is_some() {
+        let known = all.len();
+        all.extend(unknown_parts(problem, rule, &all));
+        let likeliest = (0..all.len()).max_by(|&a, &b| worth(&all[a]).total_cmp(&worth(&all[b])));
+        let found = likeliest.filter(|&best| best >= known && at_work(&all[best]) < MOST);
+        if let Some(best) = found.filter(|&best| !down_to_noise(problem, rule, &all[best])) {
+            grow(problem, rule, &mut screening, &mut all, &mut unfitted, (&[best], allowed));
+        }
+    }
     from_larger(problem, rule, &mut all);
     // Beside a leftover no difference between neighbouring tops decides anything.
     let likeliest = all.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence));
@@ -88,6 +87,62 @@ pub(crate) fn search(
         polish(problem, rule, &mut all);
     }
     Some(Searched { all, unfitted })
+}
+
+/// Fits the sets of a layer with one more mechanism each.
+fn grow(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    screening: &mut Option<Screening>,
+    all: &mut Vec<Candidate>,
+    unfitted: &mut Vec<(usize, PredictError)>,
+    (layer, allowed): (&[usize], &[usize]),
+) {
+    let wanted = match screening {
+        Some(screening) => screened(problem, screening, all, layer),
+        None => larger(problem, all, layer, allowed),
+    };
+    let fitted: Vec<Result<Candidate, PredictError>> =
+        wanted.par_iter().map(|wanted| fitted(problem, rule, all, wanted)).collect();
+    for (Wanted { set, .. }, fitted) in wanted.into_iter().zip(fitted) {
+        match (fitted, &set[..]) {
+            (Ok(fitted), _) => all.push(fitted),
+            (Err(why), &[alone]) => unfitted.push((alone, why)),
+            (Err(_), _) => {}
+        }
+    }
+}
+
+/// Fits single mechanisms from where the model begins as well, if the baseline's fit ended far from there: without what is missing it may
+/// have settled where nothing makes sense.
+fn from_where_it_begins(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    screening: &mut Screening,
+    all: &mut Vec<Candidate>,
+) {
+    let baseline = &all[0];
+    let (ends, begins) = (&baseline.fit.shared, &problem.shared.start);
+    let far = |&slot: &usize| (ends[slot] - begins[slot]).abs() > FAR * problem.shared.scale[slot];
+    if !baseline.selection.shared.iter().any(far) || down_to_noise(problem, rule, baseline) {
+        return;
+    }
+    let nuisance = problem.nuisance_start.clone();
+    let fit = Fit { shared: begins.clone(), nuisance, ..baseline.fit.clone() };
+    let begun = Candidate { fit, ..baseline.clone() };
+    let promising = screening.promising(problem, &begun);
+    let fitted = |Promising { mechanism, start }: &Promising| {
+        candidate(problem, rule, &[*mechanism], &[], &begun.fit, std::slice::from_ref(start)).ok()
+    };
+    for better in promising.par_iter().filter_map(fitted).collect::<Vec<_>>() {
+        match all.iter().position(|c| c.set == better.set) {
+            None => all.push(better),
+            Some(k) if better.fit.log_likelihood > all[k].fit.log_likelihood => {
+                all[k] = better.in_place_of(all[k].clone(), problem, rule);
+            }
+            Some(_) => {}
+        }
+    }
 }
 
 /// Whether a set leaves no more than the noise.
@@ -180,51 +235,6 @@ fn fitted(
     }
 }
 
-/// Fits sets again from the fits of larger ones, where these leave less with the member off that they have more.
-///
-/// A set that is stuck in a local minimum is left by a member that hardly does anything, which would then be named.
-fn from_larger(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
-    for size in (2..=MOST).rev() {
-        let mut larger: Vec<usize> = (0..all.len())
-            .filter(|&i| {
-                all[i].set.len() == size && all[i].evidence.is_finite() && all[i].ruled_out.is_none()
-            })
-            .collect();
-        larger.sort_by(|&a, &b| all[b].evidence.total_cmp(&all[a].evidence));
-        larger.truncate(BEAM);
-        let known: &[Candidate] = all;
-        let parts: Vec<(usize, usize)> = larger
-            .iter()
-            .flat_map(|&whole| {
-                let is_part = move |part: &usize| {
-                    let set = &known[*part].set;
-                    set.len() + 1 == size && set.iter().all(|m| known[whole].set.contains(m))
-                };
-                (0..known.len()).filter(is_part).map(move |part| (part, whole))
-            })
-            .collect();
-        let again = |&(part, whole): &(usize, usize)| -> Option<(usize, Candidate)> {
-            let (part_of, whole) = (&known[part], &known[whole]);
-            (whole.evidence > part_of.evidence).then_some(())?;
-            let (selection, noise) = (&part_of.selection, &whole.fit.noise);
-            let begins = without_more(problem, &part_of.set, &whole.fit);
-            let some =
-                solve_until(End::after(HEAT), problem, selection, noise, (&begins.shared, &begins.nuisance))
-                    .ok()?;
-            let stuck = linearise(problem, selection, noise, &part_of.fit.shared, &part_of.fit.nuisance);
-            stuck.is_ok_and(|stuck| some.chi2 < stuck.chi2).then_some(())?;
-            let found = candidate(problem, rule, &part_of.set, &[], &some, &[vec![]]).ok()?;
-            (found.evidence > part_of.evidence).then_some((part, found))
-        };
-        let found: Vec<(usize, Candidate)> = parts.par_iter().filter_map(again).collect();
-        for (part, better) in found {
-            if better.evidence > all[part].evidence {
-                all[part] = better.in_place_of(all[part].clone(), problem, rule);
-            }
-        }
-    }
-}
-
 /// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
 fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
     let best = best_evidence(all.iter());
@@ -245,10 +255,6 @@ fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
         }
         finish(problem, rule, c);
     });
-}
-
-fn best_evidence<'a>(of: impl Iterator<Item = &'a Candidate>) -> f64 {
-    of.filter(|c| c.ruled_out.is_none()).map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Where the model says to begin the mechanism that a set has and its parent has not, with all whole numbers that it knows for those
