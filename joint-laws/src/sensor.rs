@@ -13,9 +13,6 @@ pub struct Sensor<T> {
     pub drift_per_s: T,
     /// Time constant of a first-order lag, s, at least 0; `None` without one.
     pub lag_s: Option<T>,
-    /// About what is read first, if that is known: a lag begins between where the quantity stands (it was at rest before) and as far behind
-    /// it as its first slope keeps a reading (it moved on like that), at the quarter that is nearest; at the latter where it is not known.
-    pub first: Option<f64>,
     /// The largest reading.
     pub upper: T,
     /// The smallest reading.
@@ -27,24 +24,49 @@ impl<T: Number> Sensor<T> {
     pub fn perfect() -> Self {
         let zero = T::from(0.0);
         let (upper, lower) = (T::from(f64::INFINITY), T::from(f64::NEG_INFINITY));
-        Self { gain: zero, offset: zero, drift_per_s: zero, lag_s: None, first: None, upper, lower }
+        Self { gain: zero, offset: zero, drift_per_s: zero, lag_s: None, upper, lower }
     }
 
     /// Turns the true values at the times `t` (rising) of a run that began at a time into readings, in place.
     ///
-    /// The lag takes the quantity for a cubic from row to row (Hermite's, with slopes by three rows).
-    pub fn read(&self, begin: f64, t: &[f64], values: &mut [T]) {
+    /// The lag takes the quantity for a cubic from row to row (Hermite's, with slopes by three rows). It begins between where the quantity
+    /// stands (it was at rest before) and as far behind it as its first slope keeps a reading (it moved on like that), at the quarter that
+    /// is nearest to what was `measured` while that lasts (NaN where nothing was); at the latter where nothing tells.
+    pub fn read(&self, begin: f64, t: &[f64], measured: &[f64], values: &mut [T]) {
         if let Some(lag_s) = self.lag_s {
-            let begins = |settled: T, behind: T| {
-                let at = |part: f64| settled + (behind - settled) * part;
-                let part = |first: f64| moved_on(|part| (self.value(at(part), 0.0).re() - first).abs());
-                at(self.first.map_or(1.0, part))
-            };
-            lagging(t, values, lag_s, begins);
+            self.lag(lag_s, begin, (t, measured), values);
         }
         for (value, t) in values.iter_mut().zip(t) {
-            *value = self.value(*value, *t - begin).within(self.lower, self.upper);
+            *value = self.within(*value, *t - begin);
         }
+    }
+
+    /// Makes values lag, from where the first readings say.
+    fn lag(&self, lag_s: T, begin: f64, (t, measured): (&[f64], &[f64]), values: &mut [T]) {
+        let behind = lagging(t, values, lag_s);
+        if !(lag_s.re() > 0.0) {
+            return;
+        }
+        // How much more is read where the quantity was at rest before.
+        let more: Vec<T> = t
+            .iter()
+            .map(|at| (at - t[0]) / lag_s.re())
+            .take_while(|lags| *lags < FADED)
+            .zip(t)
+            .map(|(_, at)| behind * (lag_s.recip() * (t[0] - at)).exp())
+            .collect();
+        let moved = moved_on(|part| {
+            let rows = more.iter().zip(&*values).zip(t).zip(measured).filter(|(_, read)| read.is_finite());
+            let miss = |(((more, value), t), read): (((&T, &T), &f64), &f64)| {
+                (self.within(*value + *more * (1.0 - part), t - begin).re() - read).powi(2)
+            };
+            rows.map(miss).sum()
+        });
+        values.iter_mut().zip(&more).for_each(|(value, more)| *value += *more * (1.0 - moved));
+    }
+
+    fn within(&self, value: T, after_s: f64) -> T {
+        self.value(value, after_s).within(self.lower, self.upper)
     }
 
     /// What becomes of a value some time after the run began: without the lag, and within the bounds.
@@ -60,12 +82,16 @@ pub fn moved_on(missed: impl Fn(f64) -> f64) -> f64 {
     parts.min_by(|a, b| missed(*a).total_cmp(&missed(*b))).unwrap_or(1.0)
 }
 
+/// A lag's start has faded after so many time constants.
+const FADED: f64 = 12.0;
+
 /// A first-order lag of values that run along cubics from row to row, through each row with the slope of a parabola through its neighbours.
-/// `begins` says what is read first, of a quantity that was at rest before and of one that moved on with its first slope.
-fn lagging<T: Number>(t: &[f64], values: &mut [T], lag_s: T, begins: impl FnOnce(T, T) -> T) {
+/// It is read first as if the quantity had moved on with its first slope before: how far behind, is returned.
+fn lagging<T: Number>(t: &[f64], values: &mut [T], lag_s: T) -> T {
     let slopes = slopes(t, values);
-    let (Some(&first), Some(&slope)) = (values.first(), slopes.first()) else { return };
-    let mut reading = begins(first, first - lag_s * slope);
+    let (Some(&first), Some(&slope)) = (values.first(), slopes.first()) else { return T::from(0.0) };
+    let behind = lag_s * slope;
+    let mut reading = first - behind;
     let mut before = std::mem::replace(&mut values[0], reading);
     for i in 1..values.len() {
         let dt = t[i] - t[i - 1];
@@ -86,6 +112,7 @@ fn lagging<T: Number>(t: &[f64], values: &mut [T], lag_s: T, begins: impl FnOnce
         }
         before = std::mem::replace(&mut values[i], reading);
     }
+    behind
 }
 
 /// Nodes from 0 to 1 and weights of Gauss-Legendre quadrature with five nodes.
@@ -148,7 +175,12 @@ mod tests {
     fn a_ramp_is_read_late_by_the_lag() {
         let t: Vec<f64> = (0..50).map(|i| 0.1 * f64::from(i)).collect();
         let mut values: Vec<f64> = t.iter().map(|t| 3.0 * t).collect();
-        Sensor { lag_s: Some(0.25), gain: 0.1, offset: -1.0, ..Sensor::perfect() }.read(0.0, &t, &mut values);
+        Sensor { lag_s: Some(0.25), gain: 0.1, offset: -1.0, ..Sensor::perfect() }.read(
+            0.0,
+            &t,
+            &[],
+            &mut values,
+        );
         for (value, t) in values.iter().zip(&t) {
             assert_relative_eq!(*value, 1.1 * 3.0 * (t - 0.25) - 1.0, epsilon = 1e-12);
         }
@@ -162,7 +194,7 @@ mod tests {
         for (lag, faded) in [(0.02, 40), (0.1, 60), (0.126, 60), (0.5, 120), (5.0, 1500)] {
             let t: Vec<f64> = (0..2000).map(|i| dt * f64::from(i)).collect();
             let mut values: Vec<f64> = t.iter().map(|t| (rate * t).sin()).collect();
-            Sensor { lag_s: Some(lag), ..Sensor::perfect() }.read(0.0, &t, &mut values);
+            Sensor { lag_s: Some(lag), ..Sensor::perfect() }.read(0.0, &t, &[], &mut values);
             let gain = (1.0 + (rate * lag).powi(2)).sqrt().recip();
             for (value, t) in values.iter().zip(&t).skip(faded) {
                 let expected = gain * (rate * t - (rate * lag).atan()).sin();
@@ -171,16 +203,18 @@ mod tests {
         }
     }
 
-    /// A ramp that begins at rest: the reading begins where the quantity stands, if the first reading says so.
+    /// A ramp that begins at rest: the reading begins where the quantity stands, if the first readings say so, whichever of them there are.
     #[test]
-    fn a_lag_begins_where_the_first_reading_says() {
+    fn a_lag_begins_where_the_first_readings_say() {
         let t: Vec<f64> = (0..50).map(|i| 0.1 * f64::from(i)).collect();
-        for (first, settled) in [(None, 0.0), (Some(-0.6), 0.0), (Some(0.1), 1.0), (Some(-0.13), 0.75)] {
+        let read = |settled: f64| t.iter().map(move |t| 2.0 * (t - 0.25) + settled * 0.5 * (-t / 0.25).exp());
+        for (settled, wrong_by) in [(0.0, 0.0), (1.0, 0.04), (0.75, 0.02), (0.75, -0.02)] {
+            let mut measured: Vec<f64> = read(settled).map(|value| value + wrong_by).collect();
+            measured[1] = f64::NAN;
             let mut values: Vec<f64> = t.iter().map(|t| 2.0 * t).collect();
-            Sensor { lag_s: Some(0.25), first, ..Sensor::perfect() }.read(0.0, &t, &mut values);
-            for (value, t) in values.iter().zip(&t) {
-                let expected = 2.0 * (t - 0.25) + settled * 0.5 * (-t / 0.25).exp();
-                assert_relative_eq!(*value, expected, epsilon = 1e-9);
+            Sensor { lag_s: Some(0.25), ..Sensor::perfect() }.read(0.0, &t, &measured, &mut values);
+            for (value, expected) in values.iter().zip(read(settled)) {
+                assert_relative_eq!(*value, expected, epsilon = 1e-5);
             }
         }
     }
@@ -189,7 +223,7 @@ mod tests {
     fn a_sensor_saturates_and_drifts() {
         let t = [10.0, 11.0, 12.0];
         let mut values = [0.0, 1.0, 2.0];
-        Sensor { drift_per_s: 0.5, upper: 1.2, ..Sensor::perfect() }.read(10.0, &t, &mut values);
+        Sensor { drift_per_s: 0.5, upper: 1.2, ..Sensor::perfect() }.read(10.0, &t, &[], &mut values);
         assert_eq!(values, [0.0, 1.2, 1.2]);
     }
 }

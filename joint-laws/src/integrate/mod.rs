@@ -59,6 +59,11 @@ pub trait Machine<T: Number> {
     /// The motion is now beyond an edge, or before it; the laws keep the form of that side until the next call.
     fn cross(&mut self, _edge: usize, _beyond: bool) {}
 
+    /// Whether readings depend on the states' derivatives, as an accelerometer's do.
+    fn reads_rates(&self) -> bool {
+        false
+    }
+
     /// The states' derivatives without dry friction.
     fn smooth(&mut self, t: f64, x: &[T], rates: &mut [T]);
 
@@ -90,6 +95,15 @@ pub struct Reading {
     pub row: usize,
     /// Which of the caller's infinitesimal shifts in time it has.
     pub shift: usize,
+}
+
+/// The motion at a reading.
+#[derive(Debug, Clone, Copy)]
+pub struct Point<'a, T> {
+    /// The states.
+    pub x: &'a [T],
+    /// Their derivatives, friction and ceilings included, of a machine that [reads](Machine::reads_rates) them; else nothing.
+    pub rates: &'a [T],
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -246,14 +260,31 @@ impl<T: Number> Integrator<T> {
         self.fresh = false;
     }
 
-    /// The states along the tangent of the motion, a time away.
-    pub fn along_tangent(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], away: T) -> &[T] {
+    /// The motion along its tangent, a time away.
+    pub fn along_tangent(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], away: T) -> Point<'_, T> {
         let mut rates = std::mem::take(&mut self.spare);
         self.derivative(machine, t, x, &mut rates);
         self.point.clear();
         self.point.extend(x.iter().zip(&rates).map(|(x, r)| *x + *r * away));
         self.spare = rates;
-        &self.point
+        Point { x: &self.point, rates: if machine.reads_rates() { &self.spare } else { &[] } }
+    }
+
+    /// Reads the motion where the states are `x`.
+    fn read<M: Machine<T>>(
+        &mut self,
+        machine: &mut M,
+        reading: &Reading,
+        x: &[T],
+        read: &mut impl FnMut(&mut M, &Reading, Point<'_, T>),
+    ) {
+        if !machine.reads_rates() {
+            return read(machine, reading, Point { x, rates: &[] });
+        }
+        let mut rates = std::mem::take(&mut self.spare);
+        self.derivative(machine, reading.t_s, x, &mut rates);
+        read(machine, reading, Point { x, rates: &rates });
+        self.spare = rates;
     }
 
     fn smooth_rate(&mut self, machine: &mut impl Machine<T>, t: f64, x: &[T], state: usize) -> T {
@@ -382,7 +413,7 @@ impl<T: Number> Integrator<T> {
     /// Moves the states from `*t` to `to`, between which inputs must not jump, and reads them on the way.
     ///
     /// `reads` rise in time and lie between the two; each has one of the infinitesimal `shifts`. `read` gets the machine, the reading and
-    /// the states.
+    /// the motion there.
     ///
     /// # Errors
     /// [`Diverged`].
@@ -395,7 +426,7 @@ impl<T: Number> Integrator<T> {
         to: f64,
         reads: &[Reading],
         shifts: &[T],
-        mut read: impl FnMut(&mut M, &Reading, &[T]),
+        mut read: impl FnMut(&mut M, &Reading, Point<'_, T>),
     ) -> Result<(), Diverged> {
         let mut reads = reads.iter().peekable();
         let shift = |r: &Reading| shifts.get(r.shift).copied().unwrap_or(T::from(0.0));
@@ -425,14 +456,14 @@ impl<T: Number> Integrator<T> {
                 }
                 while let Some(r) = reads.next_if(|r| r.t_s <= next) {
                     let by = shift(r);
-                    if r.t_s == next && by == T::from(0.0) {
-                        read(machine, r, &self.trial);
-                        continue;
-                    }
-                    let part = if h > 0.0 { (r.t_s - *t) / h } else { 0.0 };
                     let mut point = std::mem::take(&mut self.point);
-                    self.within_moved(x, h, part, by, &mut point);
-                    read(machine, r, &point);
+                    if r.t_s == next && by == T::from(0.0) {
+                        point.copy_from_slice(&self.trial);
+                    } else {
+                        let part = if h > 0.0 { (r.t_s - *t) / h } else { 0.0 };
+                        self.within_moved(x, h, part, by, &mut point);
+                    }
+                    self.read(machine, r, &point, &mut read);
                     self.point = point;
                 }
                 if let Some((event, _)) = first {
@@ -457,7 +488,7 @@ impl<T: Number> Integrator<T> {
             let mut point = std::mem::take(&mut self.point);
             point.copy_from_slice(x);
             self.nudge(machine, *t, &mut point, by);
-            read(machine, r, &point);
+            self.read(machine, r, &point, &mut read);
             self.point = point;
         }
         Ok(())

@@ -27,6 +27,9 @@ impl<T: Number> Machine<T> for Rubbing<T> {
     fn ceilings(&self) -> &[Ceiling<T>] {
         &[]
     }
+    fn reads_rates(&self) -> bool {
+        true
+    }
     fn smooth(&mut self, _: f64, x: &[T], rates: &mut [T]) {
         self.evaluations += 1;
         rates[0] = x[1];
@@ -153,8 +156,8 @@ fn a_level_stays_at_its_ceiling_while_more_comes_in_than_leaves() {
     assert_relative_eq!(x[0], expected, epsilon = 1e-9);
 }
 
-/// Long steps read at many times give what short steps give, with and without friction, and readings that come a moment later differ by
-/// the rates.
+/// Long steps read at many times give what short steps give, with and without friction, readings that come a moment later differ by the
+/// rates, and so do the rates: friction is among them.
 #[test]
 fn readings_within_long_steps_are_those_of_short_ones() {
     for level in [0.0, 0.3] {
@@ -164,10 +167,12 @@ fn readings_within_long_steps_are_those_of_short_ones() {
             (0..40).map(|k| Reading { t_s: 0.1 * f64::from(k), row: k as usize, shift: 0 }).collect();
         let (mut t, mut x) = (0.0, [Dual::from(1.0), Dual::from(0.0)]);
         integrator.settle(&mut machine, t, &mut x);
-        let mut read = vec![[Dual::from(0.0); 2]; reads.len()];
+        let mut read = vec![[Dual::from(0.0); 3]; reads.len()];
         let later = [Dual::parameter(0.0, 0)];
         integrator
-            .advance(&mut machine, &mut t, &mut x, 4.0, &reads, &later, |_, r, x| read[r.row] = [x[0], x[1]])
+            .advance(&mut machine, &mut t, &mut x, 4.0, &reads, &later, |_, r, at| {
+                read[r.row] = [at.x[0], at.x[1], at.rates[1]];
+            })
             .unwrap();
         for (reading, got) in reads.iter().zip(&read).skip(1) {
             let mut x = [1.0, 0.0];
@@ -176,6 +181,9 @@ fn readings_within_long_steps_are_those_of_short_ones() {
                 assert_relative_eq!(got[i].re, x[i], epsilon = 1e-5);
             }
             assert_relative_eq!(got[0].eps[0], x[1], epsilon = 2e-4);
+            let acceleration = 0.2 - 9.0 * x[0] - level * x[1].signum();
+            assert_relative_eq!(got[2].re, acceleration, epsilon = 1e-4);
+            assert_relative_eq!(got[2].eps[0], -9.0 * x[1], epsilon = 2e-3);
         }
     }
 }

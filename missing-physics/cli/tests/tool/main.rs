@@ -1,5 +1,6 @@
 //! The tool, as a program that is run: one program of tests, linked once.
 
+mod accelerometer;
 mod astray;
 mod bad_recordings;
 mod browser;
@@ -19,5 +20,6 @@ mod prove;
 mod recorded;
 mod repair;
 mod report;
+mod simulated;
 mod templates;
 mod watch;

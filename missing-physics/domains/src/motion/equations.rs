@@ -2,7 +2,7 @@
 
 use joint_laws::signal::Between;
 
-use super::expression::Expression;
+use super::expression::{Expression, derivative};
 use super::tape::Tape;
 use super::units;
 use crate::recording::{Header, Memory, ReadError, Section, Source, quoted};
@@ -81,7 +81,7 @@ pub(super) struct Joint {
 
 /// The equations, and where effects may act.
 ///
-/// Names in expressions are states, inputs, parameters and `t_s`, in this order.
+/// Names in expressions are states, inputs, parameters and `t_s`, in this order, and in outputs' expressions the states' derivatives.
 #[derive(Debug, Clone)]
 pub(super) struct Equations {
     pub(super) states: Vec<State>,
@@ -94,6 +94,8 @@ pub(super) struct Equations {
     /// The states' derivatives, and the outputs, to be evaluated.
     pub(super) rates: Tape,
     pub(super) readings: Tape,
+    /// Whether any output depends on a derivative.
+    pub(super) reads_rates: bool,
 }
 
 impl Equations {
@@ -127,6 +129,8 @@ impl Equations {
             .chain(["t_s".to_owned()])
             .collect();
         unlike_each_other(&model, &names)?;
+        let derivatives = state_names.iter().map(|state| derivative(state));
+        let output_names: Vec<String> = names.iter().cloned().chain(derivatives).collect();
         let states = state_names
             .iter()
             .map(|name| {
@@ -141,12 +145,18 @@ impl Equations {
             .keys()
             .iter()
             .map(|name| {
-                let expression = expression(&outputs, name, &names)?;
+                let expression = expression(&outputs, name, &output_names)?;
                 let bare = expression.bare_name();
-                if let Some(other) = bare {
-                    units::check_same(&outputs, name, &names[other])?;
+                match bare {
+                    Some(other) if other < names.len() => {
+                        units::check_same(&outputs, name, &names[other])?;
+                    }
+                    Some(rate) => {
+                        units::check_derivative(&outputs, name, &state_names[rate - names.len()])?;
+                    }
+                    None => {}
                 }
-                if names.contains(name) && bare.map(|b| &names[b]) != Some(name) {
+                if names.contains(name) && bare.map(|b| &output_names[b]) != Some(name) {
                     return Err(outputs.unfit(
                         name,
                         "also the name of a state, input or parameter",
@@ -160,11 +170,12 @@ impl Equations {
         let mut known: Vec<Option<f64>> = vec![None; of_motion];
         known.extend(parameters.iter().map(|p| (p.known && !p.per_run).then_some(p.value)));
         known.push(None);
-        let stays: Vec<bool> = (0..known.len()).map(|n| n >= of_motion && n + 1 < known.len()).collect();
+        let mut stays: Vec<bool> = (0..known.len()).map(|n| n >= of_motion && n + 1 < known.len()).collect();
         let rates = Tape::new(states.iter().map(|s| &s.rate), &known, &stays);
-        let readings = Tape::new(outputs.iter().map(|o| &o.expression), &known, &stays);
-        let (joints, levels) = (Vec::new(), Vec::new());
-        let mut equations = Self { states, outputs, inputs, parameters, joints, levels, rates, readings };
+        let (joints, levels, readings) = (Vec::new(), Vec::new(), Tape::new(std::iter::empty(), &[], &[]));
+        let reads_rates = false;
+        let mut equations =
+            Self { states, outputs, inputs, parameters, joints, levels, rates, readings, reads_rates };
         equations.read_starts(&header.section("start")?)?;
         for section in header.root().sections("joint")? {
             let joint = equations.read_joint(&section)?;
@@ -174,6 +185,13 @@ impl Equations {
             let level = equations.state(&section, "state")?;
             equations.levels.push(level);
         }
+        equations.sense_accelerations();
+        known.extend(equations.states.iter().map(|_| None));
+        stays.extend(equations.states.iter().map(|_| false));
+        equations.readings = Tape::new(equations.outputs.iter().map(|o| &o.expression), &known, &stays);
+        let rate_names = equations.names()..known.len();
+        equations.reads_rates =
+            rate_names.into_iter().any(|r| equations.outputs.iter().any(|o| o.expression.has(r)));
         Ok(equations)
     }
 
@@ -191,6 +209,7 @@ impl Equations {
             levels: Vec::new(),
             rates: Tape::new(std::iter::empty(), &[], &[]),
             readings: Tape::new(std::iter::empty(), &[], &[]),
+            reads_rates: false,
         })
     }
 
@@ -218,7 +237,12 @@ impl Equations {
         self.states.len() + input
     }
 
-    /// Number of names in expressions.
+    /// The place of a state's derivative among the names of outputs' expressions.
+    pub(super) fn rate_name(&self, state: usize) -> usize {
+        self.names() + state
+    }
+
+    /// Number of names in expressions of derivatives.
     pub(super) fn names(&self) -> usize {
         self.states.len() + self.inputs.len() + self.parameters.len() + 1
     }

@@ -66,6 +66,8 @@ const ONES: [(&str, One); 14] = [
     ("sign", One::Sign),
 ];
 const TWOS: [(&str, Two); 3] = [("atan2", Two::Atan2), ("min", Two::Min), ("max", Two::Max)];
+/// The word for a derivative, which Modelica has too.
+const DERIVATIVE: &str = "der";
 /// Brackets within brackets; more are no equation.
 const DEEPEST: usize = 60;
 
@@ -73,6 +75,11 @@ const DEEPEST: usize = 60;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Expression {
     steps: Vec<Step>,
+}
+
+/// How the derivative of a state is written: `der(x)`.
+pub(super) fn derivative(state: &str) -> String {
+    format!("{DERIVATIVE}({state})")
 }
 
 /// Why a text is no expression: what is wrong, and at which character (from 1).
@@ -83,7 +90,7 @@ pub(super) struct Wrong {
 }
 
 impl Expression {
-    /// Parses a text in which the names `names` may stand.
+    /// Parses a text in which the names `names` may stand; a name such as `der(x)` is that of a derivative ([`derivative`]).
     pub(super) fn parse(text: &str, names: &[String]) -> Result<Self, Wrong> {
         let chars: Vec<char> = text.chars().collect();
         let mut parser = Parser { chars: &chars, at: 0, names, steps: Vec::new(), depth: 0 };
@@ -102,6 +109,18 @@ impl Expression {
         }
     }
 
+    /// What it is, and beside it so many times what one expression is more than another.
+    pub(super) fn beside(&self, factor: f64, more: &Self, than: &Self) -> Self {
+        let parts = [&self.steps[..], &more.steps, &than.steps, &[Step::Two(Two::Subtract)]];
+        let scaled = [Step::Number(factor), Step::Two(Two::Multiply), Step::Two(Two::Add)];
+        Self { steps: parts.into_iter().flatten().chain(&scaled).copied().collect() }
+    }
+
+    /// The expression that is a name.
+    pub(super) fn of_name(name: usize) -> Self {
+        Self { steps: vec![Step::Name(name)] }
+    }
+
     /// Whether a name stands in it.
     pub(super) fn has(&self, name: usize) -> bool {
         self.steps.contains(&Step::Name(name))
@@ -113,7 +132,6 @@ impl Expression {
     }
 
     /// Its value where the names have these values, step by step; `stack` is room.
-    #[cfg(test)]
     pub(super) fn value<T: Number>(&self, values: &[T], stack: &mut Vec<T>) -> T {
         stack.clear();
         for step in &self.steps {
@@ -133,7 +151,6 @@ impl Expression {
     }
 }
 
-#[cfg(test)]
 fn change<T: Number>(stack: &mut [T], f: impl FnOnce(T) -> T) {
     if let Some(top) = stack.last_mut() {
         *top = f(*top);
@@ -345,12 +362,23 @@ impl Parser<'_> {
         }
     }
 
-    fn name(&mut self) -> Result<(), Wrong> {
-        let begin = self.at;
+    fn identifier(&mut self) {
         while self.chars.get(self.at).is_some_and(|c| c.is_alphanumeric() || *c == '_') {
             self.at += 1;
         }
-        let name: String = self.chars[begin..self.at].iter().collect();
+    }
+
+    fn name(&mut self) -> Result<(), Wrong> {
+        let begin = self.at;
+        self.identifier();
+        let mut name: String = self.chars[begin..self.at].iter().collect();
+        if name == DERIVATIVE && self.take('(') {
+            self.peek();
+            let begin = self.at;
+            self.identifier();
+            name = derivative(&self.chars[begin..self.at].iter().collect::<String>());
+            self.expect(')')?;
+        }
         if let Some(place) = self.names.iter().position(|n| *n == name) {
             self.steps.push(Step::Name(place));
             return Ok(());
@@ -422,6 +450,8 @@ mod tests {
             ("2*(x + 1", 9, "\")\" is missing"),
             ("x + speed", 5, "speed is not known"),
             ("1.2.3", 1, "no number"),
+            ("2*der(y)", 3, "der(y) is not known"),
+            ("der(x", 6, "\")\" is missing"),
             ("x; y", 2, "was not expected"),
         ] {
             let wrong = Expression::parse(text, &["x".to_owned()]).unwrap_err();

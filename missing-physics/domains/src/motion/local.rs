@@ -1,6 +1,6 @@
 //! What a force, a resistance or a flow does that acts at some rows only; and the positions and speeds along which it may act.
 
-use joint_laws::integrate::Machine as _;
+use joint_laws::integrate::{Machine as _, Point};
 use missing_physics::data::Run;
 use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
 use nalgebra::{DMatrix, DVector};
@@ -19,8 +19,9 @@ struct Linear {
     /// How a deviation of the states changes their derivatives, and the outputs.
     rates: DMatrix<f64>,
     outputs: DMatrix<f64>,
-    /// How what may be acted on changes the derivatives.
+    /// How what may be acted on changes the derivatives, and at once the outputs that read these.
     pushes: Vec<DVector<f64>>,
+    felt: Vec<Vec<f64>>,
     /// The states.
     states: Vec<f64>,
 }
@@ -31,8 +32,9 @@ struct Propagation {
     /// Row by row, for each half of the time since the row before: what a deviation becomes, state by state, and last what a unit of the
     /// amount adds.
     halves: Vec<[Vec<f64>; 2]>,
-    /// Row by row, what the outputs read of a deviation, output by output.
+    /// Row by row, what the outputs read of a deviation, output by output, and of a unit of the amount itself.
     outputs: Vec<Vec<f64>>,
+    felt: Vec<Vec<f64>>,
 }
 
 impl Propagation {
@@ -62,6 +64,7 @@ impl Propagation {
             states,
             halves: (1..linear.len()).map(halves).collect(),
             outputs: linear.iter().map(outputs).collect(),
+            felt: linear.iter().map(|at| at.felt[acted_on].clone()).collect(),
         }
     }
 
@@ -71,8 +74,9 @@ impl Propagation {
         let mut out = vec![0.0; outputs * n];
         let Some(first) = amounts.iter().position(|a| *a != 0.0) else { return out };
         let (mut deviation, mut before) = (vec![0.0; self.states], vec![0.0; self.states]);
-        for row in first.max(1)..n {
-            for (half, amount) in self.halves[row - 1].iter().zip([amounts[row - 1], amounts[row]]) {
+        for row in first..n {
+            let halves = row.checked_sub(1).map_or(&[][..], |before| &self.halves[before]);
+            for (half, amount) in halves.iter().zip([amounts[row.saturating_sub(1)], amounts[row]]) {
                 before.copy_from_slice(&deviation);
                 for (to, weights) in deviation.iter_mut().zip(half.chunks(self.states + 1)) {
                     let (of_states, of_amount) = weights.split_at(self.states);
@@ -80,8 +84,10 @@ impl Propagation {
                         + of_amount[0] * amount;
                 }
             }
-            for (c, weights) in self.outputs[row].chunks(self.states).enumerate() {
-                out[c * n + row] = weights.iter().zip(&deviation).map(|(w, d)| w * d).sum();
+            for (c, (weights, felt)) in self.outputs[row].chunks(self.states).zip(&self.felt[row]).enumerate()
+            {
+                let of_states = weights.iter().zip(&deviation).map(|(w, d)| w * d);
+                out[c * n + row] = of_states.sum::<f64>() + felt * amounts[row];
             }
         }
         out
@@ -94,8 +100,7 @@ impl MotionModel {
         let equations = self.equations();
         let quantity = |what: &str, name: &str, several: bool, state: usize| {
             let name = if several { format!("{what}_on_{name}") } else { what.to_owned() };
-            let unit = units::text(&equations.states[state].name);
-            Quantity::new(name, if unit.is_empty() { "1/s".into() } else { format!("{unit}/s") })
+            Quantity::new(name, units::text_of_rate(&equations.states[state].name))
         };
         let several = equations.joints.len() > 1;
         let joints =
@@ -129,6 +134,7 @@ impl MotionModel {
                 rates: DMatrix::zeros(states, states),
                 outputs: DMatrix::zeros(outputs, states),
                 pushes: vec![DVector::zeros(states); joints + levels.len()],
+                felt: vec![vec![0.0; outputs]; joints + levels.len()],
                 states: x[..states].to_vec(),
             };
             let mut direction = vec![0.0; x.len()];
@@ -141,8 +147,25 @@ impl MotionModel {
                     push[levels[k - joints]] = 1.0;
                 }
             }
-            let mut room = vec![0.0; x.len()];
+            let (mut room, mut smooth) = (vec![0.0; x.len()], vec![0.0; x.len()]);
             let mut read = vec![[0.0; 2]; outputs];
+            let slope = |[up, down]: [f64; 2], step: f64| (up - down) / (2.0 * step);
+            if self.equations().reads_rates {
+                machine.smooth(t, x, &mut smooth);
+                for (push, felt) in here.pushes.iter().zip(&mut here.felt) {
+                    for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                        room.copy_from_slice(&smooth);
+                        room.iter_mut().zip(push).for_each(|(rate, push)| *rate += sign * STEP * push);
+                        machine.outputs(
+                            t,
+                            Point { x, rates: &room },
+                            |_| true,
+                            |c, value| read[c][side] = value,
+                        );
+                    }
+                    felt.iter_mut().zip(&read).for_each(|(felt, sides)| *felt = slope(*sides, STEP));
+                }
+            }
             for state in 0..states {
                 let step = STEP * sizes[state];
                 for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
@@ -151,14 +174,14 @@ impl MotionModel {
                     beside[state] += sign * step;
                     machine.smooth(t, &beside, &mut room);
                     rates.iter_mut().zip(&room).for_each(|(rate, now)| rate[side] = *now);
-                    machine.outputs(t, &beside, |_| true, |c, value| read[c][side] = value);
+                    let at = Point { x: &beside, rates: &room };
+                    machine.outputs(t, at, |_| true, |c, value| read[c][side] = value);
                 }
-                let slope = |[up, down]: [f64; 2]| (up - down) / (2.0 * step);
                 for (k, rate) in rates.iter().enumerate() {
-                    here.rates[(k, state)] = slope(*rate);
+                    here.rates[(k, state)] = slope(*rate, step);
                 }
                 for (c, value) in read.iter().enumerate() {
-                    here.outputs[(c, state)] = slope(*value);
+                    here.outputs[(c, state)] = slope(*value, step);
                 }
             }
             all.push(here);

@@ -3,7 +3,7 @@
 use joint_laws::Number;
 use joint_laws::friction::DryFriction;
 use joint_laws::hysteresis::bouc_wen_rate;
-use joint_laws::integrate::{Ceiling, Contact, Edge, Machine};
+use joint_laws::integrate::{Ceiling, Contact, Edge, Machine, Point};
 use joint_laws::signal::Signal;
 use joint_laws::spring::{cogging, end_stop};
 
@@ -127,11 +127,12 @@ impl<T: Number> Driven<'_, T> {
         self.equations.rates.result(&self.values, state)
     }
 
-    /// What the outputs should read: `read` gets the number and the value of each of those that are `wanted`.
+    /// What the outputs should read: `read` gets the number and the value of each of those that are `wanted`. Where derivatives are not
+    /// said, the machine stands still.
     pub(super) fn outputs(
         &mut self,
         t: f64,
-        x: &[T],
+        Point { x, rates }: Point<'_, T>,
         wanted: impl Fn(usize) -> bool,
         mut read: impl FnMut(usize, T),
     ) {
@@ -142,6 +143,12 @@ impl<T: Number> Driven<'_, T> {
         }
         let last = self.equations.names() - 1;
         self.seen[last] = T::from(t);
+        if self.equations.reads_rates {
+            // Derivatives in true time.
+            let rate = |state: usize| rates.get(state).copied().unwrap_or(T::from(0.0));
+            let paced = |rate: T| self.pace.map_or(rate, |pace| rate / pace);
+            (0..states).for_each(|state| self.seen[last + 1 + state] = paced(rate(state)));
+        }
         self.equations.readings.run(&mut self.seen);
         for c in (0..self.equations.outputs.len()).filter(|c| wanted(*c)) {
             read(c, self.equations.readings.result(&self.seen, c));
@@ -209,6 +216,10 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
 
     fn edges(&self) -> &[Edge<T>] {
         &self.edges
+    }
+
+    fn reads_rates(&self) -> bool {
+        self.equations.reads_rates
     }
 
     fn cross(&mut self, edge: usize, beyond: bool) {

@@ -1,5 +1,7 @@
 //! The domain `motion`: any machine whose equations of motion can be written down, with what is usually left out of them.
 
+mod accelerations;
+mod commands;
 mod detents;
 mod effects;
 mod equations;

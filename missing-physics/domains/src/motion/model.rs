@@ -1,6 +1,6 @@
 //! The full model of a recording of the domain `motion`.
 
-use joint_laws::integrate::{Contact, Integrator, Machine as _, Method, Reading};
+use joint_laws::integrate::{Contact, Integrator, Machine as _, Method, Point, Reading};
 use joint_laws::signal::Signal;
 use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
@@ -13,7 +13,7 @@ use super::effects::{Effects, Role};
 use super::equations::{Equations, Joint, Start};
 use super::late::{before_run, readings};
 use super::machine::{Driven, Force};
-use super::scales::Scales;
+use super::scales::{Range, Scales};
 use super::setting::{Setting, Shared};
 use super::windows;
 use crate::mechanics::JointEffect;
@@ -32,9 +32,6 @@ const FINEST_FOR_LAWS: f64 = 0.125;
 /// An end stop is stiffer by this factor than what it takes to bring the joint to its largest position with its typical acceleration: what
 /// yields more is a spring.
 const STIFFER: f64 = 3.0;
-
-/// Rows before a window whose commands may still be on their way at its beginning.
-const BEFORE: usize = 40;
 
 /// Derivatives that a number carries at the most; of more parameters eight at a time.
 const MOST_DERIVATIVES: usize = 12;
@@ -81,15 +78,15 @@ pub struct MotionModel {
     pace: Pace,
     scales: Scales,
     /// Where runs are cut into windows: the runs.
-    cut: Option<Vec<Whole>>,
+    pub(super) cut: Option<Vec<Whole>>,
 }
 
 /// A run that is cut into windows.
 #[derive(Debug, Clone)]
-struct Whole {
+pub(super) struct Whole {
     label: String,
     /// Times, and what each input is then.
-    inputs: Vec<Vec<f64>>,
+    pub(super) inputs: Vec<Vec<f64>>,
 }
 
 impl Whole {
@@ -245,14 +242,20 @@ impl MotionModel {
         mut at_row: impl FnMut(&mut Driven<'_, f64>, f64, &[f64]),
     ) -> Result<usize, String> {
         let mut setting = self.setting(run, shared, nuisance, &[]);
+        setting.before = self.commanded_before(run, &setting, [shared, nuisance], &[]);
         // A row is where the machine is then, whatever its sensors are late by.
         setting.delays.fill(None);
-        self.follow(run, setting, nuisance, |machine, reading, x, _| at_row(machine, reading.t_s, x))
+        self.follow(run, setting, nuisance, |machine, reading, at, _| at_row(machine, reading.t_s, at.x))
     }
 
     /// A typical size of each state.
     pub(super) fn state_sizes(&self) -> &[f64] {
         &self.scales.states
+    }
+
+    /// How far an output ranges.
+    pub(super) fn output_size(&self, output: usize) -> f64 {
+        self.scales.outputs.get(output).map_or(1.0, |Range { range: [low, high] }| high - low)
     }
 
     /// States and derivatives at each row of a run.
@@ -273,7 +276,13 @@ impl MotionModel {
         Ok(course)
     }
 
-    fn setting<T: Number>(&self, run: &Run, shared: &[T], nuisance: &[T], moving: &[usize]) -> Setting<T> {
+    pub(super) fn setting<T: Number>(
+        &self,
+        run: &Run,
+        shared: &[T],
+        nuisance: &[T],
+        moving: &[usize],
+    ) -> Setting<T> {
         let equations = &self.equations;
         let mut values = vec![T::from(0.0); equations.rates.registers()];
         for (k, p) in equations.parameters.iter().enumerate() {
@@ -327,7 +336,7 @@ impl MotionModel {
         run: &Run,
         setting: Setting<T>,
         nuisance: &[T],
-        mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading, &[T], Option<&[T]>),
+        mut at_row: impl FnMut(&mut Driven<'_, T>, &Reading, Point<'_, T>, Option<&[T]>),
     ) -> Result<usize, String> {
         let times = &run.inputs[0];
         let Some(&begin) = times.first() else { return Ok(0) };
@@ -351,7 +360,7 @@ impl MotionModel {
             at_row(&mut machine, read, early, Some(&x));
             next += 1;
         }
-        let mut at_row = |machine: &mut _, read: &Reading, x: &[T]| at_row(machine, read, x, None);
+        let mut at_row = |machine: &mut _, read: &Reading, at: Point<'_, T>| at_row(machine, read, at, None);
         // A row is read under its own commands; where jumps may move, what jumps a moment later has not acted yet.
         for change in breaks.iter().map(Some).chain([None]) {
             let until = change.map_or_else(|| reads.last().map_or(begin, |r| r.t_s), |b| b.t.re());
@@ -396,22 +405,8 @@ impl MotionModel {
     fn machine<T: Number>(&self, run: &Run, setting: Setting<T>, x: &[T]) -> Driven<'_, T> {
         let equations = &self.equations;
         let shortest_s = 0.25 * self.scales.step_s;
-        let signals: Vec<Signal<T>> = (0..equations.inputs.len())
-            .map(|k| {
-                let mut drive = setting.drives[k].0;
-                if let (Some((_, follower)), Some(joint)) =
-                    (&mut drive.play, equations.joints.iter().find(|j| j.drive == Some(k)))
-                {
-                    *follower = x[joint.position];
-                }
-                // Play begins where the joint stands at the run's beginning; what is late or slow still has what was before that.
-                let [times, commands] = match drive.play {
-                    Some(_) => [&run.inputs[0][..], &run.inputs[1 + k]],
-                    None => self.commands(run, k),
-                };
-                Signal::new(times, commands, equations.inputs[k].between, &drive, shortest_s)
-            })
-            .collect();
+        let signals: Vec<Signal<T>> =
+            (0..equations.inputs.len()).map(|k| self.signal(run, &setting, k, x, shortest_s)).collect();
         let joint_of: Vec<usize> =
             (0..setting.laws.len()).filter(|&j| setting.laws[j].dry.is_some()).collect();
         let contacts = joint_of.iter().map(|&j| Contact { velocity: equations.joints[j].velocity }).collect();
@@ -443,19 +438,6 @@ impl MotionModel {
         }
     }
 
-    /// Times, and what an input is then: of a window with some rows before its beginning.
-    fn commands<'a>(&'a self, run: &'a Run, input: usize) -> [&'a [f64]; 2] {
-        let whole = self.cut.as_ref().filter(|_| windows::continues(run));
-        let columns =
-            whole.and_then(|runs| runs.get(windows::of_run(run))).map_or(&run.inputs, |w| &w.inputs);
-        let (Some(first), Some(last)) = (run.inputs[0].first(), run.inputs[0].last()) else {
-            return [&run.inputs[0], &run.inputs[1 + input]];
-        };
-        let from = columns[0].partition_point(|t| t < first).saturating_sub(BEFORE);
-        let to = columns[0].partition_point(|t| t <= last);
-        [&columns[0][from..to], &columns[1 + input][from..to]]
-    }
-
     /// Where pieces of inputs begin behind a run's start, in order; what holds from the start on has begun.
     fn breaks<T: Number>(&self, machine: &mut Driven<'_, T>, begin: f64, delayed: bool) -> Vec<Break<T>> {
         let mut breaks = Vec::new();
@@ -483,18 +465,31 @@ impl MotionModel {
         moving: &[usize],
         out: &mut [T],
     ) -> Result<(), String> {
+        let mut setting = self.setting(run, shared, nuisance, moving);
+        setting.before = self.commanded_before(run, &setting, [shared, nuisance], moving);
+        self.predict_under(run, setting, nuisance, out)
+    }
+
+    /// Predicts a run under a setting.
+    pub(super) fn predict_under<T: Number>(
+        &self,
+        run: &Run,
+        setting: Setting<T>,
+        nuisance: &[T],
+        out: &mut [T],
+    ) -> Result<(), String> {
         let n = run.len();
-        let setting = self.setting(run, shared, nuisance, moving);
         let sensors = setting.sensors.clone();
         let delays: Vec<Option<f64>> = setting.delays.iter().map(|d| d.map(|delay| delay.re())).collect();
         // Readings of each output that are older than the run, as if the machine had stood still before it: row, value.
         let mut still: Vec<Vec<(usize, T)>> = vec![Vec::new(); sensors.len()];
-        self.follow(run, setting, nuisance, |machine, reading, x, begins| {
+        self.follow(run, setting, nuisance, |machine, reading, at, begins| {
             let wanted =
                 |c: usize| if reading.shift == 0 { delays[c].is_none() } else { c + 1 == reading.shift };
-            machine.outputs(reading.t_s, x, wanted, |c, value| out[c * n + reading.row] = value);
-            if let Some(begins) = begins {
-                machine.outputs(reading.t_s, begins, wanted, |c, value| still[c].push((reading.row, value)));
+            machine.outputs(reading.t_s, at, wanted, |c, value| out[c * n + reading.row] = value);
+            if let Some(x) = begins {
+                let at = Point { x, rates: &[] };
+                machine.outputs(reading.t_s, at, wanted, |c, value| still[c].push((reading.row, value)));
             }
         })?;
         let times = &run.inputs[0];
@@ -505,11 +500,8 @@ impl MotionModel {
         }
         let of_run = self.cut.as_ref().and_then(|runs| runs.get(windows::of_run(run)));
         let begin = of_run.and_then(Whole::begin_s).or(times.first().copied()).unwrap_or(0.0);
-        for (c, (mut sensor, column)) in sensors.into_iter().zip(out.chunks_mut(n.max(1))).enumerate() {
-            if sensor.lag_s.is_some() {
-                sensor.first = super::start::beginning(times, &run.outputs[c]).map(|[value, _]| value);
-            }
-            sensor.read(begin, times, column);
+        for (c, (sensor, column)) in sensors.iter().zip(out.chunks_mut(n.max(1))).enumerate() {
+            sensor.read(begin, times, &run.outputs[c], column);
         }
         match out.iter().position(|v| !v.re().is_finite()) {
             None => Ok(()),

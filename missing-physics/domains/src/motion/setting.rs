@@ -21,6 +21,8 @@ pub(super) struct Setting<T> {
     pub(super) edges: Vec<Edge<T>>,
     /// What acts on each input, and whether its jumps are moved in time.
     pub(super) drives: Vec<(Drive<T>, bool)>,
+    /// What was commanded of each before the run, where that is not its first command.
+    pub(super) before: Vec<Option<f64>>,
     pub(super) sensors: Vec<Sensor<T>>,
     /// Delays of outputs.
     pub(super) delays: Vec<Option<T>>,
@@ -61,6 +63,7 @@ impl<T: Number> Shared<'_, T> {
             ceilings: Vec::new(),
             edges: Vec::new(),
             drives: vec![(Drive::perfect(), false); equations.inputs.len()],
+            before: vec![None; equations.inputs.len()],
             sensors: vec![Sensor::perfect(); equations.outputs.len()],
             delays: vec![None; equations.outputs.len()],
             pace: None,

@@ -1,12 +1,12 @@
 //! Where fits begin: states from a run's first rows, effects from the sizes of the motion.
 
-use joint_laws::Dual;
+use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
 use missing_physics::model::{Mechanism, Scope, Spec};
 use nalgebra::{DMatrix, DVector};
 
 use super::effects::Role;
-use super::equations::{Equations, Output, Start};
+use super::equations::{Equations, Output, Start, State};
 use super::scales::{Scales, range};
 use crate::mechanics;
 
@@ -51,7 +51,11 @@ fn by_outputs(equations: &Equations, run: &Run, known: &mut [Option<f64>]) {
     let unknown: Vec<usize> = (0..known.len()).filter(|&k| known[k].is_none()).collect();
     let tells = |c: &usize| {
         let Output { expression, state, .. } = &equations.outputs[*c];
-        state.is_none() && unknown.iter().any(|&k| expression.has(k))
+        let by_rate = |(s, state): (usize, &State)| {
+            expression.has(equations.rate_name(s)) && unknown.iter().any(|&k| state.rate.has(k))
+        };
+        let by_itself = || unknown.iter().any(|&k| expression.has(k));
+        state.is_none() && (by_itself() || equations.states.iter().enumerate().any(by_rate))
     };
     let Some(&begin) = run.inputs[0].first() else { return };
     let first_rows = |c: usize| {
@@ -72,16 +76,17 @@ fn by_outputs(equations: &Equations, run: &Run, known: &mut [Option<f64>]) {
     let missed = |at: &DVector<f64>| -> DVector<f64> {
         let mut names = values.clone();
         unknown.iter().zip(at.iter()).for_each(|(&state, value)| names[state] = *value);
-        let mut registers = vec![0.0; equations.rates.registers()];
-        registers[..names.len()].copy_from_slice(&names);
-        equations.rates.prepare(&mut registers);
-        equations.rates.run(&mut registers);
+        let names: Vec<Dual<1>> = names.into_iter().map(Dual::from).collect();
         // Along the motion: the derivatives of the outputs are their slopes.
-        let mut seen = vec![Dual::<1>::from(0.0); equations.readings.registers()];
-        for (k, (seen, value)) in seen.iter_mut().zip(&names).enumerate() {
-            let rate = if k < known.len() { equations.rates.result(&registers, k) } else { 0.0 };
-            *seen = Dual { re: *value, eps: [rate] };
+        let mut names_along = names.clone();
+        for (along, rate) in names_along.iter_mut().zip(rates(equations, &names)) {
+            along.eps = [rate.re];
         }
+        let mut seen = vec![Dual::<1>::from(0.0); equations.readings.registers()];
+        let rates_along = rates(equations, &names_along);
+        seen.iter_mut()
+            .zip(names_along.into_iter().chain(rates_along))
+            .for_each(|(seen, value)| *seen = value);
         equations.readings.prepare(&mut seen);
         equations.readings.run(&mut seen);
         let of_output = |(c, [value, slope], [size, steep]): &(usize, [f64; 2], [f64; 2])| {
@@ -103,6 +108,15 @@ fn by_outputs(equations: &Equations, run: &Run, known: &mut [Option<f64>]) {
     if let Some((_, at)) = best {
         unknown.iter().zip(at.iter()).for_each(|(&state, value)| known[state] = Some(*value));
     }
+}
+
+/// The states' derivatives where names of the equations have these values.
+pub(super) fn rates<T: Number>(equations: &Equations, names: &[T]) -> Vec<T> {
+    let mut registers = vec![T::from(0.0); equations.rates.registers()];
+    registers[..names.len()].copy_from_slice(names);
+    equations.rates.prepare(&mut registers);
+    equations.rates.run(&mut registers);
+    (0..equations.states.len()).map(|state| equations.rates.result(&registers, state)).collect()
 }
 
 /// Where the squares of what is missed are least, from a start, and their sum there.

@@ -1,5 +1,6 @@
 //! Units, as names end in them.
 
+use super::expression::derivative;
 use crate::recording::{ReadError, Section};
 
 /// Suffixes and their units; the longest that fits counts.
@@ -59,26 +60,50 @@ pub(super) fn check_same(section: &Section<'_>, key: &str, other: &str) -> Resul
     }
 }
 
+/// The unit of a derivative in time, of those that names end in.
+pub(super) fn of_rate(unit: &str) -> Option<&'static str> {
+    let rates = [
+        ("m", "m/s"),
+        ("rad", "rad/s"),
+        ("m/s", "m/s^2"),
+        ("rad/s", "rad/s^2"),
+        ("m^3", "m^3/s"),
+        ("kg", "kg/s"),
+    ];
+    rates.iter().find(|(of, _)| *of == unit).map(|(_, rate)| *rate)
+}
+
+/// The unit of the derivative in time of what a name names.
+pub(super) fn text_of_rate(name: &str) -> String {
+    match of(name) {
+        None => "1/s".into(),
+        Some(unit) => of_rate(unit).map_or_else(|| format!("{unit}/s"), str::to_owned),
+    }
+}
+
 /// Checks that a quantity can be the derivative of another.
 pub(super) fn check_rate(section: &Section<'_>, key: &str, other: &str) -> Result<(), ReadError> {
     let (Some(a), Some(b)) = (of(key), of(other)) else { return Ok(()) };
-    let expected = match a {
-        "m" => "m/s",
-        "rad" => "rad/s",
-        "m/s" => "m/s^2",
-        "rad/s" => "rad/s^2",
-        "m^3" => "m^3/s",
-        "kg" => "kg/s",
-        _ => return Ok(()),
-    };
-    if b == expected {
-        return Ok(());
+    match of_rate(a) {
+        Some(expected) if b != expected => Err(section.unfit(
+            key,
+            format!("\"{other}\" (in {b})"),
+            format!("a derivative in {expected}, as {key} is in {a}"),
+        )),
+        _ => Ok(()),
     }
-    Err(section.unfit(
-        key,
-        format!("\"{other}\" (in {b})"),
-        format!("a derivative in {expected}, as {key} is in {a}"),
-    ))
+}
+
+/// Checks that a name and the derivative that it is have the same unit.
+pub(super) fn check_derivative(section: &Section<'_>, key: &str, state: &str) -> Result<(), ReadError> {
+    match (of(key), of(state).and_then(of_rate)) {
+        (Some(a), Some(b)) if a != b => Err(section.unfit(
+            key,
+            format!("\"{}\" (in {b})", derivative(state)),
+            format!("a quantity in {a}, as the name ends in"),
+        )),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
