@@ -153,6 +153,9 @@ impl<T: Number> Signal<T> {
     }
 }
 
+/// A line that crosses a value nearer to one of its ends than this part of it, in time, does so at the end.
+const AT_AN_END: f64 = 1e-9;
+
 /// Puts a knot wherever the line between two knots crosses a value.
 fn split<T: Number>(knots: &mut Vec<(T, T)>, at: T) {
     if !at.re().is_finite() {
@@ -162,7 +165,9 @@ fn split<T: Number>(knots: &mut Vec<(T, T)>, at: T) {
     for pair in knots.windows(2) {
         let ((t0, u0), (t1, u1)) = (pair[0], pair[1]);
         all.push(pair[0]);
-        if (u0.re() - at.re()) * (u1.re() - at.re()) < 0.0 {
+        let (above, below) = (u0.re() - at.re(), u1.re() - at.re());
+        let nearest = above.abs().min(below.abs());
+        if above * below < 0.0 && nearest > AT_AN_END * (above - below).abs() {
             all.push((t0 + (t1 - t0) * (at - u0) / (u1 - u0), at));
         }
     }
@@ -221,6 +226,21 @@ mod tests {
         let drive = Drive { dead_zone: 1.0, upper: 3.0, ..Drive::perfect() };
         let signal = Signal::new(&[0.0, 4.0], &[0.0, 4.0], Between::Linear, &drive, 0.01);
         for (t, expected) in [(0.5, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, 2.0), (3.5, 2.0)] {
+            assert_relative_eq!(at(&signal, t), expected, epsilon = 1e-12);
+        }
+    }
+
+    /// Commands that are zero but for rounding, as of a sine at pi, cross zero where they stand.
+    #[test]
+    fn a_command_of_nearly_zero_is_no_knot_beside_another() {
+        let signal = Signal::new(
+            &[2.98, 3.0, 3.02],
+            &[0.1, 3.67394e-16, -0.1],
+            Between::Linear,
+            &Drive::perfect(),
+            0.01,
+        );
+        for (t, expected) in [(2.99, 0.05), (3.0, 0.0), (3.005, -0.025), (3.01, -0.05)] {
             assert_relative_eq!(at(&signal, t), expected, epsilon = 1e-12);
         }
     }

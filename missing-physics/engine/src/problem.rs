@@ -266,6 +266,16 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
+    /// Whether a set is one model with any of `others`.
+    pub(crate) fn is_among<'s>(
+        &self,
+        set: &[usize],
+        mut others: impl Iterator<Item = &'s Vec<usize>>,
+    ) -> bool {
+        let at_work = self.at_work(set);
+        others.any(|other| self.at_work(other) == at_work)
+    }
+
     /// Which parameters (index into [`Spec::parameters`]) are free with the mechanisms `set` on.
     fn freed(&self, set: &[usize]) -> Vec<bool> {
         let spec = self.spec();

@@ -285,3 +285,93 @@ fn two_joints_that_rub_are_found_by_a_larger_set() {
     }
     assert_named(&answer(BELT, &data), &[("coulomb-friction@motor", 5.0), ("coulomb-friction@load", 4.0)]);
 }
+
+const TWO_LINKS: &str = r#"
+[model]
+outputs = { encoder1_rad = "shoulder_rad", encoder2_rad = "elbow_rad" }
+inputs = { torque1_n_m = "hold", torque2_n_m = "hold" }
+[model.states]
+shoulder_rad = "rate1_rad_s"
+elbow_rad = "rate2_rad_s"
+rate1_rad_s = "(a2*(torque1_n_m - d1*rate1_rad_s + a3*sin(elbow_rad)*(2*rate1_rad_s*rate2_rad_s + rate2_rad_s^2)) - (a2 + a3*cos(elbow_rad))*(torque2_n_m - d2*rate2_rad_s - a3*sin(elbow_rad)*rate1_rad_s^2))/((a1 + 2*a3*cos(elbow_rad))*a2 - (a2 + a3*cos(elbow_rad))^2)"
+rate2_rad_s = "((a1 + 2*a3*cos(elbow_rad))*(torque2_n_m - d2*rate2_rad_s - a3*sin(elbow_rad)*rate1_rad_s^2) - (a2 + a3*cos(elbow_rad))*(torque1_n_m - d1*rate1_rad_s + a3*sin(elbow_rad)*(2*rate1_rad_s*rate2_rad_s + rate2_rad_s^2)))/((a1 + 2*a3*cos(elbow_rad))*a2 - (a2 + a3*cos(elbow_rad))^2)"
+[start]
+shoulder_rad = 0.2
+elbow_rad = 0.5
+rate1_rad_s = 0.0
+rate2_rad_s = 0.0
+[[parameter]]
+name = "a1"
+unit = "kg m^2"
+start = 0.13
+[[parameter]]
+name = "a2"
+unit = "kg m^2"
+start = 0.03
+[[parameter]]
+name = "a3"
+unit = "kg m^2"
+start = 0.04
+[[parameter]]
+name = "d1"
+unit = "N m s"
+start = 0.1
+[[parameter]]
+name = "d2"
+unit = "N m s"
+start = 0.04
+[[joint]]
+name = "shoulder"
+position = "shoulder_rad"
+velocity = "rate1_rad_s"
+drive = "torque1_n_m"
+turns = true
+[[joint]]
+name = "elbow"
+position = "elbow_rad"
+velocity = "rate2_rad_s"
+drive = "torque2_n_m"
+turns = true
+"#;
+
+/// Dry friction of an arm's shoulder is a torque: what it decelerates hangs on how far the arm is stretched, as it does of the motor's torque.
+#[test]
+fn friction_of_an_arm_is_a_torque() {
+    let noise = Normal::new(0.0, 1e-3).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(21);
+    let mut data = String::from("run,t_s,torque1_n_m,torque2_n_m,encoder1_rad,encoder2_rad\n");
+    for run in 0..3 {
+        let [mut q, mut w]: [[f64; 2]; 2] = [[0.2, 0.5], [0.0; 2]];
+        let mut torques = [0.0; 2];
+        for i in 0..300 {
+            if i % 30 == 0 {
+                torques = [rng.random_range(-1.2..1.2), rng.random_range(-0.3..0.3)];
+            }
+            let [one, two] = q.map(|angle| angle + noise.sample(&mut rng));
+            let [of_one, of_two] = torques;
+            writeln!(data, "{run},{:.2},{of_one:.6},{of_two:.6},{one:.6},{two:.6}", 0.01 * f64::from(i))
+                .unwrap();
+            for _ in 0..2000 {
+                let h = 0.01 / 2000.0;
+                let (sine, cosine) = q[1].sin_cos();
+                let (m11, m12, m22) = (0.12 + 0.08 * cosine, 0.03 + 0.04 * cosine, 0.03);
+                let free = [
+                    of_one - 0.1 * w[0] + 0.04 * sine * (2.0 * w[0] * w[1] + w[1] * w[1]),
+                    of_two - 0.05 * w[1] - 0.04 * sine * w[0] * w[0],
+                ];
+                let determinant = m11 * m22 - m12 * m12;
+                // The torque that stops the shoulder within the step, as far as friction has it.
+                let freely = w[0] + h * (m22 * free[0] - m12 * free[1]) / determinant;
+                let stops = -freely * determinant / (h * m22);
+                let rubs = stops.clamp(-0.15, 0.15);
+                let on = [free[0] + rubs, free[1]];
+                w[0] += h * (m22 * on[0] - m12 * on[1]) / determinant;
+                w[1] += h * (m11 * on[1] - m12 * on[0]) / determinant;
+                q = [q[0] + h * w[0], q[1] + h * w[1]];
+            }
+        }
+    }
+    let answer = answer(TWO_LINKS, &data);
+    assert_eq!(answer["verdict"], "explained", "{}", answer["chosen"]);
+    assert_eq!(answer["chosen"], serde_json::json!(["coulomb-friction@shoulder"]));
+}

@@ -22,4 +22,5 @@ mod repair;
 mod report;
 mod simulated;
 mod templates;
+mod unlisted;
 mod watch;

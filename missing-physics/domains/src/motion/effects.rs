@@ -1,9 +1,10 @@
 //! The mechanisms of the domain: which parameters each has, where they act, and what it is in words.
 
 use super::equations::Equations;
+use super::law::LawTerm;
 use super::scales::Scales;
 use crate::mechanics::{self, Declares, InputEffect, JointEffect, JointHas, OutputEffect};
-use missing_physics::model::{Mechanism, ParameterRef, SpecBuilder, UNBOUNDED};
+use missing_physics::model::{Mechanism, ParameterRef, Quantity, SpecBuilder, UNBOUNDED};
 
 /// What a shared parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub(super) enum Role {
     Leak(usize),
     /// By how much the clock is fast.
     Clock,
+    /// The coefficient of a candidate term of an unknown law.
+    Term(usize),
 }
 
 /// A specification in the making, with what each shared parameter is.
@@ -108,6 +111,16 @@ impl<'a> Effects<'a> {
         let rate = self.add(Role::Clock, "rate", "", 0.0, [-0.5, 0.5], 0.01);
         let text = ["clock", "The recording's clock runs fast or slow.", "t = (1 + rate) t_true", TEXTBOOK];
         self.builder.mechanism("clock-rate", &[rate], text, &["inertia", "sensor-gain", "input-gain"]);
+    }
+
+    /// Declares the candidate terms of an unknown law.
+    pub(super) fn terms(&mut self, terms: &[LawTerm]) {
+        for (k, term) in terms.iter().enumerate() {
+            let name = format!("coefficient of {} in {}", term.formula, term.to.0);
+            let coefficient = self.add(Role::Term(k), &name, &term.unit, 0.0, UNBOUNDED, term.scale);
+            let to = Quantity::new(&*term.to.0, &*term.to.1);
+            self.builder.term(coefficient, &*term.formula, to, term.variables.clone());
+        }
     }
 
     /// A mechanism, of a carrier that is named where there are several of its kind: its parameters, its name, what it is, its equation and

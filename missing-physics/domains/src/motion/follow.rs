@@ -32,6 +32,10 @@ const WINDOWED_ROWS: usize = 3000;
 const FIRST_WINDOW: usize = 40;
 /// A fit misses windows by little, where it misses them by less than this part of an output's spread.
 const NEAR: f64 = 0.05;
+/// A drive does next to nothing where it does less than this part of the most that it does.
+const LEAST_EFFECT: f64 = 0.02;
+/// Effects of a drive that differ by less than this part are the same at any pose.
+const SAME_EFFECT: f64 = 1e-6;
 /// What happens in windows that are too long: to the motion, or to a fit of it.
 const GROWS: &str = "a small deviation of the start grows until the motion tells nothing of the physics";
 const STRAYS: &str = "the fit of the equations settles on another motion";
@@ -264,9 +268,51 @@ pub(super) fn windows(
     }
 }
 
+/// The states under which a joint's drive moves it as it does in the median row, of joints that it moves more or less by the pose of a machine
+/// whose joints carry one another: there a joint's forces are what they are called.
+///
+/// None of a drive that turns its sign, or does next to nothing, anywhere: what it does hangs on its direction then, not on what the joint carries.
+fn poses(
+    model: &MotionModel,
+    recording: &Recording,
+    shared: &[f64],
+) -> Result<Vec<Option<Vec<f64>>>, String> {
+    let (joints, states) = (&model.equations().joints, model.equations().states.len());
+    let mut seen: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); joints.len()];
+    let coupled = |k: &usize| !joints[*k].reacts.is_empty();
+    let mut even: Vec<bool> = (0..joints.len()).map(|k| coupled(&k)).collect();
+    if !even.contains(&true) {
+        return Ok(vec![None; joints.len()]);
+    }
+    for run in &recording.runs {
+        model
+            .along(run, shared, &model.nuisance(run), |machine, t, x| {
+                for k in (0..joints.len()).filter(coupled) {
+                    match machine.effect_at(k, t, x) {
+                        Some(effect) => seen[k].push((effect, x[..states].to_vec())),
+                        None => even[k] = false,
+                    }
+                }
+            })
+            .map_err(|error| error.to_string())?;
+    }
+    let pose = |(mut seen, even): (Vec<(f64, Vec<f64>)>, bool)| {
+        seen.retain(|(effect, _)| effect.is_finite());
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (least, most) = (seen.first()?.0, seen.last()?.0);
+        let largest = least.abs().max(most.abs());
+        let inertia = even && least * most > 0.0 && least.abs().min(most.abs()) > LEAST_EFFECT * largest;
+        let varies = most - least > SAME_EFFECT * largest;
+        let middle = seen.len() / 2;
+        (inertia && varies).then(|| seen.swap_remove(middle).1)
+    };
+    Ok(seen.into_iter().zip(even).map(pose).collect())
+}
+
 /// How large the motions are.
 pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) -> Result<Scales, String> {
     let states = model.equations().states.len();
+    let poses = poses(model, recording, shared)?;
     let (mut all, mut rates) = (vec![Vec::new(); states], vec![Vec::new(); states]);
     for run in &recording.runs {
         let course = model.course(run, shared, &model.nuisance(run))?;
@@ -291,6 +337,7 @@ pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) 
         outputs: (0..recording.channels.len()).map(|k| column(&|r| &r.outputs[k])).collect(),
         step_s: median_step(recording),
         duration_s: Clock::of(&recording.runs).duration_s,
+        poses,
         ..Scales::default()
     };
     Ok(scales.measure(model.equations(), &all, &rates))

@@ -8,6 +8,7 @@ use joint_laws::signal::Signal;
 use joint_laws::spring::{cogging, end_stop};
 
 use super::equations::{Equations, Joint};
+use super::law::{Adds, LawTerm};
 
 /// A smooth force on a joint.
 #[derive(Debug, Clone, Copy)]
@@ -64,10 +65,16 @@ impl<T: Number> JointLaws<T> {
     }
 }
 
+/// Two effects of a drive that differ by less than this part of them are the same.
+const EVEN: f64 = 1e-6;
+
 /// A machine at given parameters, driven by given signals.
 pub(super) struct Driven<'a, T> {
     pub(super) equations: &'a Equations,
     pub(super) laws: Vec<JointLaws<T>>,
+    /// Terms of an unknown law, with their coefficients, and registers to evaluate them in.
+    pub(super) terms: Vec<(&'a LawTerm, T)>,
+    pub(super) room: Vec<T>,
     /// Rates of leaks, by level.
     pub(super) leaks: Vec<Option<T>>,
     pub(super) signals: Vec<Signal<T>>,
@@ -88,6 +95,9 @@ pub(super) struct Driven<'a, T> {
     /// Registers of the rates' tape under another command, and the derivatives there.
     pub(super) idle: Vec<T>,
     pub(super) other: Vec<T>,
+    /// By joint: what a unit of its drive does to its velocity's derivative where its forces are what they are called, of joints that a drive
+    /// moves more or less by the machine's pose.
+    pub(super) nominal: Vec<Option<T>>,
     /// By joint: operations of the rates' tape that its drive enters.
     pub(super) driven: Vec<Vec<usize>>,
     /// Time and number of pieces of inputs for which the rates' registers hold, if they do for any.
@@ -151,7 +161,31 @@ impl<T: Number> Driven<'_, T> {
         }
         self.equations.readings.run(&mut self.seen);
         for c in (0..self.equations.outputs.len()).filter(|c| wanted(*c)) {
-            read(c, self.equations.readings.result(&self.seen, c));
+            let mut reading = self.equations.readings.result(&self.seen, c);
+            for (term, coefficient) in self.terms.iter().filter(|(term, _)| term.adds == Adds::Reading(c)) {
+                self.room[..=last].copy_from_slice(&self.seen[..=last]);
+                reading += *coefficient * term.value(&mut self.room);
+            }
+            read(c, reading);
+        }
+    }
+
+    /// Adds what the terms of an unknown law do to the states' derivatives.
+    fn unknown_law(&mut self, t: f64, x: &[T], rates: &mut [T]) {
+        let names = self.equations.names();
+        for k in 0..self.terms.len() {
+            let (term, coefficient) = self.terms[k];
+            self.look(t, x);
+            self.room[..names].copy_from_slice(&self.values[..names]);
+            match term.adds {
+                Adds::Force(joint) => {
+                    let force = coefficient * term.value(&mut self.room);
+                    let force = self.lever(joint, t, x).map_or(force, |lever| lever * force);
+                    self.act(joint, force, t, x, rates);
+                }
+                Adds::Rate(state) => rates[state] += coefficient * term.value(&mut self.room),
+                Adds::Reading(_) => {}
+            }
         }
     }
 
@@ -176,14 +210,37 @@ impl<T: Number> Driven<'_, T> {
         self.rate(velocity) - self.other[velocity]
     }
 
+    /// What `step` more of a joint's drive does to the derivative of its velocity, here; the derivatives there stand in `other`.
+    fn effect(&mut self, number: usize, step: f64) -> Option<T> {
+        let joint = &self.equations.joints[number];
+        let drive = joint.drive?;
+        let now = self.values[self.equations.input_name(drive)];
+        self.under(number, drive, now + step);
+        Some(self.other[joint.velocity] - self.rate(joint.velocity))
+    }
+
+    /// What a unit of a joint's drive does to the derivative of its velocity at a pose, where all units do the same.
+    pub(super) fn effect_at(&mut self, number: usize, t: f64, x: &[T]) -> Option<T> {
+        self.look(t, x);
+        let (more, less) = (self.effect(number, 1.0)?, self.effect(number, -1.0)?);
+        let even = (more.re() + less.re()).abs() <= EVEN * more.re().abs();
+        even.then_some(more)
+    }
+
+    /// How much further a force on a joint takes its velocity's derivative here than it is called: where a drive moves joints that carry one
+    /// another, by as much as it does the drive's.
+    #[inline(always)]
+    fn lever(&mut self, number: usize, t: f64, x: &[T]) -> Option<T> {
+        let nominal = self.nominal[number]?;
+        self.look(t, x);
+        Some(self.effect(number, 1.0)? / nominal)
+    }
+
     /// By how much a unit of a joint's force changes other states' derivatives: in proportion to what its drive does there. The shares
     /// stand in `other` for the states that the drive acts on.
     fn shares(&mut self, number: usize) {
+        let Some(own) = self.effect(number, 1.0) else { return };
         let joint = &self.equations.joints[number];
-        let Some(drive) = joint.drive else { return };
-        let now = self.values[self.equations.input_name(drive)];
-        self.under(number, drive, now + 1.0);
-        let own = self.other[joint.velocity] - self.rate(joint.velocity);
         for &state in &joint.reacts {
             let change = self.other[state] - self.rate(state);
             self.other[state] = if own.re() == 0.0 { T::from(0.0) } else { change / own };
@@ -233,10 +290,14 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         for (state, rate) in rates.iter_mut().enumerate().take(equations.states.len()) {
             *rate = self.rate(state);
         }
+        if !self.terms.is_empty() {
+            self.unknown_law(t, x, rates);
+        }
         for (k, joint) in equations.joints.iter().enumerate() {
             if !self.laws[k].forces.is_empty() {
                 let v = x[joint.velocity];
                 let force = self.laws[k].force(x[joint.position], v, x, &self.beyond);
+                let force = self.lever(k, t, x).map_or(force, |lever| lever * force);
                 self.act(k, force, t, x, rates);
                 for law in &self.laws[k].forces {
                     if let Force::Yielding(_, yields, state, [forward, stretched]) = *law {
@@ -277,6 +338,9 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
         let Some(dry) = &self.laws[k].dry else { return T::from(0.0) };
         let joint = &self.equations.joints[k];
         let mut resistance = dry.resistance(forward, x[joint.velocity], load);
+        if let Some(lever) = self.lever(k, t, x) {
+            resistance = resistance * lever;
+        }
         if let Some(inertia) = self.laws[k].inertia {
             resistance = resistance / (inertia + 1.0);
         }

@@ -12,6 +12,7 @@ mod growth;
 mod held;
 mod knots;
 mod late;
+mod law;
 mod local;
 mod machine;
 mod model;

@@ -12,6 +12,7 @@ use super::detents::detents;
 use super::effects::{Effects, Role};
 use super::equations::{Equations, Joint, Start};
 use super::late::{before_run, readings};
+use super::law::{self, LawTerm};
 use super::machine::{Driven, Force};
 use super::scales::{Range, Scales};
 use super::setting::{Setting, Shared};
@@ -77,6 +78,8 @@ pub struct MotionModel {
     free_states: Vec<Option<usize>>,
     pace: Pace,
     scales: Scales,
+    /// Candidate terms of an unknown law.
+    terms: Vec<LawTerm>,
     /// Where runs are cut into windows: the runs.
     pub(super) cut: Option<Vec<Whole>>,
 }
@@ -130,11 +133,13 @@ impl MotionModel {
         (all, cut): (bool, Option<&[Run]>),
     ) -> Self {
         let labels: Option<Vec<String>> = cut.map(|runs| runs.iter().map(|r| r.label.clone()).collect());
+        let terms = if all { law::terms(&equations, &scales) } else { Vec::new() };
         let (spec, roles) = {
             let mut effects = Effects::new(&equations, &scales);
             effects.stated(starts, labels.as_deref());
             if all {
                 effects.all();
+                effects.terms(&terms);
             }
             (effects.builder.build_unchecked(), effects.roles)
         };
@@ -152,7 +157,7 @@ impl MotionModel {
             equations.states.iter().map(|s| slot(cut.is_some() || s.start == Start::Free)).collect();
         let whole = |run: &Run| Whole { label: run.label.clone(), inputs: run.inputs.clone() };
         let cut = cut.map(|runs| runs.iter().map(whole).collect());
-        Self { equations, spec, roles, off, per_run, free_states, pace, scales, cut }
+        Self { equations, spec, roles, off, per_run, free_states, pace, scales, terms, cut }
     }
 
     /// The same model under equations that only take their inputs otherwise.
@@ -417,9 +422,16 @@ impl MotionModel {
         equations.readings.prepare(&mut seen);
         let rates = &equations.rates;
         let of_drive = |joint: &Joint| joint.drive.map(|drive| rates.behind(equations.input_name(drive)));
-        Driven {
+        let mut driven = Driven {
             equations,
+            nominal: vec![None; equations.joints.len()],
             laws: setting.laws,
+            terms: setting
+                .terms
+                .iter()
+                .map(|(term, coefficient)| (&self.terms[*term], *coefficient))
+                .collect(),
+            room: Vec::new(),
             leaks: setting.leaks,
             looked: (f64::NAN, usize::MAX),
             driven: equations.joints.iter().map(|joint| of_drive(joint).unwrap_or_default()).collect(),
@@ -435,7 +447,17 @@ impl MotionModel {
             values,
             seen,
             other: vec![T::from(0.0); equations.states.len()],
+        };
+        let room = driven.terms.iter().map(|(term, _)| term.registers()).max();
+        driven.room.resize(room.unwrap_or(0), T::from(0.0));
+        for (joint, pose) in self.scales.poses.iter().enumerate() {
+            if let Some(pose) = pose {
+                let pose: Vec<T> = pose.iter().map(|state| T::from(*state)).collect();
+                driven.nominal[joint] = driven.effect_at(joint, 0.0, &pose);
+            }
         }
+        driven.looked = (f64::NAN, usize::MAX);
+        driven
     }
 
     /// Where pieces of inputs begin behind a run's start, in order; what holds from the start on has begun.

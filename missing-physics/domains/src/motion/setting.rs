@@ -27,6 +27,8 @@ pub(super) struct Setting<T> {
     /// Delays of outputs.
     pub(super) delays: Vec<Option<T>>,
     pub(super) pace: Option<T>,
+    /// Terms of an unknown law, with their coefficients.
+    pub(super) terms: Vec<(usize, T)>,
     /// States beside the equations': deflections of springs that yield.
     pub(super) further_states: usize,
     /// The shortest time in which the laws change, s.
@@ -67,6 +69,7 @@ impl<T: Number> Shared<'_, T> {
             sensors: vec![Sensor::perfect(); equations.outputs.len()],
             delays: vec![None; equations.outputs.len()],
             pace: None,
+            terms: Vec::new(),
             further_states: 0,
             shortest_s: f64::INFINITY,
         };
@@ -93,6 +96,7 @@ impl<T: Number> Shared<'_, T> {
                 }
                 Role::Leak(level) => setting.leaks[level] = Some(value),
                 Role::Clock => setting.pace = Some((value + 1.0).recip()),
+                Role::Term(term) => setting.terms.push((term, value)),
             }
         }
         setting

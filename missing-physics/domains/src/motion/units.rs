@@ -81,6 +81,37 @@ pub(super) fn text_of_rate(name: &str) -> String {
     }
 }
 
+/// A unit over the product of others, each to a power: of "rad/s^2" over "rad" squared, "1/(rad s^2)".
+pub(super) fn quotient(unit: &str, of: &[(&str, i32)]) -> String {
+    let mut powers: Vec<(String, i32)> = Vec::new();
+    for (unit, times) in std::iter::once((unit, 1)).chain(of.iter().map(|(unit, power)| (*unit, -power))) {
+        for (part, side) in unit.split('/').zip([1, -1]) {
+            for factor in part.split_whitespace().filter(|factor| *factor != "1") {
+                let (base, power) = factor.split_once('^').unwrap_or((factor, "1"));
+                let power = times * side * power.parse::<i32>().unwrap_or(1);
+                match powers.iter_mut().find(|(known, _)| known == base) {
+                    Some((_, sum)) => *sum += power,
+                    None => powers.push((base.to_owned(), power)),
+                }
+            }
+        }
+    }
+    let product = |side: i32| {
+        let factors =
+            powers.iter().filter(|(_, power)| side * power > 0).map(|(base, power)| match power.abs() {
+                1 => base.clone(),
+                power => format!("{base}^{power}"),
+            });
+        factors.collect::<Vec<_>>()
+    };
+    let (above, below) = (product(1), product(-1));
+    match (&above[..], &below[..]) {
+        (_, []) => above.join(" "),
+        (_, [one]) => format!("{}/{one}", if above.is_empty() { "1".into() } else { above.join(" ") }),
+        _ => format!("{}/({})", if above.is_empty() { "1".into() } else { above.join(" ") }, below.join(" ")),
+    }
+}
+
 /// Checks that a quantity can be the derivative of another.
 pub(super) fn check_rate(section: &Section<'_>, key: &str, other: &str) -> Result<(), ReadError> {
     let (Some(a), Some(b)) = (of(key), of(other)) else { return Ok(()) };
@@ -109,6 +140,15 @@ pub(super) fn check_derivative(section: &Section<'_>, key: &str, state: &str) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn units_are_divided() {
+        assert_eq!(quotient("rad/s^2", &[("rad", 2), ("rad/s", 1)]), "1/(rad^2 s)");
+        assert_eq!(quotient("m/s^2", &[("m", 1)]), "1/s^2");
+        assert_eq!(quotient("m/s^2", &[("s", 1), ("V", 0)]), "m/s^3");
+        assert_eq!(quotient("rad", &[]), "rad");
+        assert_eq!(quotient("1/s", &[("", 3)]), "1/s");
+    }
 
     #[test]
     fn names_end_in_their_units() {

@@ -9,8 +9,9 @@ use crate::engine::local::BesideLocal;
 use crate::estimate::limits::limits;
 use crate::experiment;
 use crate::fit::prediction::{predictions, residuals};
-use crate::law::found::improves;
+use crate::law::found::{Found, LEAST_GAIN, improves};
 use crate::law::search::find;
+use crate::law::sparse::{selected, sparse};
 use crate::locate::locations::locate;
 use crate::model::{Experiment, PredictError};
 use crate::noise::rough::RoughNoise;
@@ -25,6 +26,9 @@ use crate::selection::main_cause::{Judge, Judged, MainCause};
 use crate::selection::ranking::{Best, Ranking, clearly};
 use crate::selection::search::{Searched, search};
 use crate::selection::share::Cut;
+
+/// The random numbers of a law's test.
+const OF_LAW: u64 = 1 << 32;
 
 /// Tells the observer of a step; an error where it stops the work.
 pub(super) fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<(), DiagnoseError> {
@@ -196,21 +200,34 @@ impl Course<'_> {
         let Compared { ranking, unfitted, best, white, rough } = compared;
         let Conclusion { judge, near, cause, explained, replaced } = conclusion;
         let mut noise = rough.clone();
-        let (mut diagnosis, misses) = match (cause, explained) {
-            (Some(cause), _) => {
+        let instead = cause.as_ref().map(|cause| self.law_instead(ranking, cause)).transpose()?.flatten();
+        let (mut diagnosis, misses) = match (cause, explained, instead) {
+            (Some(cause), _, Some((law, p_value))) => {
+                let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
+                diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
+                diagnosis.closest = Some(answer.closest(&cause.chosen));
+                tell_law(&mut diagnosis, answer, law, baseline);
+                diagnosis.remarks.push(format!(
+                    "{} would take away {:.1} % of the misfit; this law leaves no more than the noise (p = {p_value})",
+                    answer.names(&cause.chosen.candidate.set),
+                    (1e3 * cause.chosen.share).floor() / 10.0
+                ));
+                (diagnosis, Some(cause.chosen.least_squares))
+            }
+            (Some(cause), _, None) => {
                 let mut diagnosis = self.partly(answer, adequacy, before, ranking, &cause, rough)?;
                 diagnosis.remarks.extend(seen_near_by(answer, &judge, &cause));
                 (diagnosis, Some(cause.chosen.least_squares))
             }
-            (None, Some(chosen)) if !self.alike(ranking.at(chosen.at)) => {
+            (None, Some(chosen), _) if !self.alike(ranking.at(chosen.at)) => {
                 let diagnosis = self.runs_that_differ(answer, adequacy, before, compared, chosen, &judge)?;
                 (diagnosis, None)
             }
-            (None, Some(chosen)) => {
+            (None, Some(chosen), _) => {
                 noise = RoughNoise::white(ranking.at(chosen.at).fit.noise.sigma.clone());
                 (self.explained(answer, adequacy, before, ranking, chosen, &judge)?, None)
             }
-            (None, None) => {
+            (None, None, _) => {
                 let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
                 diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
                 let closest = near.as_ref().unwrap_or(&judge).closest();
@@ -411,15 +428,52 @@ impl Course<'_> {
         let score = repair.and_then(|repair| held_out(problem, repair).ok());
         let repair = repair.zip(score.as_ref()).filter(|(_, score)| improves(ranking.base(), score));
         let (start, seen) = repair.unwrap_or((baseline, ranking.base()));
-        if let Some(found) = find(problem, &rule.competing(), start, seen)? {
-            diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);
-            draw(diagnosis, &found.predictions);
-            diagnosis.noise = answer.noise(&found.fit);
-            diagnosis.repaired = found.repaired;
-            diagnosis.law = Some(Law { beside: answer.ids(&start.set), ..found.law });
+        let competing = rule.competing();
+        let mut found = find(problem, &competing, start, seen)?.map(|found| (found, start));
+        if !start.set.is_empty() {
+            // Mechanisms that imitate what is there leave a law of what they miss; a law beside none of them may say more.
+            let alone = sparse(problem, &competing, baseline, ranking.base())?;
+            let score = found.as_ref().map_or(f64::NEG_INFINITY, |(found, _)| found.held_out.log_score);
+            let better = |alone: &Found| improves(seen, &alone.held_out) && alone.held_out.log_score > score;
+            found = alone.filter(better).map(|alone| (alone, baseline)).or(found);
+        }
+        if let Some((found, beside)) = found {
+            tell_law(diagnosis, answer, found, beside);
         }
         Ok(())
     }
+
+    /// A law of candidate terms, no more of them than a main cause has members, that leaves nothing where that cause leaves something: then the
+    /// cause imitates what nobody has listed. With the law's own p value.
+    fn law_instead(
+        &self,
+        ranking: &Ranking,
+        cause: &MainCause,
+    ) -> Result<Option<(Found, f64)>, DiagnoseError> {
+        let Begun { problem, rule, baseline, .. } = self.begun;
+        let (base, competing, members) = (ranking.base(), rule.competing(), cause.chosen.candidate.set.len());
+        let law = selected(problem, &competing, baseline, base, members);
+        let Some(law) = law.filter(|law| improves(base, &law.score)) else { return Ok(None) };
+        let with_cause = held_out(problem, &cause.chosen.least_squares)?;
+        let better = law.score.log_score > with_cause.log_score + LEAST_GAIN;
+        if !better {
+            return Ok(None);
+        }
+        let p_value = self.test(&law.fitted, OF_LAW)?.p_value;
+        if p_value <= clearly(self.options.alpha) {
+            return Ok(None);
+        }
+        Ok(Some((law.told(problem, &competing, base)?, p_value)))
+    }
+}
+
+/// Says a law, beside a set of mechanisms.
+fn tell_law(diagnosis: &mut Diagnosis, answer: &Answer<'_>, found: Found, beside: &Candidate) {
+    diagnosis.after = answer.errors_of(&found.predictions, &found.held_out);
+    draw(diagnosis, &found.predictions);
+    diagnosis.noise = answer.noise(&found.fit);
+    diagnosis.repaired = found.repaired;
+    diagnosis.law = Some(Law { beside: answer.ids(&beside.set), ..found.law });
 }
 
 /// What is said of a main cause that was found by pieces of a single run, where whole fifths left out show less of it.

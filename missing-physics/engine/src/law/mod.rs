@@ -9,4 +9,4 @@ pub(crate) mod extended;
 pub(crate) mod found;
 mod prediction;
 pub(crate) mod search;
-mod sparse;
+pub(crate) mod sparse;

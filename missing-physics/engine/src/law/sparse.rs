@@ -13,47 +13,123 @@ use crate::problem::Problem;
 use crate::repaired::Repaired;
 use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::held_out::{HeldOut, held_out};
+use crate::selection::screening::after_one_step;
 
 /// The largest number of terms.
 const MOST_TERMS: usize = 3;
+/// Terms that are fitted beside others, of those that promise most.
+const MOST_FITTED: usize = 8;
 
-/// Forward selection among the model's candidate terms beside a set of mechanisms, each step judged on unseen data.
+/// A law of a few terms beside a set of mechanisms, and what it predicts of unseen data.
+pub(crate) struct Sparse {
+    terms: Vec<usize>,
+    pub(crate) fitted: Candidate,
+    pub(crate) score: HeldOut,
+}
+
+/// Forward selection among the model's candidate terms beside a set of mechanisms, to the largest number of terms, each step judged on unseen
+/// data; where it predicts these better than the set, as what is told of it.
 pub(crate) fn sparse(
     problem: &Problem<'_>,
     rule: &NoiseRule,
     start: &Candidate,
     seen: &HeldOut,
 ) -> Result<Option<Found>, PredictError> {
-    let (chosen, current) = selected(problem, rule, start, seen);
-    let Some((fitted, score)) = current.filter(|(_, score)| improves(seen, score)) else { return Ok(None) };
+    let law = selected(problem, rule, start, seen, MOST_TERMS).filter(|law| improves(seen, &law.score));
+    law.map(|law| law.told(problem, rule, seen)).transpose()
+}
+
+impl Sparse {
+    /// What is told of it, where a set without it predicts unseen data as `seen`.
+    pub(crate) fn told(
+        self,
+        problem: &Problem<'_>,
+        rule: &NoiseRule,
+        seen: &HeldOut,
+    ) -> Result<Found, PredictError> {
+        let Self { terms, fitted, score } = self;
+        let spec = problem.spec();
+        let terms: Vec<&Term> = terms.iter().map(|&t| &spec.terms[t]).collect();
+        let parameters: Vec<usize> = terms.iter().map(|t| t.parameter).collect();
+        let coefficients = estimates(problem, &fitted, &parameters, &[], rule, false);
+        let parts = by_quantity(&terms, &coefficients);
+        let mut variables: Vec<String> = terms.iter().flat_map(|t| t.variables.clone()).collect();
+        variables.sort();
+        variables.dedup();
+        let formulas: Vec<String> = parts.iter().map(|(to, sum)| format!("{} += {sum}", to.name)).collect();
+        Ok(Found {
+            law: Law {
+                formula: formulas.join("; "),
+                kind: "sparse",
+                beside: Vec::new(),
+                adds_to: parts.first().map(|(to, _)| (to.name.clone(), to.unit.clone())).unwrap_or_default(),
+                variables: variables.into_iter().map(|v| (v, String::new())).collect(),
+                coefficients,
+                heldout_rmse: compared(problem, seen, &score),
+                heldout_log_score_gain: score.log_score - seen.log_score,
+            },
+            predictions: predictions(problem, &fitted.fit)?,
+            held_out: score,
+            repaired: Repaired {
+                law: Some(AddedLaw::of_terms(spec, &terms)),
+                ..Repaired::of(problem, &fitted)
+            },
+            fit: fitted.fit,
+        })
+    }
+}
+
+/// The law of at most so many terms that forward selection ends at; none where the first gains nothing.
+pub(crate) fn selected(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    start: &Candidate,
+    seen: &HeldOut,
+    most: usize,
+) -> Option<Sparse> {
     let spec = problem.spec();
-    let terms: Vec<&Term> = chosen.iter().map(|&t| &spec.terms[t]).collect();
-    let coefficients =
-        estimates(problem, &fitted, &terms.iter().map(|t| t.parameter).collect::<Vec<_>>(), &[], rule, false);
-    let parts = by_quantity(&terms, &coefficients);
-    let mut variables: Vec<String> = terms.iter().flat_map(|t| t.variables.clone()).collect();
-    variables.sort();
-    variables.dedup();
-    Ok(Some(Found {
-        law: Law {
-            formula: parts
-                .iter()
-                .map(|(to, sum)| format!("{} += {sum}", to.name))
-                .collect::<Vec<_>>()
-                .join("; "),
-            kind: "sparse",
-            beside: Vec::new(),
-            adds_to: parts.first().map(|(to, _)| (to.name.clone(), to.unit.clone())).unwrap_or_default(),
-            variables: variables.into_iter().map(|v| (v, String::new())).collect(),
-            coefficients,
-            heldout_rmse: compared(problem, seen, &score),
-            heldout_log_score_gain: score.log_score - seen.log_score,
-        },
-        predictions: predictions(problem, &fitted.fit)?,
-        held_out: score,
-        repaired: Repaired { law: Some(AddedLaw::of_terms(spec, &terms)), ..Repaired::of(problem, &fitted) },
-        fit: fitted.fit,
-    }))
+    // The best of so many has to gain more.
+    let least_gain = LEAST_GAIN + (spec.terms.len().max(1) as f64).ln();
+    let mut law: Option<Sparse> = None;
+    while law.as_ref().is_none_or(|law| law.terms.len() < most) {
+        let chosen = law.as_ref().map_or(&[][..], |law| &law.terms);
+        let beside = law.as_ref().map_or(start, |law| &law.fitted);
+        let others = (0..spec.terms.len()).filter(|t| !chosen.contains(t)).collect();
+        let tried: Vec<Sparse> = promising(problem, beside, chosen, others)
+            .into_par_iter()
+            .filter_map(|t| {
+                let terms: Vec<usize> = chosen.iter().copied().chain([t]).collect();
+                let fitted = candidate(problem, rule, &start.set, &terms, &beside.fit, &[vec![]]).ok()?;
+                let score = held_out(problem, &fitted).ok()?;
+                let sound = fitted.ruled_out.is_none() && fitted.evidence.is_finite();
+                sound.then_some(Sparse { terms, fitted, score })
+            })
+            .collect();
+        let bar = law.as_ref().map_or(seen.log_score, |law| law.score.log_score) + least_gain;
+        let best = tried.into_iter().max_by(|a, b| a.score.log_score.total_cmp(&b.score.log_score));
+        match best.filter(|best| best.score.log_score > bar) {
+            Some(best) => law = Some(best),
+            None => break,
+        }
+    }
+    law
+}
+
+/// Of many terms those whose first step of a fit, beside a set with some already, gains most.
+fn promising(problem: &Problem<'_>, beside: &Candidate, chosen: &[usize], terms: Vec<usize>) -> Vec<usize> {
+    if terms.len() <= MOST_FITTED {
+        return terms;
+    }
+    let left_after = |term: usize| {
+        let terms: Vec<usize> = chosen.iter().copied().chain([term]).collect();
+        let selection = problem.select(&beside.set, &terms);
+        let at = (&beside.fit.shared[..], &beside.fit.nuisance[..]);
+        let (left, _) = after_one_step(problem, &selection, &beside.fit.noise, at)?;
+        Some((left, term))
+    };
+    let mut left: Vec<(f64, usize)> = terms.into_par_iter().filter_map(left_after).collect();
+    left.sort_by(|a, b| a.0.total_cmp(&b.0));
+    left.into_iter().take(MOST_FITTED).map(|(_, term)| term).collect()
 }
 
 /// What terms add to each quantity, those of one quantity together.
@@ -61,46 +137,12 @@ fn by_quantity(terms: &[&Term], coefficients: &[Estimate]) -> Vec<(Quantity, Str
     let mut parts: Vec<(Quantity, String)> = Vec::new();
     for (term, coefficient) in terms.iter().zip(coefficients) {
         let unit = if coefficient.unit.is_empty() { String::new() } else { format!(" {}", coefficient.unit) };
-        let product = format!("{:.4e}{unit} * {}", coefficient.value, term.formula);
+        let of = if term.formula == "1" { String::new() } else { format!(" * {}", term.formula) };
+        let product = format!("{:.4e}{unit}{of}", coefficient.value);
         match parts.iter_mut().find(|(to, _)| *to == term.adds_to) {
             Some((_, sum)) => *sum = format!("{sum} + {product}"),
             None => parts.push((term.adds_to.clone(), product)),
         }
     }
     parts
-}
-
-/// The terms that forward selection chose, and their fit; none where the first gains nothing.
-fn selected(
-    problem: &Problem<'_>,
-    rule: &NoiseRule,
-    start: &Candidate,
-    seen: &HeldOut,
-) -> (Vec<usize>, Option<(Candidate, HeldOut)>) {
-    let spec = problem.spec();
-    let mut chosen: Vec<usize> = Vec::new();
-    let mut current: Option<(Candidate, HeldOut)> = None;
-    while chosen.len() < MOST_TERMS {
-        let tried: Vec<(usize, Candidate, HeldOut)> = (0..spec.terms.len())
-            .into_par_iter()
-            .filter(|t| !chosen.contains(t))
-            .filter_map(|t| {
-                let terms: Vec<usize> = chosen.iter().copied().chain([t]).collect();
-                let near = current.as_ref().map_or(&start.fit, |c| &c.0.fit);
-                let fitted = candidate(problem, rule, &start.set, &terms, near, &[vec![]]).ok()?;
-                let score = held_out(problem, &fitted).ok()?;
-                (fitted.ruled_out.is_none() && fitted.evidence.is_finite()).then_some((t, fitted, score))
-            })
-            .collect();
-        let next = tried.into_iter().max_by(|a, b| a.2.log_score.total_cmp(&b.2.log_score));
-        let bar = current.as_ref().map_or(seen.log_score, |c| c.1.log_score) + LEAST_GAIN;
-        match next {
-            Some((t, fitted, score)) if score.log_score > bar => {
-                chosen.push(t);
-                current = Some((fitted, score));
-            }
-            _ => break,
-        }
-    }
-    (chosen, current)
 }

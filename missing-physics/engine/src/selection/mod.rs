@@ -9,6 +9,6 @@ mod nuisance_prior;
 mod parts;
 mod prior;
 pub(crate) mod ranking;
-mod screening;
+pub(crate) mod screening;
 pub(crate) mod search;
 pub(crate) mod share;

@@ -42,9 +42,7 @@ pub(super) fn unknown_parts(problem: &Problem<'_>, rule: &NoiseRule, all: &[Cand
     for whole in wholes {
         for without in &whole.set {
             let part: Vec<usize> = whole.set.iter().copied().filter(|m| m != without).collect();
-            let at_work = problem.at_work(&part);
-            let mut known = all.iter().map(|c| &c.set).chain(parts.iter().map(|(part, _)| part));
-            if !known.any(|other| problem.at_work(other) == at_work) {
+            if !problem.is_among(&part, all.iter().map(|c| &c.set).chain(parts.iter().map(|(p, _)| p))) {
                 parts.push((part, whole));
             }
         }

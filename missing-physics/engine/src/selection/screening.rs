@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use crate::fit::gauss_newton::{End, descend, linearise};
 use crate::fit::step::{NormalEquations, Step};
 use crate::model::Scope;
-use crate::problem::Problem;
+use crate::noise::rule::NoiseState;
+use crate::problem::{Problem, Selection};
 use crate::selection::candidate::{Candidate, Guess};
 
 /// Mechanisms that are fitted beside one set.
@@ -30,26 +31,46 @@ pub(crate) struct Promising {
 }
 
 /// Mechanisms, each with the starts that are looked at.
-pub(crate) struct Screening(Vec<(usize, Vec<Guess>)>);
+pub(crate) struct Screening {
+    looked_at: Vec<(usize, Vec<Guess>)>,
+    /// The starts that each had beside nothing.
+    first: Vec<Vec<Guess>>,
+}
 
 impl Screening {
     /// Mechanisms with their starts; one without any is looked at near its off value.
     pub(crate) fn new(mechanisms: impl Iterator<Item = (usize, Vec<Guess>)>) -> Self {
         let near_off = |starts: Vec<Guess>| if starts.is_empty() { vec![Guess::new()] } else { starts };
-        Self(mechanisms.map(|(m, starts)| (m, near_off(starts))).collect())
+        let looked_at: Vec<_> = mechanisms.map(|(m, starts)| (m, near_off(starts))).collect();
+        let first = looked_at.iter().map(|(_, starts)| starts.clone()).collect();
+        Self { looked_at, first }
     }
 
-    /// The mechanisms whose first steps beside a fitted set gain most, most gaining first; forgets starts that promise least.
-    pub(crate) fn promising(&mut self, problem: &Problem<'_>, parent: &Candidate) -> Vec<Promising> {
-        let tried: Vec<(usize, usize)> = (0..self.0.len())
-            .filter(|&k| !parent.set.contains(&self.0[k].0))
-            .flat_map(|k| (0..self.0[k].1.len()).map(move |start| (k, start)))
+    /// The mechanisms whose first steps beside a fitted set gain most, most gaining first; forgets starts that promise least. `anew` is where
+    /// a mechanism begins by what that set leaves.
+    pub(crate) fn promising(
+        &mut self,
+        problem: &Problem<'_>,
+        parent: &Candidate,
+        anew: impl Fn(usize) -> Vec<Guess>,
+    ) -> Vec<Promising> {
+        for ((mechanism, starts), first) in self.looked_at.iter_mut().zip(&self.first) {
+            if !parent.set.contains(mechanism) {
+                starts.extend(anew(*mechanism).into_iter().filter(|start| !first.contains(start)));
+            }
+        }
+        let tried: Vec<(usize, usize)> = (0..self.looked_at.len())
+            .filter(|&k| !parent.set.contains(&self.looked_at[k].0))
+            .flat_map(|k| (0..self.looked_at[k].1.len()).map(move |start| (k, start)))
             .collect();
         let mut scored: Vec<(f64, usize, usize)> = Vec::new();
         let mut linearised: HashMap<(usize, usize), NormalEquations> = HashMap::new();
-        let first_steps = tried
-            .into_par_iter()
-            .map(|(k, start)| (after_one_step(problem, parent, self.0[k].0, &self.0[k].1[start]), k, start));
+        let first_steps = tried.into_par_iter().map(|(k, start)| {
+            let (mechanism, starts) = &self.looked_at[k];
+            let (selection, shared) = with_one_more(problem, parent, *mechanism, &starts[start]);
+            let at = (&shared[..], &parent.fit.nuisance[..]);
+            (after_one_step(problem, &selection, &parent.fit.noise, at), k, start)
+        });
         for (step, k, start) in first_steps.collect::<Vec<_>>() {
             scored.push((step.as_ref().map_or(f64::INFINITY, |(left, _)| *left), k, start));
             linearised.extend(step.map(|(_, linear)| ((k, start), linear)));
@@ -73,7 +94,7 @@ impl Screening {
         let mut followed: Vec<(f64, Promising)> = known
             .into_par_iter()
             .filter_map(|((k, start), linear)| {
-                follow(problem, parent, self.0[k].0, &self.0[k].1[start], linear)
+                follow(problem, parent, self.looked_at[k].0, &self.looked_at[k].1[start], linear)
             })
             .collect();
         self.forget(problem, &scored);
@@ -91,50 +112,57 @@ impl Screening {
 
     /// The shape that a mechanism has at one of its starts; all starts are alike of one that has none.
     fn shape(&self, problem: &Problem<'_>, k: usize, start: usize) -> Guess {
-        let (mechanism, starts) = &self.0[k];
+        let (mechanism, starts) = &self.looked_at[k];
         let shape = &problem.spec().mechanisms[*mechanism].shape_parameters;
         let of_shape = |slot: usize| shape.iter().any(|&p| problem.slots[p] == slot);
         starts[start].iter().copied().filter(|(slot, _)| of_shape(*slot)).collect()
     }
 
     fn forget(&mut self, problem: &Problem<'_>, scored: &[(f64, usize, usize)]) {
-        for k in 0..self.0.len() {
+        for k in 0..self.looked_at.len() {
             let mut kept: Vec<Guess> = Vec::new();
             let mut shapes: Vec<Guess> = Vec::new();
             for &(_, _, start) in scored.iter().filter(|s| s.1 == k) {
                 let shape = self.shape(problem, k, start);
                 let new = !shapes.contains(&shape) && shapes.len() < SHAPES;
                 if kept.len() < STARTS || new {
-                    kept.push(self.0[k].1[start].clone());
+                    kept.push(self.looked_at[k].1[start].clone());
                 }
                 if new {
                     shapes.push(shape);
                 }
             }
-            if !kept.is_empty() && self.0[k].1.len() > STARTS {
-                self.0[k].1 = kept;
+            if !kept.is_empty() && self.looked_at[k].1.len() > STARTS {
+                self.looked_at[k].1 = kept;
             }
         }
     }
 }
 
-/// The sum of squares that is left after one step from a start, as the linearised model has it, and that model.
-fn after_one_step(
+/// The sum of squares that is left after one step from a point, as the linearised model has it, and that model.
+pub(crate) fn after_one_step(
+    problem: &Problem<'_>,
+    selection: &Selection,
+    noise: &NoiseState,
+    at: (&[f64], &[Vec<f64>]),
+) -> Option<(f64, NormalEquations)> {
+    let linear = linearise(problem, selection, noise, at.0, at.1).ok()?;
+    let step = Step::new(problem, selection, &linear, at, 0.0);
+    let left = linear.chi2 - step.predicted;
+    left.is_finite().then_some((left, linear))
+}
+
+/// A set with one mechanism more, and the shared parameters where that begins.
+fn with_one_more(
     problem: &Problem<'_>,
     parent: &Candidate,
     mechanism: usize,
     start: &[(usize, f64)],
-) -> Option<(f64, NormalEquations)> {
+) -> (Selection, Vec<f64>) {
     let set: Vec<usize> = parent.set.iter().copied().chain([mechanism]).collect();
-    let selection = problem.select(&set, &[]);
     let mut shared = parent.fit.shared.clone();
-    for &(slot, value) in start {
-        shared[slot] = value;
-    }
-    let linear = linearise(problem, &selection, &parent.fit.noise, &shared, &parent.fit.nuisance).ok()?;
-    let step = Step::new(problem, &selection, &linear, (&shared, &parent.fit.nuisance), 0.0);
-    let left = linear.chi2 - step.predicted;
-    left.is_finite().then_some((left, linear))
+    start.iter().for_each(|&(slot, value)| shared[slot] = value);
+    (problem.select(&set, &[]), shared)
 }
 
 /// The sum of squares that is left after some steps from a start, and where they lead the mechanism.
@@ -145,10 +173,7 @@ fn follow(
     start: &[(usize, f64)],
     linear: NormalEquations,
 ) -> Option<(f64, Promising)> {
-    let set: Vec<usize> = parent.set.iter().copied().chain([mechanism]).collect();
-    let selection = problem.select(&set, &[]);
-    let mut shared = parent.fit.shared.clone();
-    start.iter().for_each(|&(slot, value)| shared[slot] = value);
+    let (selection, shared) = with_one_more(problem, parent, mechanism, start);
     let at = (&shared[..], &parent.fit.nuisance[..]);
     let fit = descend(End::after(STEPS).roughly(), problem, &selection, &parent.fit.noise, at, linear);
     let of = &problem.spec().mechanisms[mechanism];

@@ -40,9 +40,10 @@ pub(crate) fn search(
     let mut all = vec![baseline];
     let mut unfitted = Vec::new();
     // Where there are many, most would be fitted for nothing.
-    let mut screening = problem
-        .knows_many()
-        .then(|| Screening::new(allowed.iter().map(|&m| (m, guesses(problem, &all[0], &[m])))));
+    let mut screening = problem.knows_many().then(|| {
+        let starts = starts_beside(problem, &all[0]);
+        Screening::new(allowed.iter().map(|&m| (m, starts(m))))
+    });
     let mut layer: Vec<usize> = vec![0];
     // A mechanism that comes with another is two at work.
     let at_work = |c: &Candidate| problem.at_work(&c.set).len();
@@ -130,7 +131,7 @@ fn from_where_it_begins(
     let nuisance = problem.nuisance_start.clone();
     let fit = Fit { shared: begins.clone(), nuisance, ..baseline.fit.clone() };
     let begun = Candidate { fit, ..baseline.clone() };
-    let promising = screening.promising(problem, &begun);
+    let promising = screening.promising(problem, &begun, starts_beside(problem, &begun));
     let fitted = |Promising { mechanism, start }: &Promising| {
         candidate(problem, rule, &[*mechanism], &[], &begun.fit, std::slice::from_ref(start)).ok()
     };
@@ -176,7 +177,8 @@ fn screened(
 ) -> Vec<Wanted> {
     let mut wanted = Vec::new();
     for &parent in layer {
-        for promising in screening.promising(problem, &all[parent]) {
+        let starts = starts_beside(problem, &all[parent]);
+        for promising in screening.promising(problem, &all[parent], starts) {
             want(problem, &mut wanted, all, parent, promising.mechanism, Some(promising.start));
         }
     }
@@ -205,9 +207,7 @@ fn want(
     }
     set.push(mechanism);
     set.sort_unstable();
-    let at_work = problem.at_work(&set);
-    let mut known = all.iter().map(|c| &c.set).chain(wanted.iter().map(|w| &w.set));
-    if !known.any(|other| problem.at_work(other) == at_work) {
+    if !problem.is_among(&set, all.iter().map(|c| &c.set).chain(wanted.iter().map(|w| &w.set))) {
         wanted.push(Wanted { set, parent, start });
     }
 }
@@ -238,9 +238,8 @@ fn fitted(
 /// Looks for better tops of the likelihood of the sets that are likeliest, and takes them.
 fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
     let best = best_evidence(all.iter());
-    let worth =
-        |c: &&mut Candidate| c.ruled_out.is_none() && !c.set.is_empty() && c.evidence > best - POLISHED;
-    let mut likely: Vec<&mut Candidate> = all.iter_mut().filter(worth).collect();
+    let close = |c: &&mut Candidate| !c.set.is_empty() && worth(c) > best - POLISHED;
+    let mut likely: Vec<&mut Candidate> = all.iter_mut().filter(close).collect();
     likely.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     likely.truncate(BEAM);
     likely.par_iter_mut().for_each(|c| {
@@ -257,13 +256,37 @@ fn polish(problem: &Problem<'_>, rule: &NoiseRule, all: &mut [Candidate]) {
     });
 }
 
+/// Where the model says to begin each mechanism, by what a fitted set leaves.
+fn starts_beside<'a>(problem: &'a Problem<'_>, parent: &Candidate) -> impl Fn(usize) -> Vec<Guess> + 'a {
+    let left = problem.model.extensions().modes.and_then(|modes| {
+        let left = residuals(problem, &parent.fit).ok()?;
+        Some((modes, over_all_rows(problem, left)))
+    });
+    let slot = |p: usize| problem.shared.index.iter().position(|&i| i == p);
+    move |mechanism| {
+        let Some((modes, left)) = &left else { return Vec::new() };
+        let starts = modes.starts(mechanism, &problem.recording.runs, left).into_iter();
+        let of_it =
+            |start: Vec<(usize, f64)>| start.into_iter().filter_map(|(p, v)| Some((slot(p)?, v))).collect();
+        distinct(starts.map(of_it))
+    }
+}
+
+/// Starts that say anything, each once.
+fn distinct(starts: impl Iterator<Item = Guess>) -> Vec<Guess> {
+    let mut distinct: Vec<Guess> = Vec::new();
+    for start in starts.filter(|start| !start.is_empty()) {
+        if !distinct.contains(&start) {
+            distinct.push(start);
+        }
+    }
+    distinct
+}
+
 /// Where the model says to begin the mechanism that a set has and its parent has not, with all whole numbers that it knows for those
 /// of the others: what was the best of them alone need not be so in company.
 fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Guess> {
-    let Some(modes) = problem.model.extensions().modes else { return Vec::new() };
-    let Ok(left) = residuals(problem, &parent.fit) else { return Vec::new() };
-    let whole = over_all_rows(problem, left);
-    let shared = |p: usize| problem.shared.index.iter().position(|&i| i == p);
+    let starts_of = starts_beside(problem, parent);
     let mut all: Vec<Guess> = Vec::new();
     for &mechanism in set {
         let integers = problem.integer_slots(&[mechanism]);
@@ -271,14 +294,9 @@ fn guesses(problem: &Problem<'_>, parent: &Candidate, set: &[usize]) -> Vec<Gues
         if !new && integers.is_empty() {
             continue;
         }
-        let mut starts: Vec<Guess> = Vec::new();
-        for start in modes.starts(mechanism, &problem.recording.runs, &whole) {
-            let of_it = start.into_iter().filter_map(|(p, value)| Some((shared(p)?, value)));
-            let start: Vec<_> = of_it.filter(|(slot, _)| new || integers.contains(slot)).collect();
-            if !start.is_empty() && !starts.contains(&start) {
-                starts.push(start);
-            }
-        }
+        let of_it =
+            |start: Guess| start.into_iter().filter(|(slot, _)| new || integers.contains(slot)).collect();
+        let starts = distinct(starts_of(mechanism).into_iter().map(of_it));
         if all.is_empty() {
             all = starts;
         } else if !starts.is_empty() {
