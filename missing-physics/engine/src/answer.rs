@@ -30,7 +30,7 @@ pub(crate) struct Answer<'a> {
     pub(crate) baseline: &'a Candidate,
     /// The baseline by plain least squares.
     pub(crate) least_squares: &'a Fit,
-    pub(crate) outliers: &'a [Outlier],
+    pub(crate) outliers: Vec<Outlier>,
 }
 
 impl Answer<'_> {
@@ -91,7 +91,7 @@ impl Answer<'_> {
             law: None,
             next_experiment: None,
             undetermined: Vec::new(),
-            outliers: self.outliers.to_vec(),
+            outliers: self.outliers.clone(),
             remarks: self.remarks(),
             repaired: Repaired::of(self.problem, &reported),
             curves: self.curves()?,

@@ -41,7 +41,7 @@ pub fn oracle(
     truth: &[String],
     options: &Options,
 ) -> Result<Oracle, DiagnoseError> {
-    let Begun { problem, rule, baseline, .. } = begin(model, recording, options)?;
+    let Begun { problem, rule, baseline, .. } = begin(model, recording, options, &[])?;
     let set = numbers(&problem, truth)?;
     let competing = rule.competing();
     let everything = problem.spec().named();
@@ -93,10 +93,10 @@ pub fn oracle_of_leftover(
     if lengths(recording) != lengths(without) {
         return Ok(None);
     }
-    let Begun { problem, rule, baseline, .. } = begin(model, without, options)?;
+    let Begun { problem, rule, baseline, .. } = begin(model, without, options, &[])?;
     let set = numbers(&problem, truth)?;
     let clean = candidate(&problem, &rule.competing(), &set, &[], &baseline.fit, &[])?;
-    let Begun { problem, .. } = begin(model, recording, options)?;
+    let Begun { problem, .. } = begin(model, recording, options, &[])?;
     let (selection, noise) = (&clean.selection, &clean.fit.noise);
     let fit = solve(&problem, selection, noise, &clean.fit.shared, &clean.fit.nuisance)?;
     let columns = (0..problem.rows.len())

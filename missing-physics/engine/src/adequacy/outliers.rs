@@ -2,7 +2,6 @@
 
 use crate::adequacy::linearised::{JUMP, LAPSE, Linearised};
 use crate::data::Recording;
-use crate::diagnosis::Outlier;
 use crate::fit::alternate::fit;
 use crate::fit::prediction::residuals;
 use crate::model::PredictError;
@@ -16,15 +15,30 @@ const ROUNDS: usize = 5;
 /// As many wild rows one after the other are no accident, unless they are a lapse of the sensor.
 const NEIGHBOURS: usize = 3;
 
-/// The recording without its wild rows (NaN in their place), and the list of them, by run, channel and row.
+/// Run, channel, row.
+pub(crate) type Place = (usize, usize, usize);
+
+/// A reading that was set aside.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Aside {
+    pub(crate) place: Place,
+    pub(crate) reading: f64,
+    /// Robust sigmas from what all other rows say of it.
+    pub(crate) z: f64,
+}
+
+/// The recording without its wild rows (NaN in their place) but for those to be kept, and the wild readings, by run, channel and row.
 ///
 /// # Errors
 /// [`PredictError`] where the simulation has no answer.
-pub(crate) fn set_aside(problem: &Problem<'_>) -> Result<(Recording, Vec<Outlier>), PredictError> {
+pub(crate) fn set_aside(
+    problem: &Problem<'_>,
+    kept: &[Place],
+) -> Result<(Recording, Vec<Aside>), PredictError> {
     let recording = &problem.recording;
     let (mut cleaned, mut outliers) = (recording.clone(), Vec::new());
     for _ in 0..ROUNDS {
-        let found = wild_rows(&problem.with(cleaned.clone()))?;
+        let found = wild_rows(&problem.with(cleaned.clone()), kept)?;
         if found.is_empty() {
             break;
         }
@@ -41,10 +55,9 @@ pub(crate) fn set_aside(problem: &Problem<'_>) -> Result<(Recording, Vec<Outlier
     let listed = outliers
         .into_iter()
         .filter(|o| !series.contains(o))
-        .map(|(run, channel, row, z)| Outlier {
-            run: recording.runs[run].label.clone(),
-            row,
-            channel: recording.channels[channel].name.clone(),
+        .map(|(run, channel, row, z)| Aside {
+            place: (run, channel, row),
+            reading: recording.runs[run].outputs[channel][row],
             z,
         })
         .collect();
@@ -52,7 +65,7 @@ pub(crate) fn set_aside(problem: &Problem<'_>) -> Result<(Recording, Vec<Outlier
 }
 
 /// Run, channel, row, robust sigmas.
-type Place = (usize, usize, usize, f64);
+type WildPlace = (usize, usize, usize, f64);
 
 struct Wild {
     run: usize,
@@ -61,14 +74,19 @@ struct Wild {
     z: f64,
 }
 
-/// The wildest rows given all others, few at a time.
-fn wild_rows(problem: &Problem<'_>) -> Result<Vec<Wild>, PredictError> {
+/// The wildest rows given all others, few at a time, but for those to be kept.
+fn wild_rows(problem: &Problem<'_>, kept: &[Place]) -> Result<Vec<Wild>, PredictError> {
     let rule = noise_rule(problem);
     let selection = problem.select(&[], &[]);
     let start = fit(problem, &selection, &rule, (&problem.shared.start, &problem.nuisance_start), None)?;
     let everything = problem.spec().asked();
     let linearised = Linearised::new(problem, &selection, &start, &everything, &rule)?;
-    let scores = linearised.row_scores(&residuals(problem, &start)?);
+    let mut scores = linearised.row_scores(&residuals(problem, &start)?);
+    for &(run, channel, row) in kept {
+        if let Ok(k) = problem.rows[run].valid[channel].binary_search(&row) {
+            scores[run][channel][k] = 0.0;
+        }
+    }
     let mut found = Vec::new();
     for channel in 0..problem.channels() {
         let all: usize = problem.count(channel);
@@ -92,7 +110,7 @@ fn wild_rows(problem: &Problem<'_>) -> Result<Vec<Wild>, PredictError> {
 }
 
 /// Whether a series of wild rows is a lapse of the sensor: short, far away, and within its run.
-fn is_lapse(recording: &Recording, series: &[Place]) -> bool {
+fn is_lapse(recording: &Recording, series: &[WildPlace]) -> bool {
     let (Some(first), Some(last)) = (series.first(), series.last()) else { return false };
     let rows = recording.runs[first.0].len();
     let far = series.iter().all(|(.., z)| z.abs() > JUMP);
@@ -100,10 +118,10 @@ fn is_lapse(recording: &Recording, series: &[Place]) -> bool {
 }
 
 /// Rows that stand in a series: what lasts is an effect, not an accident.
-fn put_back_series(recording: &Recording, cleaned: &Recording, outliers: &[Place]) -> Vec<Place> {
+fn put_back_series(recording: &Recording, cleaned: &Recording, outliers: &[WildPlace]) -> Vec<WildPlace> {
     let mut series = Vec::new();
-    let mut current: Vec<Place> = Vec::new();
-    let close = |current: &mut Vec<Place>, series: &mut Vec<Place>| {
+    let mut current: Vec<WildPlace> = Vec::new();
+    let close = |current: &mut Vec<WildPlace>, series: &mut Vec<WildPlace>| {
         if current.len() >= NEIGHBOURS && !is_lapse(recording, current) {
             series.append(current);
         }

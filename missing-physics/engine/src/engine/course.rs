@@ -1,5 +1,6 @@
 //! The way from a fitted baseline to an answer.
 
+use crate::adequacy::outliers::Place;
 use crate::adequacy::test::{self, Adequacy};
 use crate::answer::Answer;
 use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict};
@@ -39,6 +40,8 @@ pub(super) fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<()
 pub(super) struct Outcome {
     pub(super) diagnosis: Diagnosis,
     pub(super) contradicting: Option<Contradicting>,
+    /// Readings that were set aside, and that the answer's fit of all others foretells.
+    pub(super) foretold: Vec<Place>,
 }
 
 /// Sets of mechanisms, compared.
@@ -110,13 +113,13 @@ impl Course<'_> {
             rule,
             baseline,
             least_squares: &self.least_squares.fit,
-            outliers: &self.begun.outliers,
+            outliers: self.begun.outliers(),
         };
         if adequacy.p_value > self.options.alpha {
             let mut diagnosis =
                 answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?;
             diagnosis.limits = limits(problem, rule, baseline);
-            return Ok(Outcome { diagnosis, contradicting: None });
+            return Ok(Outcome { diagnosis, contradicting: None, foretold: Vec::new() });
         }
         let compared = self.compared()?;
         let before = self.before(&answer)?;
@@ -201,6 +204,11 @@ impl Course<'_> {
         let Conclusion { judge, near, cause, explained, replaced } = conclusion;
         let mut noise = rough.clone();
         let instead = cause.as_ref().map(|cause| self.law_instead(ranking, cause)).transpose()?.flatten();
+        let by = match (&cause, explained) {
+            (Some(cause), _) => Some(&cause.chosen.candidate),
+            (None, explained) => explained.map(|best| ranking.at(best.at)),
+        };
+        let foretold = by.map(|by| self.begun.foretold(&by.fit)).transpose()?.unwrap_or_default();
         let (mut diagnosis, misses) = match (cause, explained, instead) {
             (Some(cause), _, Some((law, p_value))) => {
                 let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
@@ -249,7 +257,7 @@ impl Course<'_> {
         }
         diagnosis.sets = answer.sets(ranking, best.as_ref());
         diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &noise)?;
-        Ok(Outcome { diagnosis, contradicting })
+        Ok(Outcome { diagnosis, contradicting, foretold })
     }
 
     /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of

@@ -8,6 +8,7 @@ mod local;
 pub mod stream;
 mod windows;
 
+use crate::adequacy::outliers::Place;
 use crate::data::Recording;
 use crate::diagnosis::{Contradiction, Diagnosis, Verdict};
 use crate::model::{Experiment, Model};
@@ -49,7 +50,8 @@ fn diagnose_with(
     observer: &dyn Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
     experiments.iter().try_for_each(|e| check_experiment(model.spec(), recording, e))?;
-    let Outcome { mut diagnosis, contradicting } = outcome(model, recording, experiments, options, observer)?;
+    let Outcome { mut diagnosis, contradicting, .. } =
+        outcome(model, recording, experiments, options, observer)?;
     if let Some(Contradicting { runs, share }) = contradicting {
         tell(observer, "the answer without the runs that contradict the rest", 0.0)?;
         let mut rest = recording.clone();
@@ -73,6 +75,9 @@ fn diagnose_with(
     Ok(diagnosis)
 }
 
+/// How often a recording is diagnosed again with readings that its answer foretells.
+const KEPT_ANEW: usize = 2;
+
 /// One diagnosis of all runs of a recording.
 fn outcome(
     model: &dyn Model,
@@ -81,10 +86,23 @@ fn outcome(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Outcome, DiagnoseError> {
-    tell(observer, "reading the noise", 0.0)?;
-    let begun = begin(model, recording, options)?;
-    let least_squares = least_squares_baseline(&begun)?;
-    Course { begun: &begun, least_squares: &least_squares, experiments, options, observer }.run()
+    let course = |kept: &[Place]| -> Result<Outcome, DiagnoseError> {
+        tell(observer, "reading the noise", 0.0)?;
+        let begun = begin(model, recording, options, kept)?;
+        let least_squares = least_squares_baseline(&begun)?;
+        Course { begun: &begun, least_squares: &least_squares, experiments, options, observer }.run()
+    };
+    let mut outcome = course(&[])?;
+    // What is wild beside the baseline may be no more than what an explanation says it should be.
+    let mut kept = Vec::new();
+    for _ in 0..KEPT_ANEW {
+        if outcome.foretold.is_empty() {
+            break;
+        }
+        kept.append(&mut outcome.foretold);
+        outcome = course(&kept)?;
+    }
+    Ok(outcome)
 }
 
 /// How much a verdict says.

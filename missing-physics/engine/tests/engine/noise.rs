@@ -6,7 +6,7 @@ use missing_physics::data::{Recording, Run};
 use missing_physics::diagnosis::{Diagnosis, NoiseSource, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::observer::Silent;
-use rand::SeedableRng;
+use rand::{RngExt as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, StandardNormal};
 
@@ -65,6 +65,34 @@ fn wild_readings_are_listed_wherever_they_stand_and_change_nothing() {
         assert_eq!(listed, wanted, "seed {seed}");
         assert_eq!((before.verdict, before.chosen), (after.verdict, after.chosen), "seed {seed}");
     }
+}
+
+/// A slope, a ripple, and with the square of the ripple a single row that stands out, of which no first step from nothing knows.
+fn ringing(shared: &[f64], _: &[f64], x: f64) -> f64 {
+    let row = (59.0 * x).round();
+    let knock = if row == 29.0 { 1.0 } else { 0.0 };
+    shared[0] * x + shared[1] * (9.0 * x).sin() + shared[1] * shared[1] * knock
+}
+
+/// Readings that look wild beside the baseline are none where the explanation says that they should be what they are; others stay aside.
+#[test]
+fn what_an_explanation_foretells_is_no_wild_reading() {
+    let free = |name: &str| parameter(name, 0.0, [-10.0, 10.0]);
+    let model = Curve::new(vec![free("slope"), free("ripple")], vec![mechanism("ripple", vec![1])], ringing);
+    let truth = [1.0, 0.5];
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut run = |label: &str| {
+        let x: Vec<f64> = (0..60).map(|i| f64::from(i) / 59.0).collect();
+        let y = x.iter().map(|x| ringing(&truth, &[], *x) + 0.01 * rng.sample::<f64, _>(StandardNormal));
+        Run { label: label.into(), outputs: vec![y.collect()], inputs: vec![x], kind: 0 }
+    };
+    let mut runs: Vec<Run> = ["1", "2", "3"].map(&mut run).into();
+    runs[1].outputs[0][40] += 0.4;
+    let options = Options { replicates: 199, ..Options::default() };
+    let answer = diagnose(&model, &recording("x", runs, None), &[], &options, &Silent).unwrap();
+    assert_eq!((answer.verdict, &answer.chosen[..]), (Verdict::Explained, &["ripple".to_owned()][..]));
+    let listed: Vec<(&str, usize)> = answer.outliers.iter().map(|o| (o.run.as_str(), o.row)).collect();
+    assert_eq!(listed, [("2", 40)]);
 }
 
 /// A camera that follows something else for three frames of 400; the same of 40 is an effect.

@@ -69,7 +69,7 @@ impl<'a> Watch<'a> {
             let expected = "a number between 0 and 0.5";
             return Err(DiagnoseError::Option { name: "alpha", value: alpha, expected });
         }
-        let begun = begin(model, reference, &Options { alpha, ..Options::default() })?;
+        let begun = begin(model, reference, &Options { alpha, ..Options::default() }, &[])?;
         let (setting, names, directions) = Setting::new(begun.problem, &begun.baseline.fit);
         let grams = (0..setting.reference_runs()).map(|run| setting.reference_gram(run));
         let grams = grams.collect::<Result<Vec<_>, _>>()?;
