@@ -15,10 +15,6 @@ const BEFORE: usize = 40;
 const LONG_BEFORE_S: f64 = 1e6;
 /// A machine rests under a command where its states change by no more than this part of what they do under another.
 const RESTS: f64 = 0.05;
-/// Delays and time constants in which the time before a run is forgotten,
-const FORGOTTEN: f64 = 3.0;
-/// and the part of a run whose rows are asked at the most.
-const ASKED: usize = 8;
 
 impl MotionModel {
     /// What a machine feels of an input that begins a run in a state.
@@ -65,7 +61,7 @@ impl MotionModel {
     }
 
     /// By input, what was commanded before a run, if that is not its first command: a machine that rests at first may have rested under
-    /// another (a step is commanded when the run begins). Whichever is nearer to the first rows.
+    /// another (a step is commanded when the run begins). Whichever is nearer to the run.
     pub(super) fn commanded_before<T: Number>(
         &self,
         run: &Run,
@@ -90,23 +86,20 @@ impl MotionModel {
         if rested == none {
             return none;
         }
-        let forgotten_s = FORGOTTEN * late.iter().map(|k| late_s(*k)).fold(0.0, f64::max);
-        let begin = run.inputs[0][0];
-        let tell = run.inputs[0].partition_point(|t| t - begin <= forgotten_s);
-        let first = windows::rows(run, 0, tell.min(run.len().div_ceil(ASKED)));
+        // What is felt late for a few rows moves the machine for as long as it swings, and a fit sees all of that.
         let misses = |before: &[Option<f64>]| -> f64 {
-            let mut out = vec![0.0; first.len() * first.outputs.len()];
-            let mut setting = self.setting(&first, &shared, &nuisance, moving);
+            let mut out = vec![0.0; run.len() * run.outputs.len()];
+            let mut setting = self.setting(run, &shared, &nuisance, moving);
             setting.before = before.to_vec();
-            if self.predict_under(&first, setting, &nuisance, &mut out).is_err() {
+            if self.predict_under(run, setting, &nuisance, &mut out).is_err() {
                 return f64::INFINITY;
             }
             let of_output = |(c, column): (usize, &[f64])| -> f64 {
                 let size = self.output_size(c);
-                let known = column.iter().zip(&first.outputs[c]).filter(|(_, read)| read.is_finite());
+                let known = column.iter().zip(&run.outputs[c]).filter(|(_, read)| read.is_finite());
                 known.map(|(value, read)| ((value - read) / size).powi(2)).sum()
             };
-            out.chunks(first.len()).enumerate().map(of_output).sum()
+            out.chunks(run.len()).enumerate().map(of_output).sum()
         };
         if misses(&rested) < misses(&none) { rested } else { none }
     }
