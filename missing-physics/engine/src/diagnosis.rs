@@ -296,6 +296,8 @@ pub struct Law {
     pub heldout_rmse: Vec<(String, f64, f64)>,
     /// Gain in log score on unseen data.
     pub heldout_log_score_gain: f64,
+    /// p-value of the model with the law, of a few terms: whether it leaves no more than the noise.
+    pub p_value: Option<f64>,
 }
 
 /// The action that separates the rivals best.

@@ -148,7 +148,7 @@ fn law(l: &Law) -> Value {
     value!({"formula": l.formula, "kind": l.kind, "beside": l.beside, "adds_to": quantity(&l.adds_to),
         "variables": l.variables.iter().map(quantity).collect::<Vec<_>>(),
         "coefficients": estimates(&l.coefficients), "heldout_rmse": rmse,
-        "heldout_log_score_gain": l.heldout_log_score_gain})
+        "heldout_log_score_gain": l.heldout_log_score_gain, "p_value": l.p_value})
 }
 
 fn next_experiment(n: &NextExperiment) -> Value {

@@ -51,10 +51,15 @@ pub(super) fn estimate(e: &Estimate) -> String {
 
 /// The p-value of a diagnosis; at the bootstrap's floor it is a bound.
 pub(super) fn p_value(d: &Diagnosis) -> String {
-    if d.p_value <= d.p_floor * 1.000_001 {
-        format!("p <= {}", significant(d.p_floor, 1))
+    p_words(d.p_value, d.p_floor)
+}
+
+/// A p-value of which the smallest that could be is known.
+pub(super) fn p_words(p: f64, floor: f64) -> String {
+    if p <= floor * 1.000_001 {
+        format!("p <= {}", significant(floor, 1))
     } else {
-        format!("p = {}", significant(d.p_value, 2))
+        format!("p = {}", significant(p, 2))
     }
 }
 

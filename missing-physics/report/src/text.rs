@@ -8,7 +8,7 @@ use missing_physics::diagnosis::{
 };
 
 use super::context::ReportContext;
-use super::number::{estimate, listed, p_value, probability, significant, with_error};
+use super::number::{estimate, listed, p_value, p_words, probability, significant, with_error};
 
 const WIDTH: usize = 100;
 const INDENT: usize = 9;
@@ -32,6 +32,9 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
         page.entry("law", &law_sentence(d, law));
         for coefficient in law.coefficients.iter().filter(|_| law.kind != "smooth") {
             page.entry("law", &estimate(coefficient));
+        }
+        if let Some(left) = left_by_law(d, law) {
+            page.entry("law", &left);
         }
     }
     for line in better(d) {
@@ -172,6 +175,24 @@ pub(super) fn law_sentence(d: &Diagnosis, law: &Law) -> String {
     format!("{} ({}{beside})", law.formula, law_kind(law.kind))
 }
 
+/// A law that was selected to fit leaves something where its p-value is at most this.
+const LEAVES: f64 = 0.01;
+
+/// Whether a law leaves no more than the noise.
+fn leaves_nothing(law: &Law) -> bool {
+    law.p_value.is_some_and(|p| p > LEAVES)
+}
+
+/// What a law leaves, where that was tested.
+pub(super) fn left_by_law(d: &Diagnosis, law: &Law) -> Option<String> {
+    let p = p_words(law.p_value?, d.p_floor);
+    Some(if leaves_nothing(law) {
+        format!("it leaves no more than the noise ({p})")
+    } else {
+        format!("it leaves more than the noise ({p})")
+    })
+}
+
 /// What kind of law it is, in words.
 pub(super) fn law_kind(kind: &str) -> &str {
     match kind {
@@ -231,6 +252,7 @@ pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     // What takes away nearly all is not named where a leftover may stand in for it, or for a member.
     let why = match closest.ids.len() {
         _ if closest.share < NEARLY_ALL => "too little to be named",
+        _ if d.law.as_ref().is_some_and(leaves_nothing) => "but the law does better",
         1 => "but something smooth would do as well",
         _ => "but something smooth in place of one of them would do as well",
     };

@@ -210,16 +210,11 @@ impl Course<'_> {
         };
         let foretold = by.map(|by| self.begun.foretold(&by.fit)).transpose()?.unwrap_or_default();
         let (mut diagnosis, misses) = match (cause, explained, instead) {
-            (Some(cause), _, Some((law, p_value))) => {
+            (Some(cause), _, Some(law)) => {
                 let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
                 diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
                 diagnosis.closest = Some(answer.closest(&cause.chosen));
                 tell_law(&mut diagnosis, answer, law, baseline);
-                diagnosis.remarks.push(format!(
-                    "{} would take away {:.1} % of the misfit; this law leaves no more than the noise (p = {p_value})",
-                    answer.names(&cause.chosen.candidate.set),
-                    (1e3 * cause.chosen.share).floor() / 10.0
-                ));
                 (diagnosis, Some(cause.chosen.least_squares))
             }
             (Some(cause), _, None) => {
@@ -445,19 +440,18 @@ impl Course<'_> {
             let better = |alone: &Found| improves(seen, &alone.held_out) && alone.held_out.log_score > score;
             found = alone.filter(better).map(|alone| (alone, baseline)).or(found);
         }
-        if let Some((found, beside)) = found {
+        if let Some((mut found, beside)) = found {
+            if let Some(with_law) = &found.of_terms {
+                found.law.p_value = Some(self.test(with_law, OF_LAW)?.p_value);
+            }
             tell_law(diagnosis, answer, found, beside);
         }
         Ok(())
     }
 
     /// A law of candidate terms, no more of them than a main cause has members, that leaves nothing where that cause leaves something: then the
-    /// cause imitates what nobody has listed. With the law's own p value.
-    fn law_instead(
-        &self,
-        ranking: &Ranking,
-        cause: &MainCause,
-    ) -> Result<Option<(Found, f64)>, DiagnoseError> {
+    /// cause imitates what nobody has listed.
+    fn law_instead(&self, ranking: &Ranking, cause: &MainCause) -> Result<Option<Found>, DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         let (base, competing, members) = (ranking.base(), rule.competing(), cause.chosen.candidate.set.len());
         let law = selected(problem, &competing, baseline, base, members);
@@ -471,7 +465,9 @@ impl Course<'_> {
         if p_value <= clearly(self.options.alpha) {
             return Ok(None);
         }
-        Ok(Some((law.told(problem, &competing, base)?, p_value)))
+        let mut found = law.told(problem, &competing, base)?;
+        found.law.p_value = Some(p_value);
+        Ok(Some(found))
     }
 }
 

@@ -53,7 +53,7 @@ pub(crate) fn extended(
     };
     let predictions = predictions(&wide, &fitted.fit)?;
     let repaired = Repaired { law: Some(model.law(&problem.recording)), ..Repaired::of(&wide, &fitted) };
-    Ok(Some(Found { law, predictions, held_out: score, fit: fitted.fit, repaired }))
+    Ok(Some(Found { law, predictions, held_out: score, fit: fitted.fit, repaired, of_terms: None }))
 }
 
 /// An oscillation in words.
@@ -88,6 +88,7 @@ fn periodic(problem: &Problem<'_>, model: &Extended<'_>, fit: &Fit, coefficients
         variables: vec![(along, unit)],
         heldout_rmse: Vec::new(),
         heldout_log_score_gain: 0.0,
+        p_value: None,
     }
 }
 
@@ -102,7 +103,7 @@ fn power(
     let (quantity, v) = (&problem.recording.channels[channel], &problem.recording.variables[variable]);
     let exponent = coefficients.first().map_or(f64::NAN, |e| e.value);
     Law {
-        formula: format!("{} *= ({} / {largest:.4e} {})^{exponent:.3}", quantity.name, v.name, v.unit),
+        formula: format!("{} *= ({} / {} {})^{exponent:.3}", quantity.name, v.name, number(largest), v.unit),
         kind: "power",
         beside: Vec::new(),
         adds_to: (quantity.name.clone(), quantity.unit.clone()),
@@ -110,6 +111,7 @@ fn power(
         coefficients,
         heldout_rmse: Vec::new(),
         heldout_log_score_gain: 0.0,
+        p_value: None,
     }
 }
 
@@ -137,6 +139,7 @@ fn reading(problem: &Problem<'_>, channel: usize, largest: f64, coefficients: Ve
         coefficients,
         heldout_rmse: Vec::new(),
         heldout_log_score_gain: 0.0,
+        p_value: None,
     }
 }
 
@@ -151,8 +154,12 @@ fn smooth(
     let (quantity, v) = (&problem.recording.channels[channel], &problem.recording.variables[variable]);
     Law {
         formula: format!(
-            "{} += an empirical curve of {}: sum of c_k x^k, x = ({} - {centre:.6e}) / {half_width:.6e}",
-            quantity.name, v.name, v.name
+            "{} += an empirical curve of {}: sum of c_k x^k, x = ({} - {}) / {}",
+            quantity.name,
+            v.name,
+            v.name,
+            number(centre),
+            number(half_width)
         ),
         kind: "smooth",
         beside: Vec::new(),
@@ -161,5 +168,15 @@ fn smooth(
         coefficients,
         heldout_rmse: Vec::new(),
         heldout_log_score_gain: 0.0,
+        p_value: None,
+    }
+}
+
+/// A number with five digits, without an exponent where that reads well.
+pub(super) fn number(value: f64) -> String {
+    let rounded = format!("{value:.4e}");
+    match rounded.parse::<f64>() {
+        Ok(plain) if (1e-4..1e6).contains(&plain.abs()) => plain.to_string(),
+        _ => rounded,
     }
 }

@@ -4,6 +4,7 @@ use crate::diagnosis::Law;
 use crate::fit::optimum::Fit;
 use crate::problem::Problem;
 use crate::repaired::Repaired;
+use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
 
 /// A law must gain this much log score on unseen data.
@@ -19,6 +20,8 @@ pub(crate) struct Found {
     pub(crate) held_out: HeldOut,
     pub(crate) fit: Fit,
     pub(crate) repaired: Repaired,
+    /// The model with it, where it is of the model's own terms.
+    pub(crate) of_terms: Option<Candidate>,
 }
 
 /// Whether a law predicts unseen data well enough better.

@@ -6,6 +6,7 @@ use crate::diagnosis::{Estimate, Law};
 use crate::estimate::estimates::estimates;
 use crate::fit::prediction::predictions;
 use crate::law::added::AddedLaw;
+use crate::law::describe::number;
 use crate::law::found::{Found, LEAST_GAIN, compared, improves};
 use crate::model::{PredictError, Quantity, Term};
 use crate::noise::rule::NoiseRule;
@@ -67,6 +68,7 @@ impl Sparse {
                 coefficients,
                 heldout_rmse: compared(problem, seen, &score),
                 heldout_log_score_gain: score.log_score - seen.log_score,
+                p_value: None,
             },
             predictions: predictions(problem, &fitted.fit)?,
             held_out: score,
@@ -74,7 +76,8 @@ impl Sparse {
                 law: Some(AddedLaw::of_terms(spec, &terms)),
                 ..Repaired::of(problem, &fitted)
             },
-            fit: fitted.fit,
+            fit: fitted.fit.clone(),
+            of_terms: Some(fitted),
         })
     }
 }
@@ -138,7 +141,7 @@ fn by_quantity(terms: &[&Term], coefficients: &[Estimate]) -> Vec<(Quantity, Str
     for (term, coefficient) in terms.iter().zip(coefficients) {
         let unit = if coefficient.unit.is_empty() { String::new() } else { format!(" {}", coefficient.unit) };
         let of = if term.formula == "1" { String::new() } else { format!(" * {}", term.formula) };
-        let product = format!("{:.4e}{unit}{of}", coefficient.value);
+        let product = format!("{}{unit}{of}", number(coefficient.value));
         match parts.iter_mut().find(|(to, _)| *to == term.adds_to) {
             Some((_, sum)) => *sum = format!("{sum} + {product}"),
             None => parts.push((term.adds_to.clone(), product)),

@@ -13,7 +13,8 @@ use super::figure::FIGURE_STYLE;
 use super::number::{estimate, listed, p_value, significant};
 use super::svg::{CHART_STYLE, escape};
 use super::text::{
-    as_if, closest, headline, law_kind, leftover_sentence, limits, noise_sentence, runs, where_sentence,
+    as_if, closest, headline, law_kind, left_by_law, leftover_sentence, limits, noise_sentence, runs,
+    where_sentence,
 };
 use super::{corner, explore, plots};
 
@@ -47,7 +48,7 @@ pub fn html(d: &Diagnosis, context: &ReportContext) -> String {
         section(&mut page, title, &body);
     }
     section(&mut page, "What comes closest", &list(&closest(d)));
-    section(&mut page, "The law in the residual", &d.law.as_ref().map(law).unwrap_or_default());
+    section(&mut page, "The law in the residual", &d.law.as_ref().map(|of| law(d, of)).unwrap_or_default());
     let misses: Vec<String> = d.location.iter().map(|l| where_sentence(d, l)).chain(as_if(d)).collect();
     section(&mut page, "Where it misses", &list(&misses));
     section(&mut page, "How much better", &tables::errors(d, context));
@@ -116,8 +117,9 @@ fn foot(context: &ReportContext) -> String {
 }
 
 /// A law with its kind and its coefficients.
-fn law(law: &Law) -> String {
-    let coefficients: Vec<String> = law.coefficients.iter().map(estimate).collect();
+fn law(d: &Diagnosis, law: &Law) -> String {
+    let coefficients: Vec<String> =
+        law.coefficients.iter().map(estimate).chain(left_by_law(d, law)).collect();
     format!(
         "<p><code>{}</code></p><p class=\"note\">{}</p>{}",
         escape(&law.formula),
