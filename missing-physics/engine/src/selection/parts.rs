@@ -40,8 +40,10 @@ pub(super) fn unknown_parts(problem: &Problem<'_>, rule: &NoiseRule, all: &[Cand
     wholes.truncate(BEAM);
     let mut parts: Vec<(Vec<usize>, &Candidate)> = Vec::new();
     for whole in wholes {
-        for without in &whole.set {
-            let part: Vec<usize> = whole.set.iter().copied().filter(|m| m != without).collect();
+        // Every part but nothing and the whole, as the bits of a number say.
+        for bits in 1..(1_usize << whole.set.len()) - 1 {
+            let within = |k: &usize| bits & (1 << k) != 0;
+            let part: Vec<usize> = (0..whole.set.len()).filter(within).map(|k| whole.set[k]).collect();
             if !problem.is_among(&part, all.iter().map(|c| &c.set).chain(parts.iter().map(|(p, _)| p))) {
                 parts.push((part, whole));
             }
