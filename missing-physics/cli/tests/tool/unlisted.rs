@@ -1,5 +1,5 @@
 //! Machines under laws that nobody has listed: the law is found where it acts, in the equations or in a reading.
-#![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
 use std::fmt::Write as _;
 

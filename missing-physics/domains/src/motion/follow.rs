@@ -7,6 +7,7 @@ use missing_physics::model::Model as _;
 use missing_physics::noise::rough_sigma;
 
 use super::growth::{lost, missed, strays, too_long};
+use super::machine::Driven;
 use super::model::{MotionModel, Pace};
 use super::scales::{Range, Scales, range, rms};
 use super::windows::{cut, rows};
@@ -268,51 +269,43 @@ pub(super) fn windows(
     }
 }
 
-/// The states under which a joint's drive moves it as it does in the median row, of joints that it moves more or less by the pose of a machine
-/// whose joints carry one another: there a joint's forces are what they are called.
+/// By joint, whether its drive moves it more or less by the pose of a machine whose joints carry one another: then so do its forces.
 ///
 /// None of a drive that turns its sign, or does next to nothing, anywhere: what it does hangs on its direction then, not on what the joint carries.
-fn poses(
-    model: &MotionModel,
-    recording: &Recording,
-    shared: &[f64],
-) -> Result<Vec<Option<Vec<f64>>>, String> {
-    let (joints, states) = (&model.equations().joints, model.equations().states.len());
-    let mut seen: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); joints.len()];
+fn levers(model: &MotionModel, recording: &Recording, shared: &[f64]) -> Result<Vec<bool>, String> {
+    let joints = &model.equations().joints;
+    let mut seen: Vec<Vec<f64>> = vec![Vec::new(); joints.len()];
     let coupled = |k: &usize| !joints[*k].reacts.is_empty();
-    let mut even: Vec<bool> = (0..joints.len()).map(|k| coupled(&k)).collect();
-    if !even.contains(&true) {
-        return Ok(vec![None; joints.len()]);
+    if !(0..joints.len()).any(|k| coupled(&k)) {
+        return Ok(vec![false; joints.len()]);
     }
     for run in &recording.runs {
-        model
-            .along(run, shared, &model.nuisance(run), |machine, t, x| {
-                for k in (0..joints.len()).filter(coupled) {
-                    match machine.effect_at(k, t, x) {
-                        Some(effect) => seen[k].push((effect, x[..states].to_vec())),
-                        None => even[k] = false,
-                    }
-                }
-            })
-            .map_err(|error| error.to_string())?;
+        model.along(run, shared, &model.nuisance(run), |machine, t, x| {
+            let zero = vec![0.0; x.len()];
+            for k in (0..joints.len()).filter(coupled) {
+                // A drive of which two units do not twice what one does is none that is told by a number.
+                let effect = |machine: &mut Driven<'_, f64>, x: &[f64]| {
+                    machine.effect_at(k, t, x).filter(|effect| effect.is_finite()).unwrap_or(f64::INFINITY)
+                };
+                seen[k].extend([effect(machine, x), effect(machine, &zero)]);
+            }
+        })?;
     }
-    let pose = |(mut seen, even): (Vec<(f64, Vec<f64>)>, bool)| {
-        seen.retain(|(effect, _)| effect.is_finite());
-        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (least, most) = (seen.first()?.0, seen.last()?.0);
+    let lever = |seen: Vec<f64>| {
+        let [least, most] = seen.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], effect| {
+            [least.min(*effect), most.max(*effect)]
+        });
         let largest = least.abs().max(most.abs());
-        let inertia = even && least * most > 0.0 && least.abs().min(most.abs()) > LEAST_EFFECT * largest;
-        let varies = most - least > SAME_EFFECT * largest;
-        let middle = seen.len() / 2;
-        (inertia && varies).then(|| seen.swap_remove(middle).1)
+        let inertia = least * most > 0.0 && least.abs().min(most.abs()) > LEAST_EFFECT * largest;
+        inertia && largest.is_finite() && most - least > SAME_EFFECT * largest
     };
-    Ok(seen.into_iter().zip(even).map(pose).collect())
+    Ok(seen.into_iter().map(lever).collect())
 }
 
 /// How large the motions are.
 pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) -> Result<Scales, String> {
     let states = model.equations().states.len();
-    let poses = poses(model, recording, shared)?;
+    let levers = levers(model, recording, shared)?;
     let (mut all, mut rates) = (vec![Vec::new(); states], vec![Vec::new(); states]);
     for run in &recording.runs {
         let course = model.course(run, shared, &model.nuisance(run))?;
@@ -337,7 +330,7 @@ pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) 
         outputs: (0..recording.channels.len()).map(|k| column(&|r| &r.outputs[k])).collect(),
         step_s: median_step(recording),
         duration_s: Clock::of(&recording.runs).duration_s,
-        poses,
+        levers,
         ..Scales::default()
     };
     Ok(scales.measure(model.equations(), &all, &rates))

@@ -95,8 +95,8 @@ pub(super) struct Driven<'a, T> {
     /// Registers of the rates' tape under another command, and the derivatives there.
     pub(super) idle: Vec<T>,
     pub(super) other: Vec<T>,
-    /// By joint: what a unit of its drive does to its velocity's derivative where its forces are what they are called, of joints that a drive
-    /// moves more or less by the machine's pose.
+    /// By joint: what a unit of its drive does to its velocity's derivative where all states are zero, of joints that a drive moves more or less
+    /// by the machine's pose: there its forces are what they are called.
     pub(super) nominal: Vec<Option<T>>,
     /// By joint: operations of the rates' tape that its drive enters.
     pub(super) driven: Vec<Vec<usize>>,

@@ -8,8 +8,8 @@ use crate::mechanics::{Clock, JointSizes, JointUnits};
 pub(super) struct Scales {
     pub(super) states: Vec<f64>,
     pub(super) joints: Vec<JointSizes>,
-    /// By joint: the states at which its forces are what they are called, if a drive moves it more or less by the machine's pose.
-    pub(super) poses: Vec<Option<Vec<f64>>>,
+    /// By joint: whether its drive moves it more or less by the machine's pose, and its forces with it.
+    pub(super) levers: Vec<bool>,
     pub(super) inputs: Vec<Range>,
     pub(super) outputs: Vec<Range>,
     /// Smallest and largest value of each level.

@@ -153,9 +153,10 @@ impl TrajectoryModel {
                 }
                 Role::WindX => flight.wind_m_s[0] = *value,
                 Role::WindY => flight.wind_m_s[1] = *value,
-                Role::StiffX => flight.stiffness_per_s2[0] = *value,
-                Role::StiffY => flight.stiffness_per_s2[1] = *value,
-                Role::StiffZ => flight.stiffness_per_s2[2] = *value,
+                Role::Stiff => flight.stiffness_per_s2.iter_mut().for_each(|along| *along += *value),
+                Role::StiffX => flight.stiffness_per_s2[0] += *value,
+                Role::StiffY => flight.stiffness_per_s2[1] += *value,
+                Role::StiffZ => flight.stiffness_per_s2[2] += *value,
                 Role::CameraScale => camera.scale = *value,
                 Role::TiltX => camera.tilt[0] = *value,
                 Role::TiltY => camera.tilt[1] = *value,

@@ -25,6 +25,8 @@ pub(super) enum Role {
     Cubic,
     PushX,
     PushY,
+    /// Along all axes alike, and along one.
+    Stiff,
     StiffX,
     StiffY,
     StiffZ,
@@ -33,10 +35,10 @@ pub(super) enum Role {
 impl Role {
     /// Whether a flight with it on still has a closed form.
     pub(super) fn keeps_closed_form(self) -> bool {
-        use Role::{Cubic, LiftCoefficient, LiftX, LiftY, LiftZ, Quadratic, StiffX, StiffY, StiffZ};
+        use Role::{Cubic, LiftCoefficient, LiftX, LiftY, LiftZ, Quadratic, Stiff, StiffX, StiffY, StiffZ};
         !matches!(
             self,
-            Quadratic | Cubic | LiftX | LiftY | LiftZ | LiftCoefficient | StiffX | StiffY | StiffZ
+            Quadratic | Cubic | LiftX | LiftY | LiftZ | LiftCoefficient | Stiff | StiffX | StiffY | StiffZ
         )
     }
 }
@@ -142,6 +144,14 @@ fn terms(b: &mut Flying, axes: Axes) {
         );
     }
     if axes == Axes::Space {
+        b.term(
+            Role::Stiff,
+            ("stiffness_per_s2", "1/s^2"),
+            f64::NEG_INFINITY,
+            0.1,
+            "-(r - r(0))",
+            &["x_m", "y_m", "z_m"],
+        );
         b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_x", &[]);
         b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_y", &[]);
         b.term(
