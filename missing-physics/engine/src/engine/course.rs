@@ -203,7 +203,8 @@ impl Course<'_> {
         let Compared { ranking, unfitted, best, white, rough } = compared;
         let Conclusion { judge, near, cause, explained, replaced } = conclusion;
         let mut noise = rough.clone();
-        let instead = cause.as_ref().map(|cause| self.law_instead(ranking, cause)).transpose()?.flatten();
+        let instead =
+            cause.as_ref().map(|cause| self.law_instead(ranking, cause, white)).transpose()?.flatten();
         let by = match (&cause, explained) {
             (Some(cause), _) => Some(&cause.chosen.candidate),
             (None, explained) => explained.map(|best| ranking.at(best.at)),
@@ -236,7 +237,7 @@ impl Course<'_> {
                 let closest = near.as_ref().unwrap_or(&judge).closest();
                 diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
                 let misses = closest.map_or_else(|| self.least_squares.clone(), |c| c.least_squares);
-                self.unexplained(&mut diagnosis, answer, ranking, &misses.set)?;
+                self.unexplained(&mut diagnosis, answer, ranking, &misses.set, white)?;
                 (diagnosis, Some(misses))
             }
         };
@@ -424,6 +425,7 @@ impl Course<'_> {
         answer: &Answer<'_>,
         ranking: &Ranking,
         closest: &[usize],
+        white: &[f64],
     ) -> Result<(), DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell("looking for a law in the residual", 0.0)?;
@@ -442,26 +444,40 @@ impl Course<'_> {
         }
         if let Some((mut found, beside)) = found {
             if let Some(with_law) = &found.of_terms {
-                found.law.p_value = Some(self.test(with_law, OF_LAW)?.p_value);
+                found.law.p_value = self.left_by_law(with_law, white)?;
             }
             tell_law(diagnosis, answer, found, beside);
         }
         Ok(())
     }
 
+    /// The p value of a model with a law; none where its noise is a slow error.
+    fn left_by_law(&self, with_law: &Candidate, white: &[f64]) -> Result<Option<f64>, PredictError> {
+        if slow(&self.begun.problem, &with_law.fit.noise, white) {
+            return Ok(None);
+        }
+        Ok(Some(self.test(with_law, OF_LAW)?.p_value))
+    }
+
     /// A law of candidate terms, no more of them than a main cause has members, that leaves nothing where that cause leaves something: then the
     /// cause imitates what nobody has listed.
-    fn law_instead(&self, ranking: &Ranking, cause: &MainCause) -> Result<Option<Found>, DiagnoseError> {
+    fn law_instead(
+        &self,
+        ranking: &Ranking,
+        cause: &MainCause,
+        white: &[f64],
+    ) -> Result<Option<Found>, DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         let (base, competing, members) = (ranking.base(), rule.competing(), cause.chosen.candidate.set.len());
         let law = selected(problem, &competing, baseline, base, members);
         let Some(law) = law.filter(|law| improves(base, &law.score)) else { return Ok(None) };
+        // Where noise that is slow stands in for what a law leaves, its score says little, and its errors say all.
         let with_cause = held_out(problem, &cause.chosen.least_squares)?;
-        let better = law.score.log_score > with_cause.log_score + LEAST_GAIN;
-        if !better {
+        let nearer = law.score.rmse.iter().zip(&with_cause.rmse).all(|(law, cause)| law < cause);
+        if !nearer || law.score.log_score <= with_cause.log_score + LEAST_GAIN {
             return Ok(None);
         }
-        let p_value = self.test(&law.fitted, OF_LAW)?.p_value;
+        let Some(p_value) = self.left_by_law(&law.fitted, white)? else { return Ok(None) };
         if p_value <= clearly(self.options.alpha) {
             return Ok(None);
         }
