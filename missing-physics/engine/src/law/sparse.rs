@@ -18,6 +18,8 @@ use crate::selection::screening::after_one_step;
 
 /// The largest number of terms.
 const MOST_TERMS: usize = 3;
+/// More terms than these are many: most would be fitted for nothing.
+const MANY: usize = 16;
 /// Terms that are fitted beside others, of those that promise most.
 const MOST_FITTED: usize = 8;
 
@@ -91,8 +93,8 @@ pub(crate) fn selected(
     most: usize,
 ) -> Option<Sparse> {
     let spec = problem.spec();
-    // The best of so many has to gain more.
-    let least_gain = LEAST_GAIN + (spec.terms.len().max(1) as f64).ln();
+    // The best of very many has to gain more.
+    let least_gain = LEAST_GAIN + (spec.terms.len() as f64 / MANY as f64).max(1.0).ln();
     let mut law: Option<Sparse> = None;
     while law.as_ref().is_none_or(|law| law.terms.len() < most) {
         let chosen = law.as_ref().map_or(&[][..], |law| &law.terms);
@@ -120,7 +122,7 @@ pub(crate) fn selected(
 
 /// Of many terms those whose first step of a fit, beside a set with some already, gains most.
 fn promising(problem: &Problem<'_>, beside: &Candidate, chosen: &[usize], terms: Vec<usize>) -> Vec<usize> {
-    if terms.len() <= MOST_FITTED {
+    if terms.len() <= MANY {
         return terms;
     }
     let left_after = |term: usize| {
