@@ -2,7 +2,7 @@
 
 use joint_laws::Number;
 
-use super::equations::{Equations, Joint};
+use super::equations::Equations;
 use super::expression::{Expression, derivative};
 use super::scales::Scales;
 use super::tape::Tape;
@@ -107,8 +107,7 @@ pub(super) fn terms(equations: &Equations, scales: &Scales) -> Vec<LawTerm> {
         candidates.joint(joint);
     }
     for state in 0..equations.states.len() {
-        let of_joint = |joint: &Joint| joint.velocity == state || joint.position == state;
-        if !equations.joints.iter().any(of_joint) && equations.states[state].rate.bare_name().is_none() {
+        if !candidates.of_joint(state) && equations.states[state].rate.bare_name().is_none() {
             candidates.rate(state);
         }
     }
@@ -152,6 +151,24 @@ impl<'a> Candidates<'a> {
             states,
             time: variable("t_s", scales.duration_s),
             found: Vec::new(),
+        }
+    }
+
+    /// Whether a state is a joint's position or velocity.
+    fn of_joint(&self, state: usize) -> bool {
+        self.equations.joints.iter().any(|joint| joint.velocity == state || joint.position == state)
+    }
+
+    /// All states but one, if any, and the inputs.
+    fn others(&self, state: Option<usize>) -> Vec<Variable> {
+        let others = self.states.iter().enumerate().filter(|(other, _)| Some(*other) != state);
+        others.map(|(_, other)| other).chain(self.inputs.iter().map(|(_, input)| input)).cloned().collect()
+    }
+
+    /// Adds the waves of an angle.
+    fn waves(&mut self, adds: Adds, angle: &Variable) {
+        for (function, periods) in [("sin", 1), ("cos", 1), ("sin", 2), ("cos", 2)] {
+            self.add(adds, &[angle.wave(function, periods)]);
         }
     }
 
@@ -208,9 +225,7 @@ impl<'a> Candidates<'a> {
         }
         self.add(to, &x.signed_square());
         if joint.turns {
-            for (function, periods) in [("sin", 1), ("cos", 1), ("sin", 2), ("cos", 2)] {
-                self.add(to, &[x.wave(function, periods)]);
-            }
+            self.waves(to, &x);
         }
         self.add(to, &[t.power(1)]);
         self.add(to, &[t.power(1), x.power(1)]);
@@ -237,8 +252,7 @@ impl<'a> Candidates<'a> {
             }
         }
         for (state, z) in self.states.clone().iter().enumerate() {
-            let of_joint = |joint: &Joint| joint.velocity == state || joint.position == state;
-            if !self.equations.joints.iter().any(of_joint) {
+            if !self.of_joint(state) {
                 self.add(to, &[z.power(1)]);
                 self.add(to, &[z.power(1), x.power(1)]);
                 self.add(to, &[z.power(1), v.power(1)]);
@@ -254,12 +268,7 @@ impl<'a> Candidates<'a> {
         (1..=4).for_each(|power| self.add(to, &[z.power(power)]));
         self.add(to, &[t.power(1)]);
         self.add(to, &[t.power(1), z.power(1)]);
-        let others: Vec<Variable> = (self.states.iter().enumerate())
-            .filter(|(other, _)| *other != state)
-            .map(|(_, other)| other.clone())
-            .chain(self.inputs.iter().map(|(_, input)| input.clone()))
-            .collect();
-        for other in others {
+        for other in self.others(Some(state)) {
             self.add(to, &[other.power(1)]);
             self.add(to, &[other.power(2)]);
             self.add(to, &[other.power(1), z.power(1)]);
@@ -273,16 +282,9 @@ impl<'a> Candidates<'a> {
         if let Some(state) = measured
             && self.equations.joints.iter().any(|j| j.turns && j.position == state)
         {
-            for (function, periods) in [("sin", 1), ("cos", 1), ("sin", 2), ("cos", 2)] {
-                let wave = self.states[state].wave(function, periods);
-                self.add(to, &[wave]);
-            }
+            let angle = self.states[state].clone();
+            self.waves(to, &angle);
         }
-        let others = self.states.iter().enumerate().filter(|(state, _)| Some(*state) != measured);
-        let others: Vec<Variable> = others
-            .map(|(_, state)| state.clone())
-            .chain(self.inputs.iter().map(|(_, u)| u.clone()))
-            .collect();
-        others.iter().for_each(|other| self.add(to, &[other.power(1)]));
+        self.others(measured).iter().for_each(|other| self.add(to, &[other.power(1)]));
     }
 }

@@ -180,8 +180,7 @@ impl<T: Number> Driven<'_, T> {
             match term.adds {
                 Adds::Force(joint) => {
                     let force = coefficient * term.value(&mut self.room);
-                    let force = self.lever(joint, t, x).map_or(force, |lever| lever * force);
-                    self.act(joint, force, t, x, rates);
+                    self.exert(joint, force, t, x, rates);
                 }
                 Adds::Rate(state) => rates[state] += coefficient * term.value(&mut self.room),
                 Adds::Reading(_) => {}
@@ -238,8 +237,7 @@ impl<T: Number> Driven<'_, T> {
 
     /// By how much a unit of a joint's force changes other states' derivatives: in proportion to what its drive does there. The shares
     /// stand in `other` for the states that the drive acts on.
-    fn shares(&mut self, number: usize) {
-        let Some(own) = self.effect(number, 1.0) else { return };
+    fn shares(&mut self, number: usize, own: T) {
         let joint = &self.equations.joints[number];
         for &state in &joint.reacts {
             let change = self.other[state] - self.rate(state);
@@ -252,13 +250,31 @@ impl<T: Number> Driven<'_, T> {
     /// Adds what a force on a joint does to the states' derivatives: as much as it is to that of the joint's velocity.
     #[inline(always)]
     pub(super) fn act(&mut self, number: usize, force: T, t: f64, x: &[T], rates: &mut [T]) {
+        self.act_by(number, |_| force, t, x, rates);
+    }
+
+    /// The same of a force by what it is called, which goes further or less far by the pose.
+    #[inline(always)]
+    fn exert(&mut self, number: usize, force: T, t: f64, x: &[T], rates: &mut [T]) {
+        let nominal = self.nominal[number];
+        self.act_by(number, |own| nominal.map_or(force, |nominal| own / nominal * force), t, x, rates);
+    }
+
+    /// Adds what a force on a joint does to the states' derivatives, the force by what a unit of the joint's drive does to that of its velocity; of a
+    /// joint whose drive acts on nothing else, by no matter what.
+    #[inline(always)]
+    fn act_by(&mut self, number: usize, force: impl Fn(T) -> T, t: f64, x: &[T], rates: &mut [T]) {
         let joint = &self.equations.joints[number];
-        rates[joint.velocity] += force;
-        if !joint.reacts.is_empty() {
-            self.look(t, x);
-            self.shares(number);
-            joint.reacts.iter().for_each(|&state| rates[state] += self.other[state] * force);
+        if joint.reacts.is_empty() {
+            rates[joint.velocity] += force(T::from(1.0));
+            return;
         }
+        self.look(t, x);
+        let Some(own) = self.effect(number, 1.0) else { return };
+        let force = force(own);
+        rates[joint.velocity] += force;
+        self.shares(number, own);
+        joint.reacts.iter().for_each(|&state| rates[state] += self.other[state] * force);
     }
 }
 
@@ -297,8 +313,7 @@ impl<T: Number> Machine<T> for Driven<'_, T> {
             if !self.laws[k].forces.is_empty() {
                 let v = x[joint.velocity];
                 let force = self.laws[k].force(x[joint.position], v, x, &self.beyond);
-                let force = self.lever(k, t, x).map_or(force, |lever| lever * force);
-                self.act(k, force, t, x, rates);
+                self.exert(k, force, t, x, rates);
                 for law in &self.laws[k].forces {
                     if let Force::Yielding(_, yields, state, [forward, stretched]) = *law {
                         let signs = (self.beyond[forward], self.beyond[stretched]);

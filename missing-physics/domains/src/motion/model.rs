@@ -450,11 +450,11 @@ impl MotionModel {
         };
         let room = driven.terms.iter().map(|(term, _)| term.registers()).max();
         driven.room.resize(room.unwrap_or(0), T::from(0.0));
-        let zero = vec![T::from(0.0); equations.states.len()];
         for joint in (0..self.scales.levers.len()).filter(|joint| self.scales.levers[*joint]) {
+            let zero = vec![T::from(0.0); equations.states.len()];
             driven.nominal[joint] = driven.effect_at(joint, 0.0, &zero);
+            driven.looked = (f64::NAN, usize::MAX);
         }
-        driven.looked = (f64::NAN, usize::MAX);
         driven
     }
 

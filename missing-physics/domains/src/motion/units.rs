@@ -105,10 +105,11 @@ pub(super) fn quotient(unit: &str, of: &[(&str, i32)]) -> String {
         factors.collect::<Vec<_>>()
     };
     let (above, below) = (product(1), product(-1));
-    match (&above[..], &below[..]) {
-        (_, []) => above.join(" "),
-        (_, [one]) => format!("{}/{one}", if above.is_empty() { "1".into() } else { above.join(" ") }),
-        _ => format!("{}/({})", if above.is_empty() { "1".into() } else { above.join(" ") }, below.join(" ")),
+    let top = if above.is_empty() && !below.is_empty() { "1".to_owned() } else { above.join(" ") };
+    match &below[..] {
+        [] => top,
+        [one] => format!("{top}/{one}"),
+        _ => format!("{top}/({})", below.join(" ")),
     }
 }
 

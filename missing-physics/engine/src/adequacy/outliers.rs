@@ -19,7 +19,7 @@ const NEIGHBOURS: usize = 3;
 pub(crate) type Place = (usize, usize, usize);
 
 /// A reading that was set aside.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Aside {
     pub(crate) place: Place,
     pub(crate) reading: f64,
@@ -36,46 +36,28 @@ pub(crate) fn set_aside(
     kept: &[Place],
 ) -> Result<(Recording, Vec<Aside>), PredictError> {
     let recording = &problem.recording;
-    let (mut cleaned, mut outliers) = (recording.clone(), Vec::new());
+    let (mut cleaned, mut aside) = (recording.clone(), Vec::new());
     for _ in 0..ROUNDS {
         let found = wild_rows(&problem.with(cleaned.clone()), kept)?;
         if found.is_empty() {
             break;
         }
-        for wild in found {
-            cleaned.runs[wild.run].outputs[wild.channel][wild.row] = f64::NAN;
-            outliers.push((wild.run, wild.channel, wild.row, wild.z));
+        for Aside { place: (run, channel, row), .. } in &found {
+            cleaned.runs[*run].outputs[*channel][*row] = f64::NAN;
         }
+        aside.extend(found);
     }
-    outliers.sort_by_key(|o| (o.0, o.1, o.2));
-    let series = put_back_series(recording, &cleaned, &outliers);
-    for &(run, channel, row, _) in &series {
-        cleaned.runs[run].outputs[channel][row] = recording.runs[run].outputs[channel][row];
+    aside.sort_by_key(|wild| wild.place);
+    let series = put_back_series(recording, &cleaned, &aside);
+    for &Aside { place: (run, channel, row), reading, .. } in &series {
+        cleaned.runs[run].outputs[channel][row] = reading;
     }
-    let listed = outliers
-        .into_iter()
-        .filter(|o| !series.contains(o))
-        .map(|(run, channel, row, z)| Aside {
-            place: (run, channel, row),
-            reading: recording.runs[run].outputs[channel][row],
-            z,
-        })
-        .collect();
-    Ok((cleaned, listed))
-}
-
-/// Run, channel, row, robust sigmas.
-type WildPlace = (usize, usize, usize, f64);
-
-struct Wild {
-    run: usize,
-    channel: usize,
-    row: usize,
-    z: f64,
+    aside.retain(|wild| !series.contains(wild));
+    Ok((cleaned, aside))
 }
 
 /// The wildest rows given all others, few at a time, but for those to be kept.
-fn wild_rows(problem: &Problem<'_>, kept: &[Place]) -> Result<Vec<Wild>, PredictError> {
+fn wild_rows(problem: &Problem<'_>, kept: &[Place]) -> Result<Vec<Aside>, PredictError> {
     let rule = noise_rule(problem);
     let selection = problem.select(&[], &[]);
     let start = fit(problem, &selection, &rule, (&problem.shared.start, &problem.nuisance_start), None)?;
@@ -98,7 +80,9 @@ fn wild_rows(problem: &Problem<'_>, kept: &[Place]) -> Result<Vec<Wild>, Predict
             for (k, value) in z.iter().enumerate() {
                 let around = &z[k.saturating_sub(1)..(k + 2).min(z.len())];
                 if value.abs() > limit && around.iter().all(|other| other.abs() <= value.abs()) {
-                    here.push(Wild { run, channel, row: problem.rows[run].valid[channel][k], z: *value });
+                    let row = problem.rows[run].valid[channel][k];
+                    let reading = problem.recording.runs[run].outputs[channel][row];
+                    here.push(Aside { place: (run, channel, row), reading, z: *value });
                 }
             }
         }
@@ -110,35 +94,35 @@ fn wild_rows(problem: &Problem<'_>, kept: &[Place]) -> Result<Vec<Wild>, Predict
 }
 
 /// Whether a series of wild rows is a lapse of the sensor: short, far away, and within its run.
-fn is_lapse(recording: &Recording, series: &[WildPlace]) -> bool {
+fn is_lapse(recording: &Recording, series: &[Aside]) -> bool {
     let (Some(first), Some(last)) = (series.first(), series.last()) else { return false };
-    let rows = recording.runs[first.0].len();
-    let far = series.iter().all(|(.., z)| z.abs() > JUMP);
-    far && series.len() * LAPSE <= rows && first.2 > 0 && last.2 + 1 < rows
+    let rows = recording.runs[first.place.0].len();
+    let far = series.iter().all(|wild| wild.z.abs() > JUMP);
+    far && series.len() * LAPSE <= rows && first.place.2 > 0 && last.place.2 + 1 < rows
 }
 
 /// Rows that stand in a series: what lasts is an effect, not an accident.
-fn put_back_series(recording: &Recording, cleaned: &Recording, outliers: &[WildPlace]) -> Vec<WildPlace> {
+fn put_back_series(recording: &Recording, cleaned: &Recording, aside: &[Aside]) -> Vec<Aside> {
     let mut series = Vec::new();
-    let mut current: Vec<WildPlace> = Vec::new();
-    let close = |current: &mut Vec<WildPlace>, series: &mut Vec<WildPlace>| {
+    let mut current: Vec<Aside> = Vec::new();
+    let close = |current: &mut Vec<Aside>, series: &mut Vec<Aside>| {
         if current.len() >= NEIGHBOURS && !is_lapse(recording, current) {
             series.append(current);
         }
         current.clear();
     };
-    for &place in outliers {
-        let (run, channel, row, _) = place;
+    for &wild in aside {
+        let (run, channel, row) = wild.place;
         let follows = current.last().is_some_and(|last| {
-            let between = last.2 + 1..row;
-            last.0 == run
-                && last.1 == channel
+            let between = last.place.2 + 1..row;
+            last.place.0 == run
+                && last.place.1 == channel
                 && between.into_iter().all(|i| !recording.runs[run].outputs[channel][i].is_finite())
         });
         if !follows {
             close(&mut current, &mut series);
         }
-        current.push(place);
+        current.push(wild);
     }
     close(&mut current, &mut series);
     // A run that lost more than a tenth of its rows did not lose them by accident either.
@@ -147,7 +131,7 @@ fn put_back_series(recording: &Recording, cleaned: &Recording, outliers: &[WildP
             let count = |r: &Recording| r.runs[run].outputs[channel].iter().filter(|v| v.is_finite()).count();
             let (before, lost) = (count(recording), count(recording) - count(cleaned));
             if lost > 2 && lost * 10 > before && !data.is_empty() {
-                let mine = outliers.iter().filter(|o| o.0 == run && o.1 == channel);
+                let mine = aside.iter().filter(|o| o.place.0 == run && o.place.1 == channel);
                 series.extend(mine.filter(|o| !series.contains(o)).copied().collect::<Vec<_>>());
             }
         }

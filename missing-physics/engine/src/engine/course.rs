@@ -40,8 +40,13 @@ pub(super) fn tell(observer: &dyn Observer, stage: &str, done: f64) -> Result<()
 pub(super) struct Outcome {
     pub(super) diagnosis: Diagnosis,
     pub(super) contradicting: Option<Contradicting>,
-    /// Readings that were set aside, and that the answer's fit of all others foretells.
-    pub(super) foretold: Vec<Place>,
+}
+
+/// Where a course ends.
+pub(super) enum End {
+    Answer(Box<Outcome>),
+    /// Before the answer is put together, at readings that were set aside and that its fit of all others foretells.
+    Foretold(Vec<Place>),
 }
 
 /// Sets of mechanisms, compared.
@@ -74,6 +79,8 @@ pub(super) struct Course<'a> {
     pub(super) experiments: &'a [Experiment],
     pub(super) options: &'a Options,
     pub(super) observer: &'a dyn Observer,
+    /// Whether the recording may be diagnosed again with readings that were set aside.
+    pub(super) may_keep: bool,
 }
 
 impl Course<'_> {
@@ -103,7 +110,7 @@ impl Course<'_> {
     }
 
     /// The whole way.
-    pub(super) fn run(&self) -> Result<Outcome, DiagnoseError> {
+    pub(super) fn run(&self) -> Result<End, DiagnoseError> {
         let Begun { problem, rule, baseline, .. } = self.begun;
         self.tell("adequacy of the baseline", 0.0)?;
         let adequacy = self.test(baseline, 1)?;
@@ -119,12 +126,26 @@ impl Course<'_> {
             let mut diagnosis =
                 answer.skeleton(&adequacy, Verdict::Adequate, baseline, self.before(&answer)?)?;
             diagnosis.limits = limits(problem, rule, baseline);
-            return Ok(Outcome { diagnosis, contradicting: None, foretold: Vec::new() });
+            return Ok(End::Answer(Box::new(Outcome { diagnosis, contradicting: None })));
         }
         let compared = self.compared()?;
         let before = self.before(&answer)?;
         let conclusion = self.conclusion(&compared)?;
-        self.outcome(&answer, &adequacy, before, &compared, conclusion)
+        if self.may_keep {
+            let foretold = self.foretold(&compared, &conclusion)?;
+            if !foretold.is_empty() {
+                return Ok(End::Foretold(foretold));
+            }
+        }
+        let outcome = self.outcome(&answer, &adequacy, before, &compared, conclusion)?;
+        Ok(End::Answer(Box::new(outcome)))
+    }
+
+    /// Readings that were set aside, and that a conclusion's fit of all others foretells.
+    fn foretold(&self, compared: &Compared, conclusion: &Conclusion<'_>) -> Result<Vec<Place>, PredictError> {
+        let explained = || conclusion.explained.map(|best| compared.ranking.at(best.at));
+        let by = conclusion.cause.as_ref().map(|cause| &cause.chosen.candidate).or_else(explained);
+        by.map_or_else(|| Ok(Vec::new()), |by| self.begun.foretold(&by.fit))
     }
 
     /// Every set worth looking at, the preferred one, and the noise beside which they are judged.
@@ -205,11 +226,6 @@ impl Course<'_> {
         let mut noise = rough.clone();
         let instead =
             cause.as_ref().map(|cause| self.law_instead(ranking, cause, white)).transpose()?.flatten();
-        let by = match (&cause, explained) {
-            (Some(cause), _) => Some(&cause.chosen.candidate),
-            (None, explained) => explained.map(|best| ranking.at(best.at)),
-        };
-        let foretold = by.map(|by| self.begun.foretold(&by.fit)).transpose()?.unwrap_or_default();
         let (mut diagnosis, misses) = match (cause, explained, instead) {
             (Some(cause), _, Some(law)) => {
                 let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
@@ -253,7 +269,7 @@ impl Course<'_> {
         }
         diagnosis.sets = answer.sets(ranking, best.as_ref());
         diagnosis.location = locate(problem, &baseline.selection, &self.least_squares.fit, &noise)?;
-        Ok(Outcome { diagnosis, contradicting, foretold })
+        Ok(Outcome { diagnosis, contradicting })
     }
 
     /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of

@@ -15,7 +15,7 @@ use crate::model::{Experiment, Model};
 use crate::observer::Observer;
 use crate::runs::contradicting::Contradicting;
 use begin::{begin, least_squares_baseline};
-use course::{Course, Outcome, tell};
+use course::{Course, End, Outcome, tell};
 use input::check_experiment;
 
 pub use input::{DiagnoseError, Options};
@@ -86,23 +86,20 @@ fn outcome(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Outcome, DiagnoseError> {
-    let course = |kept: &[Place]| -> Result<Outcome, DiagnoseError> {
-        tell(observer, "reading the noise", 0.0)?;
-        let begun = begin(model, recording, options, kept)?;
-        let least_squares = least_squares_baseline(&begun)?;
-        Course { begun: &begun, least_squares: &least_squares, experiments, options, observer }.run()
-    };
-    let mut outcome = course(&[])?;
     // What is wild beside the baseline may be no more than what an explanation says it should be.
-    let mut kept = Vec::new();
-    for _ in 0..KEPT_ANEW {
-        if outcome.foretold.is_empty() {
-            break;
+    let mut kept: Vec<Place> = Vec::new();
+    let mut again = 0;
+    loop {
+        tell(observer, "reading the noise", 0.0)?;
+        let begun = begin(model, recording, options, &kept)?;
+        let least_squares = &least_squares_baseline(&begun)?;
+        let may_keep = again < KEPT_ANEW;
+        match (Course { begun: &begun, least_squares, experiments, options, observer, may_keep }).run()? {
+            End::Answer(outcome) => return Ok(*outcome),
+            End::Foretold(readings) => kept.extend(readings),
         }
-        kept.append(&mut outcome.foretold);
-        outcome = course(&kept)?;
+        again += 1;
     }
-    Ok(outcome)
 }
 
 /// How much a verdict says.

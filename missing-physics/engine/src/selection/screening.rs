@@ -33,17 +33,30 @@ pub(crate) struct Promising {
 /// Mechanisms, each with the starts that are looked at.
 pub(crate) struct Screening {
     looked_at: Vec<(usize, Vec<Guess>)>,
-    /// The starts that each had beside nothing.
-    first: Vec<Vec<Guess>>,
+    /// The starts that each had beside the first set, once that was asked for.
+    first: Option<Vec<Vec<Guess>>>,
 }
 
 impl Screening {
-    /// Mechanisms with their starts; one without any is looked at near its off value.
-    pub(crate) fn new(mechanisms: impl Iterator<Item = (usize, Vec<Guess>)>) -> Self {
-        let near_off = |starts: Vec<Guess>| if starts.is_empty() { vec![Guess::new()] } else { starts };
-        let looked_at: Vec<_> = mechanisms.map(|(m, starts)| (m, near_off(starts))).collect();
-        let first = looked_at.iter().map(|(_, starts)| starts.clone()).collect();
-        Self { looked_at, first }
+    /// Mechanisms, none of which has been looked at.
+    pub(crate) fn new(mechanisms: &[usize]) -> Self {
+        Self { looked_at: mechanisms.iter().map(|m| (*m, Vec::new())).collect(), first: None }
+    }
+
+    /// Takes in where mechanisms begin beside a set: those without any start near their off values, the first time; after that what begins
+    /// elsewhere than beside the first set.
+    fn begin(&mut self, parent: &Candidate, anew: impl Fn(usize) -> Vec<Guess>) {
+        let Some(first) = &self.first else {
+            let near_off = |starts: Vec<Guess>| if starts.is_empty() { vec![Guess::new()] } else { starts };
+            self.looked_at.iter_mut().for_each(|(m, starts)| *starts = near_off(anew(*m)));
+            self.first = Some(self.looked_at.iter().map(|(_, starts)| starts.clone()).collect());
+            return;
+        };
+        for ((mechanism, starts), first) in self.looked_at.iter_mut().zip(first) {
+            if !parent.set.contains(mechanism) {
+                starts.extend(anew(*mechanism).into_iter().filter(|start| !first.contains(start)));
+            }
+        }
     }
 
     /// The mechanisms whose first steps beside a fitted set gain most, most gaining first; forgets starts that promise least. `anew` is where
@@ -54,11 +67,7 @@ impl Screening {
         parent: &Candidate,
         anew: impl Fn(usize) -> Vec<Guess>,
     ) -> Vec<Promising> {
-        for ((mechanism, starts), first) in self.looked_at.iter_mut().zip(&self.first) {
-            if !parent.set.contains(mechanism) {
-                starts.extend(anew(*mechanism).into_iter().filter(|start| !first.contains(start)));
-            }
-        }
+        self.begin(parent, anew);
         let tried: Vec<(usize, usize)> = (0..self.looked_at.len())
             .filter(|&k| !parent.set.contains(&self.looked_at[k].0))
             .flat_map(|k| (0..self.looked_at[k].1.len()).map(move |start| (k, start)))

@@ -40,10 +40,7 @@ pub(crate) fn search(
     let mut all = vec![baseline];
     let mut unfitted = Vec::new();
     // Where there are many, most would be fitted for nothing.
-    let mut screening = problem.knows_many().then(|| {
-        let starts = starts_beside(problem, &all[0]);
-        Screening::new(allowed.iter().map(|&m| (m, starts(m))))
-    });
+    let mut screening = problem.knows_many().then(|| Screening::new(allowed));
     let mut layer: Vec<usize> = vec![0];
     // A mechanism that comes with another is two at work.
     let at_work = |c: &Candidate| problem.at_work(&c.set).len();
