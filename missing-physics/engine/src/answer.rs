@@ -296,14 +296,13 @@ impl Answer<'_> {
     ) -> Option<MechanismReport> {
         let mechanism = &self.problem.spec().mechanisms[m];
         let alone = ranking.of(&[m]);
-        let holder = best
-            .filter(|c| c.set.contains(&m))
-            .or_else(|| sets.iter().map(|p| p.0).find(|c| c.set.contains(&m)))
-            .or(alone)?;
+        // Beside one that brings it along as a companion a mechanism is at work without being a member.
+        let holds = |c: &&Candidate| self.problem.at_work(&c.set).contains(&m);
+        let holder = best.filter(holds).or_else(|| sets.iter().map(|p| p.0).find(holds)).or(alone)?;
         let scored = if ranking.score_of(&holder.set).is_some() { &holder.set[..] } else { &[m] };
         let score = ranking.score_of(scored);
         let profile = profile && best.is_some_and(|b| b.set == holder.set);
-        let holding = sets.iter().filter(|(c, _)| self.problem.at_work(&c.set).contains(&m));
+        let holding = sets.iter().filter(|(c, _)| holds(c));
         let channels = &self.problem.recording.channels;
         Some(MechanismReport {
             id: mechanism.id.clone(),

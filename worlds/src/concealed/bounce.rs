@@ -40,8 +40,14 @@ impl Maker for Bounce {
         if hidden == Hidden::Local {
             local(&mut world, whole(&mut rng, 0, 3), &mut key, &mut rng);
         } else if hidden.unlisted() {
-            world.effects.softer_side = log_between(&mut rng, 0.02, 0.15);
-            key.unlisted = Some("a table that is softer on one side".into());
+            let softer_side = log_between(&mut rng, 0.02, 0.15);
+            if whole(&mut rng, 0, 1) == 0 {
+                world.effects.softer_side = softer_side;
+                key.unlisted = Some("a table that is softer on one side".into());
+            } else {
+                world.effects.bowl_per_m = log_between(&mut rng, 0.1, 1.0);
+                key.unlisted = Some("a table that is a shallow bowl".into());
+            }
         }
         let mut seed = seed ^ 0x5eed;
         let mut made = world.recorded(seed);

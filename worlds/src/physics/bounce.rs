@@ -33,6 +33,8 @@ pub struct Effects {
     pub unheard: f64,
     /// Unlisted: fall of the restitution where x is above [`BounceWorld::soft_from_m`].
     pub softer_side: f64,
+    /// Unlisted: the table is a shallow bowl, whose slope grows by so much for each metre from the middle, in 1/m.
+    pub bowl_per_m: f64,
     /// Unlisted: change of the restitution from the first run to the last.
     pub warming: f64,
     /// Unlisted: fall of the restitution with the square of the speed beyond 1 m/s, in s^2/m^2.
@@ -136,6 +138,18 @@ pub(crate) struct Recorded {
     pub(crate) softer: Vec<usize>,
 }
 
+impl Effects {
+    /// How high the table is at a place.
+    fn table_height(&self, [x, y, _]: &Vec3) -> f64 {
+        self.table_slope[0] * x + self.table_slope[1] * y + 0.5 * self.bowl_per_m * (x * x + y * y)
+    }
+
+    /// Slopes of the table at a place.
+    fn slopes_at(&self, [x, y, _]: &Vec3) -> [f64; 2] {
+        [self.table_slope[0] + self.bowl_per_m * x, self.table_slope[1] + self.bowl_per_m * y]
+    }
+}
+
 impl BounceWorld {
     /// Thirty drops from 0.3 m, six impacts each, heard to 30 us and 6 mm.
     pub fn drops() -> Self {
@@ -235,11 +249,12 @@ impl BounceWorld {
         let mut t = rng.random_range(begin_s);
         let mut level = Self { effects: *e, ..*self };
         level.effects.table_slope = [0.0; 2];
+        level.effects.bowl_per_m = 0.0;
         let mut heard = Vec::with_capacity(impacts);
         for impact in 0..impacts {
             let table = if impact == 0 { &level } else { self };
             t += table.fly(&mut place, &mut velocity);
-            place[2] = e.table_slope[0] * place[0] + e.table_slope[1] * place[1];
+            place[2] = e.table_height(&place);
             let at = [
                 t * (1.0 + e.clock_rate) + self.noise[0] * normal(rng),
                 place[0] * (1.0 + e.position_scale) + self.noise[1] * normal(rng),
@@ -254,11 +269,11 @@ impl BounceWorld {
     /// Flies until the table is reached; the time it took.
     fn fly(&self, place: &mut Vec3, velocity: &mut Vec3) -> f64 {
         const STEP_S: f64 = 1e-3;
-        let [sx, sy] = self.effects.table_slope;
-        let above = |p: &Vec3| p[2] - sx * p[0] - sy * p[1];
+        let above = |p: &Vec3| p[2] - self.effects.table_height(p);
         let mut t = 0.0;
         loop {
             let (p, v) = self.step(place, velocity, STEP_S);
+            let [sx, sy] = self.effects.slopes_at(&p);
             if above(&p) <= 0.0 && v[2] - sx * v[0] - sy * v[1] < 0.0 {
                 break;
             }
@@ -294,7 +309,8 @@ impl BounceWorld {
         if e.softer.acts(place[0], speed) {
             restitution -= e.softer.by;
         }
-        let up = unit(&[-e.table_slope[0], -e.table_slope[1], 1.0]);
+        let [sx, sy] = e.slopes_at(place);
+        let up = unit(&[-sx, -sy, 1.0]);
         let into = v[0] * up[0] + v[1] * up[1] + v[2] * up[2];
         let mirrored: Vec3 =
             std::array::from_fn(|i| (1.0 - e.friction) * (v[i] - into * up[i]) - into * up[i]);
@@ -355,6 +371,27 @@ mod tests {
         for pair in flights.windows(2) {
             approx::assert_relative_eq!(pair[1] / pair[0], 0.8, max_relative = 2e-6);
         }
+    }
+
+    /// A ball that falls straight down is mirrored at the slope where it lands, and lands again on the bowl.
+    #[test]
+    fn a_bowl_sends_balls_to_its_middle() {
+        let effects = Effects { bowl_per_m: 0.8, ..Effects::default() };
+        let still = BounceWorld { noise: [0.0; 2], kappa: 1e14, release_m_s: 0.0, ..BounceWorld::drops() };
+        let world = BounceWorld { effects, ..still };
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let heard = world.drop([0.1, 0.0], 0.3, 0.0..1.0, 2, &mut rng);
+        let [first, second] = [heard[0].heard, heard[1].heard];
+        let (duration, theta) = (second[0] - first[0], (0.8_f64 * 0.1).atan());
+        let after = 0.8 * (2.0 * GRAVITY_M_S2 * 0.3).sqrt();
+        // Directions are drawn about the mean one to 1e-7 rad.
+        approx::assert_relative_eq!(
+            (second[1] - first[1]) / duration,
+            -after * (2.0 * theta).sin(),
+            max_relative = 1e-5
+        );
+        let rise = after * (2.0 * theta).cos() * duration - 0.5 * GRAVITY_M_S2 * duration * duration;
+        approx::assert_abs_diff_eq!(rise, 0.4 * (second[1].powi(2) - first[1].powi(2)), epsilon = 1e-6);
     }
 
     #[test]

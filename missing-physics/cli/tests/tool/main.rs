@@ -16,6 +16,7 @@ mod machines;
 mod next_experiment;
 mod outputs;
 mod pages;
+mod plane;
 mod prove;
 mod recorded;
 mod repair;

@@ -5,10 +5,15 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// What the tool says of a recording.
+/// What the tool says of a machine's recording.
 pub(super) fn answer(header: &str, data: &str) -> Value {
+    answer_in("motion", header, data)
+}
+
+/// What the tool says of a recording of a domain.
+pub(super) fn answer_in(domain: &str, header: &str, data: &str) -> Value {
     let folder = tempfile::tempdir().unwrap();
-    let header = format!("format = 1\ndomain = \"motion\"\ndata = \"data.csv\"\n{header}");
+    let header = format!("format = 1\ndomain = \"{domain}\"\ndata = \"data.csv\"\n{header}");
     std::fs::write(folder.path().join("recording.toml"), header).unwrap();
     std::fs::write(folder.path().join("data.csv"), data).unwrap();
     let tool = env!("CARGO_BIN_EXE_missing-physics");

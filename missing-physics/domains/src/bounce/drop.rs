@@ -186,7 +186,9 @@ impl Drop {
         let share = duration_s / (whole * (1.0 + effects.position_scale));
         let (from, to) = (self.place(index), self.place(index + 1));
         let [dx, dy] = [(to[0] - from[0]) * share, (to[1] - from[1]) * share];
-        let rise = effects.table[0] * dx + effects.table[1] * dy;
+        let halfway = [0, 1].map(|k| 0.5 * (from[k] + to[k]) - self.middle_m[k]);
+        let [slope_x, slope_y] = effects.table_at(halfway);
+        let rise = slope_x * dx + slope_y * dy;
         Hop { displacement_m: [dx, dy, rise], duration_s }
             .velocities(effects.gravity_m_s2, effects.drag_per_m)
     }
@@ -216,10 +218,12 @@ impl Drop {
                 landing = self.flight(impact, effects, m, Part::Last).1;
             }
             if let Some(before) = before {
-                let expected = reflected(&before, effects.table, effects.friction);
+                let place = self.place(impact);
+                let from_middle = [0, 1].map(|k| place[k] - self.middle_m[k]);
+                let expected = reflected(&before, effects.table_at(from_middle), effects.friction);
                 let ratio =
                     (speed(&after).max(f64::MIN_POSITIVE) / speed(&expected).max(f64::MIN_POSITIVE)).ln();
-                let restitution = effects.log_restitution(self.place(impact), speed(&before));
+                let restitution = effects.log_restitution(place, speed(&before));
                 let (now, then) = (heading(&after), heading(&expected));
                 let values = [ratio - restitution, angles * (now[0] - then[0]), angles * (now[1] - then[1])];
                 values.iter().enumerate().for_each(|(c, v)| out[self.row(at, c)] = *v);

@@ -11,6 +11,8 @@ pub(super) struct Effects {
     pub(super) drag_per_m: f64,
     /// Slopes dz/dx and dz/dy of the table.
     pub(super) table: [f64; 2],
+    /// By how much those slopes grow for each metre from where balls land on average: a bowl, or a dome below zero; 1/m.
+    pub(super) curved_per_m: f64,
     /// Where balls head on average when they first come to the table (or leave it, where their fall is not known), in the
     /// recording's units of length and time.
     pub(super) heads: [f64; 2],
@@ -42,6 +44,7 @@ impl Effects {
             slope_s_m: 0.0,
             drag_per_m: 0.0,
             table: [0.0; 2],
+            curved_per_m: 0.0,
             heads: [0.0; 2],
             outwards_per_m: 0.0,
             friction: 0.0,
@@ -52,6 +55,11 @@ impl Effects {
             unheard: 0.0,
             terms: [0.0; 3],
         }
+    }
+
+    /// Slopes of the table so far (m) from where balls land on average.
+    pub(super) fn table_at(&self, from_middle: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| self.table[k] + self.curved_per_m * from_middle[k])
     }
 
     /// Logarithm of the restitution of an impact at a place and a speed.

@@ -29,6 +29,8 @@ pub(super) struct Layout {
     /// Candidate terms of an unknown law: linear in x and y, and in the speed squared.
     pub(super) terms: Option<[ParameterRef; 2]>,
     pub(super) squared: ParameterRef,
+    /// That the table's slope changes with the place, and along x and y where balls land on average.
+    pub(super) curved: Option<[ParameterRef; 3]>,
 }
 
 /// The specification of a set-up, the restitution starting at a value.
@@ -214,15 +216,25 @@ fn microphone(b: &mut SpecBuilder, p: &mut Layout, count: usize) {
     p.microphone = Some([x, y, which]);
 }
 
-/// What the logarithm of the restitution could depend on, should no mechanism hold.
+/// What the logarithm of the restitution, and the table's slope, could depend on, should no mechanism hold.
 fn terms(b: &mut SpecBuilder, p: &mut Layout, placed: bool) {
-    let mut term = |name: &str, unit: &str, scale: f64, formula: &str, variable: &str| {
+    let mut term = |name: &str, unit: &str, scale: f64, of: &str, formula: &str, variables: &[&str]| {
         let at = b.shared(name, unit, 0.0, [-1e3 * scale, 1e3 * scale], scale);
-        b.term(at, formula, Quantity::new("ln(restitution)", ""), vec![variable.into()]);
+        b.term(at, formula, Quantity::new(of, ""), variables.iter().map(|v| (*v).into()).collect());
         at
     };
-    p.squared = term("per_v2_s2_m2", "s^2/m^2", 1e-3, "v^2", "v");
+    let restitution = "ln(restitution)";
+    p.squared = term("per_v2_s2_m2", "s^2/m^2", 1e-3, restitution, "v^2", &["v"]);
     if placed {
-        p.terms = Some([term("per_x_m", "1/m", 0.02, "x", "x_m"), term("per_y_m", "1/m", 0.02, "y", "y_m")]);
+        let x = term("per_x_m", "1/m", 0.02, restitution, "x", &["x_m"]);
+        let y = term("per_y_m", "1/m", 0.02, restitution, "y", &["y_m"]);
+        p.terms = Some([x, y]);
+        let slope = "slope of the table";
+        let curved = term("curved_per_m", "1/m", 0.05, slope, "(r - mean r)", &["x_m", "y_m"]);
+        p.curved = Some([
+            curved,
+            term("curved_from_x", "", 0.01, slope, "e_x", &[]),
+            term("curved_from_y", "", 0.01, slope, "e_y", &[]),
+        ]);
     }
 }

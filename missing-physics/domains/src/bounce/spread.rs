@@ -79,12 +79,13 @@ impl Nuisance {
 
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
 /// only about the likely drop.
-const NUISANCES: [Nuisance; 6] = [
+const NUISANCES: [Nuisance; 7] = [
     Nuisance::new(|e| &mut e.restitution, 0.3),
     Nuisance::new(|e| &mut e.slope_s_m, 0.1),
     Nuisance::new(|e| &mut e.drag_per_m, 0.5),
     Nuisance::new(|e| &mut e.table[0], 0.3),
     Nuisance::new(|e| &mut e.table[1], 0.3),
+    Nuisance::new(|e| &mut e.curved_per_m, 1.0),
     Nuisance::new(|e| &mut e.walk_s, 1e-4),
 ];
 const CLOCK: Nuisance = Nuisance::new(|e| &mut e.clock_rate, 0.1);

@@ -22,10 +22,7 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
     for drop in [1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0] {
         if drop <= 2.0 * height {
             let duration = (2.0 * drop / gravity_m_s2).sqrt();
-            let nuisance = match axes {
-                Axes::Space => vec![0.0, 0.0, drop, 0.0, 0.0, 0.0],
-                _ => vec![drop, 0.0],
-            };
+            let nuisance = begins(axes, [0.0, 0.0, drop], [0.0; 3]);
             let words = format!("drop it from {drop} m as well, {REPEATS} times");
             list.push(repeated(
                 recording,
@@ -37,7 +34,7 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
             ));
         }
     }
-    if axes == Axes::Space {
+    if axes.along_ground() {
         for factor in [0.5, 1.0, 2.0] {
             let launch = (factor * speed * 2.0).round() / 2.0;
             for degrees in [30.0_f64, 60.0, 85.0] {
@@ -52,14 +49,14 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
                 ];
                 let words =
                     format!("throw it at {launch} m/s, {degrees} degrees above level, {REPEATS} times");
-                let nuisance = vec![0.0, 0.0, 1.0, launch * cos, 0.0, launch * sin];
+                let nuisance = begins(axes, [0.0, 0.0, 1.0], [launch * cos, 0.0, launch * sin]);
                 list.push(repeated(recording, action, words, duration, frame, nuisance));
             }
         }
     }
     let mut rod = template(recording, vec![0.0, 1.0]);
     rod.kind = ROD;
-    let nuisance = vec![0.0; if axes == Axes::Space { 6 } else { 2 }];
+    let nuisance = begins(axes, [0.0; 3], [0.0; 3]);
     list.push(Experiment {
         action: vec![("known_length_m".into(), 1.0)],
         words: "film an upright rod of exactly 1 m, 10 times, and read its ends".into(),
@@ -67,6 +64,12 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
         nuisance: vec![nuisance; 10],
     });
     list
+}
+
+/// The nuisance parameters of a run that begins at a place (m) with a velocity (m/s).
+fn begins(axes: Axes, place: [f64; 3], velocity: [f64; 3]) -> Vec<f64> {
+    let seen = axes.seen();
+    seen.iter().map(|k| place[*k]).chain(seen.iter().map(|k| velocity[*k])).collect()
 }
 
 fn repeated(

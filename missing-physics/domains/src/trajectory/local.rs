@@ -69,13 +69,12 @@ impl TrajectoryModel {
 impl LocalCauses for TrajectoryModel {
     /// A force; of a felt flight it is what the sensor reads.
     fn unknowns(&self) -> Vec<LocalUnknown> {
-        let axes: &[&str] = match self.axes() {
-            Axes::Space => &["x", "y", "z"],
-            Axes::Height => &["z"],
-            Axes::Accelerometer => return Vec::new(),
-        };
-        let component = |axis: &&str| Quantity::new(format!("acceleration_{axis}_m_s2"), "m/s^2");
-        vec![LocalUnknown::new("a force", axes.iter().map(component).collect())]
+        if self.axes() == Axes::Accelerometer {
+            return Vec::new();
+        }
+        let component =
+            |axis: &usize| Quantity::new(format!("acceleration_{}_m_s2", ["x", "y", "z"][*axis]), "m/s^2");
+        vec![LocalUnknown::new("a force", self.axes().seen().iter().map(component).collect())]
     }
 
     fn response(
@@ -93,13 +92,12 @@ impl LocalCauses for TrajectoryModel {
                 return Ok(out);
             }
             let (flight, camera, states) = self.followed(run, shared, nuisance)?;
-            let first = 3 - run.outputs.len();
-            for (i, place) in
-                Self::pushed(run, &flight, &states, first + component, amounts).into_iter().enumerate()
-            {
-                let seen = if first == 0 { tilted(place, camera.tilt) } else { place };
-                for (c, x) in seen.iter().skip(first).enumerate() {
-                    out[c * n + i] = camera.scale * x;
+            let seen = self.axes().seen();
+            let places = Self::pushed(run, &flight, &states, seen[component], amounts);
+            for (i, place) in places.into_iter().enumerate() {
+                let place = if self.axes().along_ground() { tilted(place, camera.tilt) } else { place };
+                for (c, axis) in seen.iter().enumerate() {
+                    out[c * n + i] = camera.scale * place[*axis];
                 }
             }
             Ok(out)
@@ -108,13 +106,11 @@ impl LocalCauses for TrajectoryModel {
     }
 
     fn states(&self) -> Vec<Quantity> {
-        let speed = Quantity::new("speed_m_s", "m/s");
-        let place = |name: &&str| Quantity::new(*name, "m");
-        match self.axes() {
-            Axes::Space => ["x_m", "y_m", "z_m"].iter().map(place).chain([speed]).collect(),
-            Axes::Height => vec![place(&"z_m"), speed],
-            Axes::Accelerometer => Vec::new(),
+        if self.axes() == Axes::Accelerometer {
+            return Vec::new();
         }
+        let place = |axis: &usize| Quantity::new(["x_m", "y_m", "z_m"][*axis], "m");
+        self.axes().seen().iter().map(place).chain([Quantity::new("speed_m_s", "m/s")]).collect()
     }
 
     fn state(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {
@@ -122,9 +118,8 @@ impl LocalCauses for TrajectoryModel {
             return Ok(Vec::new());
         }
         let (_, _, states) = self.followed(run, shared, nuisance)?;
-        let first = 3 - run.outputs.len();
-        let place = |k: usize| states.iter().map(|s| s.position[k]).collect();
+        let place = |k: &usize| states.iter().map(|s| s.position[*k]).collect();
         let speed = |s: &State<f64>| s.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-        Ok((first..3).map(place).chain([states.iter().map(speed).collect()]).collect())
+        Ok(self.axes().seen().iter().map(place).chain([states.iter().map(speed).collect()]).collect())
     }
 }

@@ -47,6 +47,7 @@ impl Domain for Trajectory {
     fn reads(&self) -> &'static [(&'static str, &'static str)] {
         &[
             ("run, t_s, z_m", "height alone"),
+            ("run, t_s, x_m, z_m", "one camera's view of a flight in the plane of its picture, z up"),
             ("run, t_s, x_m, y_m, z_m", "all coordinates, z up"),
             ("run, t_s, accel_z_m_s2", "specific force on board; its offset is fitted in each run"),
             (
@@ -92,6 +93,7 @@ impl Domain for Trajectory {
         let axes = axes(&table)?;
         let channel_names: &[&str] = match axes {
             Axes::Height => &["z_m"],
+            Axes::Plane => &["x_m", "z_m"],
             Axes::Space => &["x_m", "y_m", "z_m"],
             Axes::Accelerometer => &["accel_z_m_s2"],
         };
@@ -154,10 +156,10 @@ fn axes(table: &Table) -> Result<Axes, ReadError> {
     }
     match (has("x_m"), has("y_m"), has("z_m")) {
         (false, false, true) => Ok(Axes::Height),
+        (true, false, true) => Ok(Axes::Plane),
         (true, true, true) => Ok(Axes::Space),
         (_, _, false) => Err(table.missing("z_m", "height in metres (or accel_z_m_s2)")),
-        (true, false, _) => Err(table.missing("y_m", "x_m, y_m and z_m, or z_m alone")),
-        (false, true, _) => Err(table.missing("x_m", "x_m, y_m and z_m, or z_m alone")),
+        (false, true, true) => Err(table.missing("x_m", "z_m alone, x_m and z_m, or x_m, y_m and z_m")),
     }
 }
 
@@ -168,7 +170,10 @@ fn check_spin(table: &Table, axes: Axes, spins: usize) -> Result<(), ReadError> 
     let absent = SPIN.into_iter().find(|n| table.numbers(n).is_none());
     match absent {
         Some(column) => Err(table.missing(column, "all three components of the spin, or none")),
-        None => Err(table.missing("x_m", "all coordinates where the spin is given")),
+        None => {
+            let absent = ["x_m", "y_m"].into_iter().find(|n| table.numbers(n).is_none()).unwrap_or("y_m");
+            Err(table.missing(absent, "all coordinates where the spin is given"))
+        }
     }
 }
 
@@ -190,6 +195,10 @@ fn undetermined(axes: Axes) -> Vec<String> {
         Axes::Height => {
             vec!["magnus-lift, wind and camera-tilt need x and y as well: they were not tried".into()]
         }
+        Axes::Plane => vec![
+            "one camera does not see what comes towards it: wind and spin across the picture were not tried"
+                .into(),
+        ],
         Axes::Accelerometer => vec![
             "buoyancy is one with the sensor's offset: it was not tried".into(),
             "a reading of one axis shows no lift and no wind, and there is no camera: they were not tried"

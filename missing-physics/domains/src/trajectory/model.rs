@@ -80,13 +80,12 @@ impl DualModel for TrajectoryModel {
                 *p += *v * shift;
             }
             match self.setup.axes {
-                Axes::Height => out[i] = camera.scale * p[2],
                 // Specific force: what is left of the acceleration once gravity is taken away, plus the sensor's offset.
                 Axes::Accelerometer => out[i] = a[2] + self.setup.gravity_m_s2 + nuisance[0],
-                Axes::Space => {
-                    let p = tilted(p, camera.tilt);
-                    for c in 0..3 {
-                        out[c * n + i] = camera.scale * p[c];
+                axes => {
+                    let p = if axes.along_ground() { tilted(p, camera.tilt) } else { p };
+                    for (c, axis) in axes.seen().iter().enumerate() {
+                        out[c * n + i] = camera.scale * p[*axis];
                     }
                 }
             }
@@ -109,16 +108,16 @@ impl TrajectoryModel {
     /// Where a run begins, by its nuisance parameters.
     pub(super) fn start<T: DualNum<Primitive = f64, Real = f64> + Copy>(&self, nuisance: &[T]) -> State<T> {
         let zero = T::from(0.0);
-        match self.setup.axes {
-            Axes::Height => {
-                State { position: [zero, zero, nuisance[0]], velocity: [zero, zero, nuisance[1]] }
-            }
-            Axes::Space => State {
-                position: [nuisance[0], nuisance[1], nuisance[2]],
-                velocity: [nuisance[3], nuisance[4], nuisance[5]],
-            },
-            Axes::Accelerometer => State { position: [zero; 3], velocity: [zero, zero, nuisance[1]] },
+        let mut start = State { position: [zero; 3], velocity: [zero; 3] };
+        let seen = self.setup.axes.seen();
+        if seen.is_empty() {
+            start.velocity[2] = nuisance[1];
         }
+        for (c, axis) in seen.iter().enumerate() {
+            start.position[*axis] = nuisance[c];
+            start.velocity[*axis] = nuisance[seen.len() + c];
+        }
+        start
     }
 
     /// The flight and the camera at some shared parameters, and whether the flight's closed form will do: where nothing else is on,
@@ -178,12 +177,11 @@ impl TrajectoryModel {
         let zero = T::from(0.0);
         for i in 0..rows {
             let mut p = [zero, zero, T::from(i as f64)];
-            if self.setup.axes == Axes::Space {
+            if self.setup.axes.along_ground() {
                 p = tilted(p, camera.tilt);
             }
-            let first = 3 - out.len() / rows.max(1);
-            for (c, p) in p.iter().enumerate().skip(first) {
-                out[(c - first) * rows + i] = nuisance[c - first] + camera.scale * *p;
+            for (c, axis) in self.setup.axes.seen().iter().enumerate() {
+                out[c * rows + i] = nuisance[c] + camera.scale * p[*axis];
             }
         }
     }

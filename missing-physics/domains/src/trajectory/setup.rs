@@ -5,10 +5,29 @@
 pub enum Axes {
     /// Height alone.
     Height,
+    /// The height and the coordinate along the picture: one camera, square to the plane of the flight.
+    Plane,
     /// All three coordinates.
     Space,
     /// The specific force along z, by an accelerometer on board.
     Accelerometer,
+}
+
+impl Axes {
+    /// Which of x, y and z (0 to 2) are seen, one a channel; none of them is felt.
+    pub fn seen(self) -> &'static [usize] {
+        match self {
+            Self::Height => &[2],
+            Self::Plane => &[0, 2],
+            Self::Space => &[0, 1, 2],
+            Self::Accelerometer => &[],
+        }
+    }
+
+    /// Whether distances along the ground are seen.
+    pub(super) fn along_ground(self) -> bool {
+        self.seen().len() > 1
+    }
 }
 
 /// What is known of the set-up.

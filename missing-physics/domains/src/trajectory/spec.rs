@@ -88,8 +88,8 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
     if !felt {
         camera_and_gravity(b);
     }
-    if setup.axes == Axes::Space {
-        in_space(b, setup.spin, drag);
+    if setup.axes.along_ground() {
+        along_ground(b, setup, drag);
     }
     terms(b, setup.axes);
     start(b, setup.axes);
@@ -143,55 +143,32 @@ fn terms(b: &mut Flying, axes: Axes) {
             &["z_m"],
         );
     }
-    if axes == Axes::Space {
-        b.term(
-            Role::Stiff,
-            ("stiffness_per_s2", "1/s^2"),
-            f64::NEG_INFINITY,
-            0.1,
-            "-(r - r(0))",
-            &["x_m", "y_m", "z_m"],
-        );
-        b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_x", &[]);
-        b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), f64::NEG_INFINITY, 0.1, "e_y", &[]);
-        b.term(
-            Role::StiffX,
-            ("stiffness_x_per_s2", "1/s^2"),
-            f64::NEG_INFINITY,
-            0.1,
-            "-(x - x(0))",
-            &["x_m"],
-        );
-        b.term(
-            Role::StiffY,
-            ("stiffness_y_per_s2", "1/s^2"),
-            f64::NEG_INFINITY,
-            0.1,
-            "-(y - y(0))",
-            &["y_m"],
-        );
+    if axes.along_ground() {
+        let places: Vec<&str> = axes.seen().iter().map(|k| ["x_m", "y_m", "z_m"][*k]).collect();
+        let free = f64::NEG_INFINITY;
+        b.term(Role::Stiff, ("stiffness_per_s2", "1/s^2"), free, 0.1, "-(r - r(0))", &places);
+        b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), free, 0.1, "e_x", &[]);
+        if axes == Axes::Space {
+            b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), free, 0.1, "e_y", &[]);
+        }
+        b.term(Role::StiffX, ("stiffness_x_per_s2", "1/s^2"), free, 0.1, "-(x - x(0))", &["x_m"]);
+        if axes == Axes::Space {
+            b.term(Role::StiffY, ("stiffness_y_per_s2", "1/s^2"), free, 0.1, "-(y - y(0))", &["y_m"]);
+        }
     }
 }
 
 /// Where and how fast each run begins.
 fn start(b: &mut Flying, axes: Axes) {
-    match axes {
-        Axes::Height => {
-            b.b.nuisance("z0_m", "m", UNBOUNDED, 1.0);
-            b.b.nuisance("vz0_m_s", "m/s", UNBOUNDED, 1.0);
-        }
-        Axes::Space => {
-            for name in ["x0_m", "y0_m", "z0_m"] {
-                b.b.nuisance(name, "m", UNBOUNDED, 1.0);
-            }
-            for name in ["vx0_m_s", "vy0_m_s", "vz0_m_s"] {
-                b.b.nuisance(name, "m/s", UNBOUNDED, 1.0);
-            }
-        }
-        Axes::Accelerometer => {
-            b.b.nuisance("offset_m_s2", "m/s^2", UNBOUNDED, 1.0);
-            b.b.nuisance("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
-        }
+    if axes == Axes::Accelerometer {
+        b.b.nuisance("offset_m_s2", "m/s^2", UNBOUNDED, 1.0);
+        b.b.nuisance("vz0_m_s", "m/s", [-100.0, 100.0], 0.01);
+    }
+    for axis in axes.seen() {
+        b.b.nuisance(["x0_m", "y0_m", "z0_m"][*axis], "m", UNBOUNDED, 1.0);
+    }
+    for axis in axes.seen() {
+        b.b.nuisance(["vx0_m_s", "vy0_m_s", "vz0_m_s"][*axis], "m/s", UNBOUNDED, 1.0);
     }
 }
 
@@ -225,16 +202,18 @@ fn camera_and_gravity(b: &mut Flying) {
     b.b.mechanism("clock-rate", &[clock], text, &["camera-scale", "buoyancy"]);
 }
 
-/// Effects that need all three coordinates.
-fn in_space(b: &mut Flying, spin: bool, drag: ParameterRef) {
-    let (parameters, equation) = if spin {
+/// Effects that a height alone does not show: what acts within the plane of the picture, or in space.
+fn along_ground(b: &mut Flying, setup: &Setup, drag: ParameterRef) {
+    let space = setup.axes == Axes::Space;
+    let (parameters, equation) = if setup.spin {
         let c = b.shared(Role::LiftCoefficient, "lift_coefficient", "", [-20.0, 20.0], 0.01);
         (vec![c], "a = c spin x v")
     } else {
-        let roles = [Role::LiftX, Role::LiftY, Role::LiftZ];
-        let names = ["lift_x_per_s", "lift_y_per_s", "lift_z_per_s"];
-        let lift =
-            roles.into_iter().zip(names).map(|(r, n)| b.shared(r, n, "1/s", [-20.0, 20.0], 0.1)).collect();
+        let lifts =
+            [(Role::LiftX, "lift_x_per_s"), (Role::LiftY, "lift_y_per_s"), (Role::LiftZ, "lift_z_per_s")];
+        // Within the plane a ball is lifted by spin about the axis across it.
+        let within = if space { 0..3 } else { 1..2 };
+        let lift = lifts[within].iter().map(|(r, n)| b.shared(*r, n, "1/s", [-20.0, 20.0], 0.1)).collect();
         (lift, "a = lift x v")
     };
     let text = [
@@ -244,29 +223,30 @@ fn in_space(b: &mut Flying, spin: bool, drag: ParameterRef) {
         "Mehta 1985, doi:10.1146/annurev.fl.17.010185.001055",
     ];
     b.b.mechanism("magnus-lift", &parameters, text, &["wind", "camera-tilt"]);
-    let wx = b.shared(Role::WindX, "wind_x_m_s", "m/s", [-40.0, 40.0], 2.0);
-    let wy = b.shared(Role::WindY, "wind_y_m_s", "m/s", [-40.0, 40.0], 2.0);
+    let mut winds = vec![b.shared(Role::WindX, "wind_x_m_s", "m/s", [-40.0, 40.0], 2.0)];
+    winds.extend(space.then(|| b.shared(Role::WindY, "wind_y_m_s", "m/s", [-40.0, 40.0], 2.0)));
     let text = [
         "wind",
         "The air moves; it acts through drag.",
         "u = v - w in every drag",
         "Clift, Grace and Weber 1978, Bubbles, Drops, and Particles",
     ];
-    let wind = b.b.mechanism("wind", &[wx, wy], text, &["quadratic-drag", "magnus-lift", "camera-tilt"]);
+    let wind = b.b.mechanism("wind", &winds, text, &["quadratic-drag", "magnus-lift", "camera-tilt"]);
     wind.companions = vec![drag.index];
     wind.companions_unless = vec!["quadratic-drag".into(), "linear-drag".into()];
-    let tx = b.shared(Role::TiltX, "about_x_rad", "rad", [-0.5, 0.5], 0.01);
+    let tx = space.then(|| b.shared(Role::TiltX, "about_x_rad", "rad", [-0.5, 0.5], 0.01));
     let ty = b.shared(Role::TiltY, "about_y_rad", "rad", [-0.5, 0.5], 0.01);
+    let tilts: Vec<ParameterRef> = tx.into_iter().chain([ty]).collect();
     let text = [
         "camera tilt",
         "The camera's vertical is not gravity's.",
         "measured = R_y(about_y) R_x(about_x) true",
         "Hartley and Zisserman 2004, doi:10.1017/CBO9780511811685, ch. 2",
     ];
-    let tilt = b.b.mechanism("camera-tilt", &[tx, ty], text, &["wind", "magnus-lift"]);
+    let tilt = b.b.mechanism("camera-tilt", &tilts, text, &["wind", "magnus-lift"]);
     tilt.derived.push(Derived {
         name: "angle_rad".into(),
         unit: "rad".into(),
-        value: Arc::new(move |shared| shared[tx.slot].hypot(shared[ty.slot])),
+        value: Arc::new(move |shared| tilts.iter().map(|t| shared[t.slot].powi(2)).sum::<f64>().sqrt()),
     });
 }
