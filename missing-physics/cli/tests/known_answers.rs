@@ -306,6 +306,20 @@ fn the_author_s_times_of_the_same_ball() {
     assert!(end_after < end_before, "{end_before} {end_after}");
 }
 
+/// Balls on a table that is a shallow bowl, 1.6 m in radius: its slope is the law, and no clock that runs wrong by a fifth is named for it, beside
+/// directions that scatter by a third of a right angle.
+#[test]
+#[ignore = "needs ../shared, long: .ci/run --long"]
+fn shared_long_a_bowl_is_a_law_and_no_clock() {
+    let answer = answer(&shared("practice/leftover/bounce/c05"), "2");
+    assert_eq!(answer["verdict"], "unexplained");
+    assert!(ids(&answer["chosen"]).is_empty());
+    assert_eq!(answer["law"]["adds_to"]["name"], "slope of the table", "{}", answer["law"]);
+    let before_and_after =
+        ["before", "after"].map(|when| answer["fit"][when]["x_m"]["heldout_rmse"].as_f64().unwrap());
+    assert!(before_and_after[1] < 0.3 * before_and_after[0], "{before_and_after:?}");
+}
+
 /// Simulated recordings with an effect of the list and a smaller one beside it that is not: the former is named, the latter is said. With
 /// an effect that is not on the list, of which the best of the list takes away four fifths, nothing is named.
 #[test]

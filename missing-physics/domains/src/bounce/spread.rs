@@ -79,16 +79,20 @@ impl Nuisance {
 
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
 /// only about the likely drop.
-const NUISANCES: [Nuisance; 7] = [
+const NUISANCES: [Nuisance; 6] = [
     Nuisance::new(|e| &mut e.restitution, 0.3),
     Nuisance::new(|e| &mut e.slope_s_m, 0.1),
     Nuisance::new(|e| &mut e.drag_per_m, 0.5),
     Nuisance::new(|e| &mut e.table[0], 0.3),
     Nuisance::new(|e| &mut e.table[1], 0.3),
-    Nuisance::new(|e| &mut e.curved_per_m, 1.0),
     Nuisance::new(|e| &mut e.walk_s, 1e-4),
 ];
 const CLOCK: Nuisance = Nuisance::new(|e| &mut e.clock_rate, 0.1);
+/// A table that is a bowl: directions then hang on places, and seem to scatter by far more than they do. Fitted only where the drops are
+/// likelier for it by [`CURVED`], since a level table's directions are the better known without.
+const BOWL: Nuisance = Nuisance::new(|e| &mut e.curved_per_m, 1.0);
+/// Log Bayes factor by which drops speak for a bowl.
+const CURVED: f64 = 5.0;
 /// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
 /// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
 /// take for a smaller slope.
@@ -259,6 +263,22 @@ const PLAUSIBLE: usize = 16;
 /// # Errors
 /// The number of the drop that makes no sense; of the first, where all together make none.
 pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration) -> Result<Judged, usize> {
+    let mut nuisances = nuisances(drops);
+    let (level, evidence_of_level) = judge_beside(&nuisances, drops, effects, calibration)?;
+    nuisances.push(BOWL);
+    Ok(match judge_beside(&nuisances, drops, effects, calibration) {
+        Ok((bowl, evidence)) if evidence > evidence_of_level + CURVED => bowl,
+        _ => level,
+    })
+}
+
+/// The same beside given nuisances, and the log evidence of what the drops say, up to a constant.
+fn judge_beside(
+    nuisances: &[Nuisance],
+    drops: &[Drop],
+    effects: &Effects,
+    calibration: Calibration,
+) -> Result<(Judged, f64), usize> {
     let [x, y] = calibration.place_m;
     let [time_s, place_m] = calibration.estimated.unwrap_or([TYPICAL.time_s, TYPICAL.place_m[0]]);
     let mut spread = Spread {
@@ -270,9 +290,9 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
     let mut plausible = vec![spread; PLAUSIBLE];
     let mut begin = *effects;
     let mut linear: Vec<Linear> = drops.iter().map(|d| Linear::about_straight(d, effects)).collect();
-    let nuisances = nuisances(drops);
+    let mut evidence = f64::NEG_INFINITY;
     for _ in 0..ROUNDS {
-        let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, &nuisances)).collect();
+        let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, nuisances)).collect();
         // A hand sends balls nowhere, beforehand; the other effects are those that the drops begin with.
         let expected = Effects { heads: [0.0; 2], outwards_per_m: 0.0, ..*effects };
         let beforehand: Vec<[f64; 2]> = (nuisances.iter())
@@ -282,7 +302,9 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
             .collect();
         let likelihood = Likelihood { drops: &parts, beforehand: &beforehand, calibration, start: spread };
         spread = likelihood.spread(&best(&likelihood).ok_or(0_usize)?);
-        let (_, moved) = likelihood.value(&spread).ok_or(0_usize)?;
+        let (minus_twice, moved) = likelihood.value(&spread).ok_or(0_usize)?;
+        // What is left of each nuisance's prior is the logarithm of its width.
+        evidence = -0.5 * minus_twice - nuisances.iter().map(|n| n.width.ln()).sum::<f64>();
         plausible = Likelihood { start: spread, ..likelihood }.plausible();
         let mut likely = begin;
         nuisances.iter().zip(moved.iter()).for_each(|(nuisance, by)| *(nuisance.effect)(&mut likely) += by);
@@ -294,7 +316,7 @@ pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration)
         linear = linear.iter().enumerate().map(about).collect::<Result<_, _>>()?;
     }
     let Effects { heads, outwards_per_m, .. } = begin;
-    Ok(Judged { spread, plausible, drops: linear, heads, outwards_per_m })
+    Ok((Judged { spread, plausible, drops: linear, heads, outwards_per_m }, evidence))
 }
 
 /// A drop with its errors and what the nuisances make of them.

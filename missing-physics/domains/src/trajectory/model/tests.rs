@@ -15,9 +15,13 @@ fn run(channels: usize, spin: bool) -> Run {
 /// Derivatives against central differences, everything off and everything on, for all that can be measured.
 #[test]
 fn derivatives_agree_with_differences() {
-    for (axes, spin) in
-        [(Axes::Height, false), (Axes::Space, false), (Axes::Space, true), (Axes::Accelerometer, false)]
-    {
+    for (axes, spin) in [
+        (Axes::Height, false),
+        (Axes::Plane, false),
+        (Axes::Space, false),
+        (Axes::Space, true),
+        (Axes::Accelerometer, false),
+    ] {
         let model = TrajectoryModel::new(Setup {
             axes,
             mass_kg: Some(0.05),
@@ -26,7 +30,7 @@ fn derivatives_agree_with_differences() {
             air_density_kg_m3: 1.2,
             spin,
         });
-        let channels = if axes == Axes::Space { 3 } else { 1 };
+        let channels = axes.seen().len().max(1);
         let run = run(channels, spin);
         let n_shared = model.spec().count(Scope::Shared);
         let nuisance: Vec<f64> = (0..model.nuisance_count()).map(|i| 1.0 + 0.7 * i as f64).collect();
