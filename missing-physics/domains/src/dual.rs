@@ -11,15 +11,22 @@ pub(super) trait DualModel: Model {
         true
     }
 
-    /// Predicts as [`Model::predict`] does; `moving` are the shared slots that carry a derivative.
+    /// Predicts as [`Model::predict`] does; `moving` are the slots that carry a derivative.
     fn predict_dual<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,
         run: &Run,
         shared: &[T],
         nuisance: &[T],
-        moving: &[usize],
+        moving: Moving<'_>,
         out: &mut [T],
     ) -> Result<(), String>;
+}
+
+/// Slots of the parameters that carry a derivative.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Moving<'a> {
+    pub(super) shared: &'a [usize],
+    pub(super) nuisance: &'a [usize],
 }
 
 /// What [`Model::jacobian`] is asked for.
@@ -82,9 +89,11 @@ impl JacobianRequest<'_> {
             unit[i] = 1.0;
             target.eps = Derivative::some(unit);
         }
-        let moving: Vec<usize> = free.iter().filter(|f| f.1).map(|f| f.2).collect();
+        let slots =
+            |shared: bool| -> Vec<usize> { free.iter().filter(|f| f.1 == shared).map(|f| f.2).collect() };
+        let moving = Moving { shared: &slots(true), nuisance: &slots(false) };
         let mut values = vec![DualSVec64::<N>::from(0.0); rows];
-        model.predict_dual(self.run, &shared, &nuisance, &moving, &mut values)?;
+        model.predict_dual(self.run, &shared, &nuisance, moving, &mut values)?;
         for (row, value) in values.iter().enumerate() {
             out[row] = value.re;
             for (i, (column, ..)) in free.iter().enumerate() {

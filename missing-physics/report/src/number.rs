@@ -31,6 +31,12 @@ pub(super) fn with_error(value: f64, error: f64) -> String {
     format!("{value:.decimals$} +- {error:.decimals$}")
 }
 
+/// A number in a few digits with its unit, where it has one.
+pub(super) fn in_unit(value: f64, digits: usize, unit: &str) -> String {
+    let value = significant(value, digits);
+    if unit.is_empty() { value } else { format!("{value} {unit}") }
+}
+
 /// Value and interval with digits that the interval's width supports.
 pub(super) fn estimate(e: &Estimate) -> String {
     let unit = if e.unit.is_empty() { String::new() } else { format!(" {}", e.unit) };

@@ -8,7 +8,7 @@ use missing_physics::diagnosis::{
 };
 
 use super::context::ReportContext;
-use super::number::{estimate, listed, p_value, p_words, probability, significant, with_error};
+use super::number::{estimate, in_unit, listed, p_value, p_words, probability, significant, with_error};
 
 const WIDTH: usize = 100;
 const INDENT: usize = 9;
@@ -210,14 +210,14 @@ pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
     const ROUNDING: f64 = 1e-6;
     let is_rounding = l.mean_residual.abs() < ROUNDING * l.largest_residual.abs();
     let mean = if is_rounding { 0.0 } else { l.mean_residual };
+    let unit = unit_of(d, &l.channel);
     format!(
-        "{}: measured less simulated is {} {unit} on average, at most {} {unit} ({:.0} sigma, {:.0} % of the misfit)",
+        "{}: measured less simulated is {} on average, at most {} ({:.0} sigma, {:.0} % of the misfit)",
         place_words(d, l),
-        significant(mean, 2),
-        significant(l.largest_residual, 2),
+        in_unit(mean, 2, &unit),
+        in_unit(l.largest_residual, 2, &unit),
         l.z,
         100.0 * l.share,
-        unit = unit_of(d, &l.channel),
     )
 }
 
@@ -236,13 +236,9 @@ pub(super) fn as_if(d: &Diagnosis) -> Vec<String> {
 
 /// What the chosen mechanisms leave, in one sentence.
 pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
-    format!(
-        "{}: {} {unit} rms is left, beside noise of {} {unit}",
-        place_words(d, l),
-        significant(l.rms, 2),
-        significant(l.sigma, 2),
-        unit = unit_of(d, &l.channel),
-    )
+    let unit = unit_of(d, &l.channel);
+    let (left, noise) = (in_unit(l.rms, 2, &unit), in_unit(l.sigma, 2, &unit));
+    format!("{}: {left} rms is left, beside noise of {noise}", place_words(d, l))
 }
 
 /// What comes closest where nothing explains the data, and what its parameters would be.
@@ -278,12 +274,10 @@ pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
         let of = d.mechanisms.iter().filter(|m| d.chosen.contains(&m.id)).find(is_of);
         let of = of.map_or_else(String::new, |m| format!(" of {}", m.name));
         format!(
-            "{}{of} differs from run to run by {} {} (one standard deviation) beyond their noise; its interval allows for that",
+            "{}{of} differs from run to run by {} (one standard deviation) beyond their noise; its interval allows for that",
             s.parameter,
-            significant(s.standard_deviation, 2),
-            s.unit
+            in_unit(s.standard_deviation, 2, &s.unit)
         )
-        .replace("  ", " ")
     };
     let mut lines: Vec<String> =
         d.run_differences.iter().map(differs).chain(d.between_runs.iter().map(spread)).collect();
@@ -307,10 +301,10 @@ pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
 pub(super) fn limits(d: &Diagnosis) -> Vec<String> {
     let mut lines: Vec<(&str, Vec<String>)> = Vec::new();
     for limit in &d.limits {
-        let size = format!("{} {} {}", limit.parameter, significant(limit.upper, 2), limit.unit);
+        let size = format!("{} {}", limit.parameter, in_unit(limit.upper, 2, &limit.unit));
         match lines.last_mut().filter(|(id, _)| *id == limit.id) {
-            Some((_, sizes)) => sizes.push(size.trim_end().to_owned()),
-            None => lines.push((&limit.id, vec![size.trim_end().to_owned()])),
+            Some((_, sizes)) => sizes.push(size),
+            None => lines.push((&limit.id, vec![size])),
         }
     }
     lines.into_iter().map(|(id, sizes)| format!("{id}: {}", sizes.join(", "))).collect()
@@ -376,15 +370,13 @@ fn better(d: &Diagnosis) -> Vec<String> {
         .zip(&d.after)
         .map(|(before, after)| {
             let noise = d.noise.iter().find(|n| n.channel == before.channel);
-            let noise = noise.map_or_else(String::new, |n| {
-                format!(" (noise {} {})", significant(n.sigma, 2), unit(&n.channel))
-            });
+            let noise = noise
+                .map_or_else(String::new, |n| format!(" (noise {})", in_unit(n.sigma, 2, &unit(&n.channel))));
             format!(
-                "{}: error on {unseen} {} -> {} {}{noise}",
+                "{}: error on {unseen} {} -> {}{noise}",
                 before.channel,
                 significant(before.heldout_rmse, 3),
-                significant(after.heldout_rmse, 3),
-                unit(&before.channel),
+                in_unit(after.heldout_rmse, 3, &unit(&before.channel)),
             )
         })
         .collect()
@@ -405,7 +397,7 @@ pub(super) fn noise_sentence(d: &Diagnosis, n: &missing_physics::diagnosis::Chan
     } else {
         ", white".into()
     };
-    format!("{}: {} {unit}{colour} (from {})", n.channel, significant(n.sigma, 2), n.source.word())
+    format!("{}: {}{colour} (from {})", n.channel, in_unit(n.sigma, 2, &unit), n.source.word())
 }
 
 struct Page(String);

@@ -80,7 +80,20 @@ impl Drops {
     }
 
     fn with(&self, effects: Effects) -> BounceWorld {
-        BounceWorld { effects, ..self.world }
+        let world = BounceWorld { effects, ..self.world };
+        if effects.softer_side == 0.0 {
+            return world;
+        }
+        // A softer side begins in the middle of where balls land: on a tilted table they would miss one that begins below their release.
+        let even = BounceWorld { effects: Effects { softer_side: 0.0, ..effects }, ..world };
+        let mut landed: Vec<f64> = even
+            .heard(self.seed)
+            .iter()
+            .flat_map(|drop| &drop.impacts)
+            .map(|impact| impact.heard[1])
+            .collect();
+        landed.sort_by(f64::total_cmp);
+        BounceWorld { soft_from_m: landed[landed.len() / 2], ..world }
     }
 }
 

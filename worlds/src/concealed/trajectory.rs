@@ -108,7 +108,7 @@ fn wind(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
 }
 
 fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
-    match whole(rng, 0, 3) {
+    match whole(rng, 0, 4) {
         0 => {
             e.mast =
                 Mast { amplitude_m: log_between(rng, 0.003, 0.02), frequency_hz: between(rng, 2.0, 8.0) };
@@ -125,6 +125,10 @@ fn unlisted(e: &mut Effects, key: &mut Key, rng: &mut ChaCha8Rng) {
             // The change of the speed stays when the gust is over: the key states no place in the readings.
             e.gust = Gust { velocity_m_s: [0.0, log_between(rng, 4.0, 15.0), 0.0], window_s: [begin, end] };
             key.unlisted = Some("a gust in still air, with drag".into());
+        }
+        3 => {
+            e.spins_per_s = log_between(rng, 0.03, 0.3);
+            key.unlisted = Some("balls that spin each in its own way".into());
         }
         _ => {
             e.knock =

@@ -96,7 +96,7 @@ pub struct BounceWorld {
     pub placed: bool,
     /// One sigma of the restitution's logarithm from impact to impact.
     pub restitution_scatter: f64,
-    /// Where the softer side of the table begins, if it has one, along x in m; balls are let go above 0.
+    /// Where the softer side of the table begins, if it has one, along x in m.
     pub soft_from_m: f64,
     /// The effects at work.
     pub effects: Effects,

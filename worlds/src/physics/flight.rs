@@ -51,6 +51,8 @@ pub struct Effects {
     pub gust: Gust,
     /// Unlisted: the camera is knocked.
     pub knock: Knock,
+    /// Unlisted: each run's ball spins about a level axis of its own, which lifts it by so much, in 1/s.
+    pub spins_per_s: f64,
     /// Unlisted: the ball is pushed for a while, or at some heights.
     pub push: Push,
 }
@@ -228,6 +230,9 @@ impl FlightWorld {
             if r < world.effects.push.from_run {
                 world.effects.push = Push::default();
             }
+            let (north, east) = launch.phase_rad.sin_cos();
+            world.effects.magnus_per_s[0] += self.effects.spins_per_s * east;
+            world.effects.magnus_per_s[1] += self.effects.spins_per_s * north;
             world.fly(launch.state, launch.rows, launch.phase_rad, STEPS)
         };
         launches.iter().enumerate().map(of_run).collect()

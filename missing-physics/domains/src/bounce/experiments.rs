@@ -28,7 +28,7 @@ pub(super) fn experiments(model: &mut BounceModel) -> Vec<Experiment> {
                 model.imagined(&format!("next {name} {value} {k}"), &drop, &numbers())
             })
             .collect();
-        list.extend(runs.map(|runs| experiment(name, value, words, vec![Vec::new(); runs.len()], runs)));
+        list.extend(runs.map(|runs| experiment(name, value, words, vec![vec![0.0]; runs.len()], runs)));
     };
     for height in HEIGHTS_M {
         add("drop_height_m", height, format!("drop it from {height} m"), height, 0.0);

@@ -234,7 +234,7 @@ impl Model for BounceModel {
         &self,
         run: &Run,
         shared: &[f64],
-        _nuisance: &[f64],
+        nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
         let wrong = |reason: &str| PredictError { run: run.label.clone(), reason: reason.into() };
@@ -242,6 +242,7 @@ impl Model for BounceModel {
         let array = self.wrong(shared);
         let moved = self.moved(drop, &array);
         let mut effects = self.effects(shared);
+        effects.restitution *= 1.0 + nuisance[self.layout.of_run.slot];
         if !moved.is_empty() {
             effects.heard_scale = std::mem::take(&mut effects.position_scale);
         }

@@ -12,6 +12,8 @@ use super::spread::{HEADS, OUTWARDS};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Layout {
     pub(super) restitution: ParameterRef,
+    /// By how much that of a run differs, relative to 1.
+    pub(super) of_run: ParameterRef,
     pub(super) slope: ParameterRef,
     pub(super) drag: ParameterRef,
     pub(super) table: Option<[ParameterRef; 2]>,
@@ -101,6 +103,18 @@ pub(super) fn build(setup: &Setup, restitution: f64) -> (SpecBuilder, Layout) {
         });
         p.unheard = Some(unheard);
     }
+    p.of_run = b.nuisance("restitution_change", "", [-0.5, 1.0], 0.01);
+    b.between_runs(
+        "restitution-by-run",
+        &[p.of_run],
+        [
+            "a restitution that differs from run to run",
+            "Each run is of another ball, or falls on another place of the table.",
+            "e -> e (1 + change of the run)",
+            "Laird and Ware 1982, doi:10.2307/2529876 (random effects)",
+        ],
+        &["velocity-dependent-restitution"],
+    );
     terms(&mut b, &mut p, setup.placed);
     (b, p)
 }
@@ -233,8 +247,8 @@ fn terms(b: &mut SpecBuilder, p: &mut Layout, placed: bool) {
         let curved = term("curved_per_m", "1/m", 0.05, slope, "(r - mean r)", &["x_m", "y_m"]);
         p.curved = Some([
             curved,
-            term("curved_from_x", "", 0.01, slope, "e_x", &[]),
-            term("curved_from_y", "", 0.01, slope, "e_y", &[]),
+            term("slope_at_middle_x", "", 0.01, slope, "e_x", &[]),
+            term("slope_at_middle_y", "", 0.01, slope, "e_y", &[]),
         ]);
     }
 }

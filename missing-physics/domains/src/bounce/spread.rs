@@ -2,6 +2,7 @@
 
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::neldermead::NelderMead;
+use missing_physics::model::FEWEST_RUNS_THAT_DIFFER;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -36,6 +37,7 @@ impl Calibration {
             (spread.time_s / time_s, times, self.time_s.is_none()),
             (spread.place_m[0] / place_m, places, self.place_m == [None; 2]),
             (spread.restitution / TYPICAL.restitution, 1.5, self.time_s.is_none()),
+            (spread.between_drops / TYPICAL.between_drops, 1.5, spread.between_drops > 0.0),
             (spread.kappa / TYPICAL.kappa, 1.5, true),
             (spread.approach_rad / TYPICAL.approach_rad, 1.0, true),
         ]
@@ -47,14 +49,21 @@ impl Calibration {
 }
 
 /// What is typical: times marked in a sound to a tenth of a millisecond, places to half a centimetre, directions to a degree, a hand that
-/// lets go to two, a restitution to a thousandth.
-const TYPICAL: Spread =
-    Spread { time_s: 1e-4, place_m: [5e-3; 2], kappa: 3e3, approach_rad: 0.03, restitution: 1e-3 };
+/// lets go to two, a restitution to a thousandth, or to half a hundredth where drops are not alike.
+const TYPICAL: Spread = Spread {
+    time_s: 1e-4,
+    place_m: [5e-3; 2],
+    kappa: 3e3,
+    approach_rad: 0.03,
+    restitution: 1e-3,
+    between_drops: 5e-3,
+};
 
 #[derive(Debug, Clone, Copy)]
 enum Unknown {
     Time,
     Restitution,
+    BetweenDrops,
     Place,
     Kappa,
     Approach,
@@ -88,11 +97,14 @@ const NUISANCES: [Nuisance; 6] = [
     Nuisance::new(|e| &mut e.walk_s, 1e-4),
 ];
 const CLOCK: Nuisance = Nuisance::new(|e| &mut e.clock_rate, 0.1);
-/// A table that is a bowl: directions then hang on places, and seem to scatter by far more than they do. Fitted only where the drops are
-/// likelier for it by [`CURVED`], since a level table's directions are the better known without.
-const BOWL: Nuisance = Nuisance::new(|e| &mut e.curved_per_m, 1.0);
-/// Log Bayes factor by which drops speak for a bowl.
-const CURVED: f64 = 5.0;
+/// A table that is a bowl: directions then hang on places, and seem to scatter by far more than they do.
+const BOWL: [Nuisance; 1] = [Nuisance::new(|e| &mut e.curved_per_m, 1.0)];
+/// A table that is softer on one side: restitutions then seem to scatter.
+const SOFTER_SIDE: [Nuisance; 2] =
+    [Nuisance::new(|e| &mut e.terms[0], 1.0), Nuisance::new(|e| &mut e.terms[1], 1.0)];
+/// Log Bayes factor by which drops speak for a bowl, a softer side, or a restitution that is not the same in all of them: beside what is not
+/// there the rest is known less well.
+const NEEDED: f64 = 5.0;
 /// A hand gives balls a velocity of its own, and one that was let go above one point heads the further out the further out it
 /// lands: fitted with the rest, because the first place is measured with an error that a regression of headings on places would
 /// take for a smaller slope.
@@ -142,6 +154,7 @@ impl Likelihood<'_> {
             match free {
                 Unknown::Time => spread.time_s *= factor,
                 Unknown::Restitution => spread.restitution *= factor,
+                Unknown::BetweenDrops => spread.between_drops *= factor,
                 Unknown::Place => spread.place_m = spread.place_m.map(|p| p * factor),
                 Unknown::Kappa => spread.kappa *= factor,
                 Unknown::Approach => spread.approach_rad *= factor,
@@ -154,6 +167,9 @@ impl Likelihood<'_> {
         let mut list = Vec::new();
         if self.calibration.time_s.is_none() {
             list.extend([Unknown::Time, Unknown::Restitution]);
+        }
+        if self.start.between_drops > 0.0 {
+            list.push(Unknown::BetweenDrops);
         }
         list.extend([Unknown::Kappa, Unknown::Approach]);
         if self.calibration.place_m == [None; 2] {
@@ -263,18 +279,38 @@ const PLAUSIBLE: usize = 16;
 /// # Errors
 /// The number of the drop that makes no sense; of the first, where all together make none.
 pub(super) fn judge(drops: &[Drop], effects: &Effects, calibration: Calibration) -> Result<Judged, usize> {
-    let mut nuisances = nuisances(drops);
-    let (level, evidence_of_level) = judge_beside(&nuisances, drops, effects, calibration)?;
-    nuisances.push(BOWL);
-    Ok(match judge_beside(&nuisances, drops, effects, calibration) {
-        Ok((bowl, evidence)) if evidence > evidence_of_level + CURVED => bowl,
-        _ => level,
-    })
+    let placed = drops.iter().any(|d| !d.places_m.is_empty());
+    let mut left: Vec<(&[Nuisance], bool)> = Vec::new();
+    if placed {
+        left.extend([(&BOWL[..], false), (&SOFTER_SIDE[..], false)]);
+    }
+    if drops.len() >= FEWEST_RUNS_THAT_DIFFER {
+        left.push((&[], true));
+    }
+    let (mut beside, mut differ) = (nuisances(drops), false);
+    let mut best = judge_beside(&beside, differ, drops, effects, calibration)?;
+    loop {
+        let with = |(at, (more, differs)): (usize, &(&[Nuisance], bool))| {
+            let all = [&beside[..], more].concat();
+            let judged = judge_beside(&all, differ || *differs, drops, effects, calibration).ok()?;
+            Some((at, judged))
+        };
+        let likeliest = left.iter().enumerate().filter_map(with).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let Some((at, judged)) = likeliest.filter(|(_, judged)| judged.1 > best.1 + NEEDED) else {
+            return Ok(best.0);
+        };
+        let (more, differs) = left.remove(at);
+        beside.extend(more);
+        differ |= differs;
+        best = judged;
+    }
 }
 
-/// The same beside given nuisances, and the log evidence of what the drops say, up to a constant.
+/// The same beside given nuisances, and a restitution that differs from drop to drop or not; and the log evidence of what the drops say, up to
+/// a constant.
 fn judge_beside(
     nuisances: &[Nuisance],
+    differ: bool,
     drops: &[Drop],
     effects: &Effects,
     calibration: Calibration,
@@ -285,6 +321,7 @@ fn judge_beside(
         time_s: calibration.time_s.unwrap_or(time_s),
         place_m: [x.or(y).unwrap_or(place_m), y.or(x).unwrap_or(place_m)],
         restitution: if calibration.time_s.is_some() { 0.0 } else { TYPICAL.restitution },
+        between_drops: if differ { TYPICAL.between_drops } else { 0.0 },
         ..TYPICAL
     };
     let mut plausible = vec![spread; PLAUSIBLE];
@@ -316,6 +353,8 @@ fn judge_beside(
         linear = linear.iter().enumerate().map(about).collect::<Result<_, _>>()?;
     }
     let Effects { heads, outwards_per_m, .. } = begin;
+    spread.between_drops = 0.0;
+    plausible.iter_mut().for_each(|spread| spread.between_drops = 0.0);
     Ok((Judged { spread, plausible, drops: linear, heads, outwards_per_m }, evidence))
 }
 

@@ -129,7 +129,8 @@ impl TimesModel {
         let drag = shared[p.drag.slot] * self.setup.drag_unit.unwrap_or(1.0);
         let squared = shared[p.squared.slot];
         let restitution = |speed: f64| {
-            let e = shared[p.restitution.slot] - shared[p.slope.slot] * (speed - 1.0);
+            let e = shared[p.restitution.slot] * (1.0 + nuisance[p.of_run.slot])
+                - shared[p.slope.slot] * (speed - 1.0);
             e.max(1e-3) * (squared * speed * speed).exp()
         };
         let rate = p.clock.map_or(0.0, |at| shared[at.slot]);

@@ -21,6 +21,8 @@ pub(super) struct Spread {
     /// Scatter of the restitution's logarithm from impact to impact (Montaine et al. 2011, doi:10.1103/PhysRevE.84.041306); zero where the
     /// clock's sigma is known.
     pub(super) restitution: f64,
+    /// Scatter of the restitution's logarithm from drop to drop: what the rest is judged beside, and zero in what is judged.
+    pub(super) between_drops: f64,
 }
 
 impl Spread {
@@ -147,7 +149,13 @@ impl Linear {
         self.scatter(&mut covariance, spread);
         // At least what rounding does, far below any clock.
         let scatter = spread.restitution.powi(2).max(1e-18);
-        (self.drop.directions()..covariance.nrows()).for_each(|row| covariance[(row, row)] += scatter);
+        let speeds = self.drop.directions()..covariance.nrows();
+        speeds.clone().for_each(|row| covariance[(row, row)] += scatter);
+        if spread.between_drops > 0.0 {
+            let n = speeds.len();
+            let mut of_speeds = covariance.view_mut((speeds.start, speeds.start), (n, n));
+            of_speeds.add_scalar_mut(spread.between_drops.powi(2));
+        }
         covariance
     }
 

@@ -9,7 +9,7 @@ use missing_physics::model::{Extensions, Model, MultimodalModel, ParameterRef, P
 
 use super::setup::{Condition, Setup};
 use super::spec::{self, Layout};
-use crate::dual::{DualModel, JacobianRequest};
+use crate::dual::{DualModel, JacobianRequest, Moving};
 
 /// The model of the domain `indentation`.
 #[derive(Debug)]
@@ -116,14 +116,14 @@ impl DualModel for IndentationModel {
         run: &Run,
         shared: &[T],
         nuisance: &[T],
-        moving: &[usize],
+        moving: Moving<'_>,
         out: &mut [T],
     ) -> Result<(), String> {
         let p = &self.layout;
         let depths = run.inputs.first().ok_or("delta_m is missing")?;
         let value = |at: Option<ParameterRef>| at.map_or(T::from(0.0), |at| shared[at.slot]);
         let on = |at: Option<ParameterRef>| {
-            at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.contains(&at.slot))
+            at.is_some_and(|at| shared[at.slot].re() > 0.0 || moving.shared.contains(&at.slot))
         };
         let modulus = self.modulus(run).ok_or("no condition")?;
         let modulus = shared[modulus.slot] * (nuisance[p.stiffer.slot] + 1.0);
@@ -170,7 +170,7 @@ impl Model for IndentationModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict_dual(run, shared, nuisance, &[], out)
+        self.predict_dual(run, shared, nuisance, Moving::default(), out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 

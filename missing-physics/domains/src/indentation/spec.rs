@@ -78,7 +78,7 @@ pub(super) fn build(
     p.stiffer = b.nuisance("stiffness_change", "", [-0.9, 9.0], 0.05);
     b.between_runs(
         "stiffness-by-run",
-        p.stiffer,
+        &[p.stiffer],
         [
             "a body that differs from curve to curve",
             "Each curve is of another body, or of another place on it.",

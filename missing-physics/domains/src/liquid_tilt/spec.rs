@@ -59,7 +59,7 @@ fn by_run(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup, length: f64) {
     p.held = b.nuisance("held_higher_m", "m", [-0.25 * length, 0.25 * length], 1e-3);
     b.between_runs(
         "grasp-by-run",
-        p.held,
+        &[p.held],
         [
             "a grip that differs from run to run",
             "The container is grasped anew, or slides between runs.",
@@ -74,7 +74,7 @@ fn by_run(b: &mut SpecBuilder, p: &mut Layout, setup: &Setup, length: f64) {
     let fill = b.nuisance("fill_change", "", [-0.9, 1.0], 0.01);
     b.between_runs(
         "fill-by-run",
-        fill,
+        &[fill],
         [
             "a fill that differs from run to run",
             "Liquid is spilt, evaporates or was measured roughly.",

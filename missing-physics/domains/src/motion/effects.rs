@@ -90,6 +90,25 @@ impl<'a> Effects<'a> {
         }
     }
 
+    /// Declares what may differ from run to run: each of the recording's parameters that all runs share. Gives the slot of each one's change.
+    pub(super) fn between_runs(&mut self) -> Vec<Option<usize>> {
+        let mut of = |p: &super::equations::Parameter| {
+            (!p.known && !p.per_run).then(|| {
+                let name = &p.name;
+                let change = self.builder.nuisance(&format!("{name}_change"), &p.unit, UNBOUNDED, p.scale);
+                let text = [
+                    &*format!("{name} that differs from run to run"),
+                    "Nobody kept it the same: a battery, a load, a temperature.",
+                    &*format!("{name} -> {name} + change of the run"),
+                    "Laird and Ware 1982, doi:10.2307/2529876 (random effects)",
+                ];
+                self.builder.between_runs(&format!("{name}-by-run"), &[change], text, &[]);
+                change.slot
+            })
+        };
+        self.equations.parameters.iter().map(&mut of).collect()
+    }
+
     /// Declares all mechanisms.
     pub(super) fn all(&mut self) {
         for joint in 0..self.equations.joints.len() {

@@ -225,7 +225,7 @@ pub(super) fn windows(
             let shorter = cut(recording, followed);
             let grows = |shared: &[f64]| -> Result<bool, String> {
                 let sizes = sizes(&free, &shorter, shared)?;
-                Ok(too_long(&free, recording, shared, &sizes.states, length.min(longest)))
+                Ok(too_long(&free, recording, shared, &sizes.moves, length.min(longest)))
             };
             if grows(&shared)? {
                 if shared == stated || grows(&stated)? {
@@ -330,6 +330,7 @@ pub(super) fn sizes(model: &MotionModel, recording: &Recording, shared: &[f64]) 
         outputs: (0..recording.channels.len()).map(|k| column(&|r| &r.outputs[k])).collect(),
         step_s: median_step(recording),
         duration_s: Clock::of(&recording.runs).duration_s,
+        runs: recording.runs.len(),
         levers,
         ..Scales::default()
     };

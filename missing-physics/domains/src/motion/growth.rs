@@ -58,28 +58,28 @@ pub(super) fn lost(missed: f64, half: f64) -> bool {
 }
 
 /// Whether windows of a number of rows are too long: a deviation of their start grows beyond what can be followed. `free` is the model
-/// with all states free at a window's start, `sizes` are those of the states.
+/// with all states free at a window's start, `moves` says how far each state moves.
 pub(super) fn too_long(
     free: &MotionModel,
     recording: &Recording,
     shared: &[f64],
-    sizes: &[f64],
+    moves: &[f64],
     length: usize,
 ) -> bool {
     let windows = cut(recording, length).runs;
     let every = windows.len().div_ceil(LOOKED_AT).max(1);
     let mut grown: Vec<f64> =
-        windows.iter().step_by(every).map(|w| growth(free, recording, w, shared, sizes)).collect();
+        windows.iter().step_by(every).map(|w| growth(free, recording, w, shared, moves)).collect();
     grown.sort_by(f64::total_cmp);
     // One window among many may begin at a wrong guess.
     grown.get(grown.len() * 3 / 4).is_some_and(|g| !(*g < MOST_GROWTH))
 }
 
 /// The largest deviation of an output in a window, in parts of its spread, that a deviation of a state at the start brings, in parts of
-/// that state's size; infinite where the motion cannot be followed to the window's end.
-fn growth(free: &MotionModel, recording: &Recording, window: &Run, shared: &[f64], sizes: &[f64]) -> f64 {
+/// how far that state moves; infinite where the motion cannot be followed to the window's end.
+fn growth(free: &MotionModel, recording: &Recording, window: &Run, shared: &[f64], moves: &[f64]) -> f64 {
     let nuisance = free.nuisance(window);
-    let first = nuisance.len() - sizes.len();
+    let first = nuisance.len() - moves.len();
     let states: Vec<usize> = (first..nuisance.len()).collect();
     let n = window.len();
     let channels = recording.channels.len();
@@ -90,10 +90,10 @@ fn growth(free: &MotionModel, recording: &Recording, window: &Run, shared: &[f64
     let mut most = 0.0_f64;
     for c in 0..channels {
         let spread = deviation(recording.runs.iter().flat_map(|r| &r.outputs[c]).copied());
-        for (state, size) in sizes.iter().enumerate() {
+        for (state, moves) in moves.iter().enumerate() {
             let column = &jacobian[(state * channels + c) * n..][..n];
             let steepest = column.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            most = most.max(steepest * size / spread);
+            most = most.max(steepest * moves / spread);
         }
     }
     most

@@ -5,7 +5,8 @@ use joint_laws::signal::Signal;
 use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
 use missing_physics::model::{
-    Extensions, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec, WindowedModel,
+    Extensions, FEWEST_RUNS_THAT_DIFFER, JointLimits, Model, MultimodalModel, PredictError, Scope, Spec,
+    WindowedModel,
 };
 
 use super::detents::detents;
@@ -75,6 +76,8 @@ pub struct MotionModel {
     off: Vec<f64>,
     /// Nuisance slots of the recording's parameters of each run, and of the states that are free at its start.
     per_run: Vec<Option<usize>>,
+    /// The same of changes of those that all runs share, where they may differ.
+    changes: Vec<Option<usize>>,
     free_states: Vec<Option<usize>>,
     pace: Pace,
     scales: Scales,
@@ -134,12 +137,17 @@ impl MotionModel {
     ) -> Self {
         let labels: Option<Vec<String>> = cut.map(|runs| runs.iter().map(|r| r.label.clone()).collect());
         let terms = if all { law::terms(&equations, &scales) } else { Vec::new() };
+        let mut changes = Vec::new();
         let (spec, roles) = {
             let mut effects = Effects::new(&equations, &scales);
             effects.stated(starts, labels.as_deref());
             if all {
                 effects.all();
                 effects.terms(&terms);
+            }
+            // The windows of a run share its parameters.
+            if all && cut.is_none() && scales.runs >= FEWEST_RUNS_THAT_DIFFER {
+                changes = effects.between_runs();
             }
             (effects.builder.build_unchecked(), effects.roles)
         };
@@ -157,7 +165,7 @@ impl MotionModel {
             equations.states.iter().map(|s| slot(cut.is_some() || s.start == Start::Free)).collect();
         let whole = |run: &Run| Whole { label: run.label.clone(), inputs: run.inputs.clone() };
         let cut = cut.map(|runs| runs.iter().map(whole).collect());
-        Self { equations, spec, roles, off, per_run, free_states, pace, scales, terms, cut }
+        Self { equations, spec, roles, off, per_run, changes, free_states, pace, scales, terms, cut }
     }
 
     /// The same model under equations that only take their inputs otherwise.
@@ -294,6 +302,9 @@ impl MotionModel {
             let place = equations.parameter_name(k);
             values[place] = self.per_run[k].map_or(T::from(p.value), |slot| nuisance[slot]);
         }
+        let changes: Vec<(usize, T)> = (self.changes.iter().enumerate())
+            .filter_map(|(k, slot)| Some((equations.parameter_name(k), nuisance[(*slot)?])))
+            .collect();
         let on = |slot: usize| shared[slot].re() != self.off[slot] || moving.contains(&slot);
         let shared = Shared {
             equations,
@@ -303,7 +314,9 @@ impl MotionModel {
             run: windows::of_run(run),
             joints: &self.scales.joints,
         };
-        shared.setting(values)
+        let mut setting = shared.setting(values);
+        changes.into_iter().for_each(|(place, change)| setting.values[place] += change);
+        setting
     }
 
     /// The finest step under these laws, s: the model's, halved until it resolves them.

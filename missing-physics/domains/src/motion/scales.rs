@@ -7,6 +7,8 @@ use crate::mechanics::{Clock, JointSizes, JointUnits};
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scales {
     pub(super) states: Vec<f64>,
+    /// How far each state moves: its size, or its range where that is smaller (a temperature in kelvins).
+    pub(super) moves: Vec<f64>,
     pub(super) joints: Vec<JointSizes>,
     /// By joint: whether its drive moves it more or less by the machine's pose, and its forces with it.
     pub(super) levers: Vec<bool>,
@@ -18,6 +20,7 @@ pub(super) struct Scales {
     pub(super) step_s: f64,
     /// The longest run, s.
     pub(super) duration_s: f64,
+    pub(super) runs: usize,
 }
 
 /// Smallest and largest value of a column.
@@ -69,6 +72,11 @@ impl Scales {
     /// The sizes of motions that were simulated: `states[state]` and `rates[state]` over all rows of all runs.
     pub(super) fn measure(mut self, equations: &Equations, states: &[Vec<f64>], rates: &[Vec<f64>]) -> Self {
         self.states = states.iter().map(|s| rms(s)).collect();
+        let moves = |(s, size): (&Vec<f64>, &f64)| {
+            let [low, high] = range(s.iter().copied());
+            size.min(high - low)
+        };
+        self.moves = states.iter().zip(&self.states).map(moves).collect();
         self.joints = equations
             .joints
             .iter()

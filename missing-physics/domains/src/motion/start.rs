@@ -2,7 +2,7 @@
 
 use joint_laws::{Dual, Number};
 use missing_physics::data::Run;
-use missing_physics::model::{Mechanism, Scope, Spec};
+use missing_physics::model::{Mechanism, Spec};
 use nalgebra::{DMatrix, DVector};
 
 use super::effects::Role;
@@ -184,11 +184,9 @@ pub(super) fn mechanism(
     roles: &[Role],
     scales: &Scales,
 ) -> Vec<Vec<(usize, f64)>> {
-    let slots = slots(spec);
-    let role = |index: usize| roles[slots[index]];
     let parameters = &mechanism.parameters;
-    let Some(&first) = parameters.first() else { return Vec::new() };
-    match role(first) {
+    let Some(&first) = parameters.first().filter(|_| !mechanism.between_runs) else { return Vec::new() };
+    match roles[spec.slots()[first]] {
         Role::Joint(joint, effect) => {
             let sizes = &scales.joints[joint];
             mechanics::joint_starts(effect, parameters, sizes, sizes.least_yield(scales.step_s))
@@ -205,17 +203,4 @@ pub(super) fn mechanism(
         }
         _ => Vec::new(),
     }
-}
-
-/// The slot of each shared parameter by its index.
-fn slots(spec: &Spec) -> Vec<usize> {
-    let mut next = 0;
-    spec.parameters
-        .iter()
-        .map(|p| {
-            let slot = next;
-            next += usize::from(p.scope == Scope::Shared);
-            slot
-        })
-        .collect()
 }

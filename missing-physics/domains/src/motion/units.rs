@@ -4,7 +4,7 @@ use super::expression::derivative;
 use crate::recording::{ReadError, Section};
 
 /// Suffixes and their units; the longest that fits counts.
-const SUFFIXES: [(&str, &str); 24] = [
+const SUFFIXES: [(&str, &str); 25] = [
     ("_m_s2", "m/s^2"),
     ("_rad_s2", "rad/s^2"),
     ("_m_s", "m/s"),
@@ -29,6 +29,7 @@ const SUFFIXES: [(&str, &str); 24] = [
     ("_n", "N"),
     ("_v", "V"),
     ("_a", "A"),
+    ("_k", "K"),
 ];
 
 /// The unit that a name ends in, where it is a known one that is not spelt out by the name itself (`gain_per_rad`).

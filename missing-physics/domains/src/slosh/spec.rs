@@ -100,7 +100,7 @@ fn fill(b: &mut SpecBuilder, p: &mut Layout) {
     p.fill = b.nuisance("fill_change", "", [-0.5, 0.5], 0.02);
     b.between_runs(
         "fill-by-run",
-        p.fill,
+        &[p.fill],
         [
             "a fill that differs from run to run",
             "Liquid leaks, evaporates, is spilt or was measured roughly.",

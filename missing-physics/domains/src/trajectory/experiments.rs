@@ -3,6 +3,7 @@
 use missing_physics::data::{Recording, Run};
 use missing_physics::model::Experiment;
 
+use super::model::TrajectoryModel;
 use super::setup::{Axes, ROD};
 use crate::reading::upper_median;
 
@@ -12,7 +13,8 @@ const MOST_FRAMES: usize = 200;
 const REPEATS: usize = 3;
 
 /// Drops and throws within about twice of what was recorded, and a rod of known length.
-pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) -> Vec<Experiment> {
+pub(super) fn experiments(model: &TrajectoryModel, recording: &Recording) -> Vec<Experiment> {
+    let (axes, gravity_m_s2) = (model.axes(), model.gravity_m_s2());
     let mut list = Vec::new();
     let frame = frame_s(recording);
     if axes == Axes::Accelerometer || gravity_m_s2 <= 0.0 {
@@ -22,7 +24,7 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
     for drop in [1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0] {
         if drop <= 2.0 * height {
             let duration = (2.0 * drop / gravity_m_s2).sqrt();
-            let nuisance = begins(axes, [0.0, 0.0, drop], [0.0; 3]);
+            let nuisance = begins(model, [0.0, 0.0, drop], [0.0; 3]);
             let words = format!("drop it from {drop} m as well, {REPEATS} times");
             list.push(repeated(
                 recording,
@@ -49,14 +51,14 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
                 ];
                 let words =
                     format!("throw it at {launch} m/s, {degrees} degrees above level, {REPEATS} times");
-                let nuisance = begins(axes, [0.0, 0.0, 1.0], [launch * cos, 0.0, launch * sin]);
+                let nuisance = begins(model, [0.0, 0.0, 1.0], [launch * cos, 0.0, launch * sin]);
                 list.push(repeated(recording, action, words, duration, frame, nuisance));
             }
         }
     }
     let mut rod = template(recording, vec![0.0, 1.0]);
     rod.kind = ROD;
-    let nuisance = begins(axes, [0.0; 3], [0.0; 3]);
+    let nuisance = begins(model, [0.0; 3], [0.0; 3]);
     list.push(Experiment {
         action: vec![("known_length_m".into(), 1.0)],
         words: "film an upright rod of exactly 1 m, 10 times, and read its ends".into(),
@@ -67,9 +69,12 @@ pub(super) fn experiments(axes: Axes, gravity_m_s2: f64, recording: &Recording) 
 }
 
 /// The nuisance parameters of a run that begins at a place (m) with a velocity (m/s).
-fn begins(axes: Axes, place: [f64; 3], velocity: [f64; 3]) -> Vec<f64> {
-    let seen = axes.seen();
-    seen.iter().map(|k| place[*k]).chain(seen.iter().map(|k| velocity[*k])).collect()
+fn begins(model: &TrajectoryModel, place: [f64; 3], velocity: [f64; 3]) -> Vec<f64> {
+    let seen = model.axes().seen();
+    let mut begins: Vec<f64> =
+        seen.iter().map(|k| place[*k]).chain(seen.iter().map(|k| velocity[*k])).collect();
+    begins.resize(model.nuisance_count(), 0.0);
+    begins
 }
 
 fn repeated(

@@ -6,6 +6,7 @@ use missing_physics::model::{LocalCauses, LocalUnknown, PredictError, Quantity};
 
 use super::model::{Camera, TrajectoryModel, tilted};
 use super::setup::{Axes, ROD};
+use crate::dual::Moving;
 
 /// A step in speed (m/s) or place (m) at which the change of the acceleration is asked for.
 const STEP: f64 = 1e-3;
@@ -16,7 +17,7 @@ type Followed = (Flight<f64>, Camera<f64>, Vec<State<f64>>);
 impl TrajectoryModel {
     /// The flight as it is without the force, and the camera.
     fn followed(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Followed, PredictError> {
-        let (flight, camera, _) = self.effects(run, shared, &[]);
+        let (flight, camera, _) = self.effects(run, (shared, nuisance), Moving::default());
         let start = self.start(nuisance);
         let times = &run.inputs[0];
         let begin = times.first().copied().unwrap_or(0.0);
@@ -109,8 +110,8 @@ impl LocalCauses for TrajectoryModel {
         if self.axes() == Axes::Accelerometer {
             return Vec::new();
         }
-        let place = |axis: &usize| Quantity::new(["x_m", "y_m", "z_m"][*axis], "m");
-        self.axes().seen().iter().map(place).chain([Quantity::new("speed_m_s", "m/s")]).collect()
+        let place = |column: &&str| Quantity::new(*column, "m");
+        self.axes().channels().iter().map(place).chain([Quantity::new("speed_m_s", "m/s")]).collect()
     }
 
     fn state(&self, run: &Run, shared: &[f64], nuisance: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {

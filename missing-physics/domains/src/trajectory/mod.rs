@@ -14,6 +14,7 @@ use crate::plausible;
 use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
 use crate::recording::{Column, Header, ReadError, Table};
 pub use model::TrajectoryModel;
+use setup::PLACE;
 pub use setup::{Axes, ROD, Setup};
 
 const COLUMNS: [Column; 9] = [
@@ -91,12 +92,7 @@ impl Domain for Trajectory {
         let labels = table.labels("run", "the label of each row's run")?;
         let times = table.numbers("t_s").ok_or_else(|| table.missing("t_s", "time in seconds"))?;
         let axes = axes(&table)?;
-        let channel_names: &[&str] = match axes {
-            Axes::Height => &["z_m"],
-            Axes::Plane => &["x_m", "z_m"],
-            Axes::Space => &["x_m", "y_m", "z_m"],
-            Axes::Accelerometer => &["accel_z_m_s2"],
-        };
+        let channel_names = axes.channels();
         let spins: Vec<&[f64]> = SPIN.iter().filter_map(|n| table.numbers(n)).collect();
         check_spin(&table, axes, spins.len())?;
         let calibration = calibration(header, channel_names)?;
@@ -113,7 +109,7 @@ impl Domain for Trajectory {
         let spin = spins.len() == 3;
         let model =
             TrajectoryModel::new(Setup { axes, mass_kg, diameter_m, gravity_m_s2, air_density_kg_m3, spin });
-        let per_run = model.nuisance_count();
+        let per_run = axes.starts();
         let (values, needed) = (labels.len() * columns.len(), runs.len() * per_run + columns.len() + 2);
         if values < needed {
             let rows = needed.div_ceil(columns.len().max(1));
@@ -132,7 +128,7 @@ impl Domain for Trajectory {
             calibration,
             resolution: columns.iter().map(|c| resolution(c)).collect(),
         };
-        let experiments = experiments::experiments(axes, gravity_m_s2, &recording);
+        let experiments = experiments::experiments(&model, &recording);
         let hint = match axes {
             Axes::Accelerometer => None,
             _ => plausible::fall(&recording.runs, recording.channels.len() - 1, gravity_m_s2),
@@ -145,7 +141,7 @@ impl Domain for Trajectory {
 fn axes(table: &Table) -> Result<Axes, ReadError> {
     let has = |n: &str| table.numbers(n).is_some();
     if has("accel_z_m_s2") {
-        return match ["x_m", "y_m", "z_m"].into_iter().find(|n| has(n)) {
+        return match PLACE.into_iter().find(|n| has(n)) {
             None => Ok(Axes::Accelerometer),
             Some(column) => Err(ReadError::UnknownColumn {
                 file: table.file.clone(),

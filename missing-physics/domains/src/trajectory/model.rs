@@ -6,8 +6,8 @@ use missing_physics::model::{Extensions, Model, PredictError, Scope, Spec};
 use num_dual::DualNum;
 
 use super::setup::{Axes, ROD, Setup};
-use super::spec::{self, Role};
-use crate::dual::{DualModel, JacobianRequest};
+use super::spec::{self, Built, Role};
+use crate::dual::{DualModel, JacobianRequest, Moving};
 
 /// The model of the domain `trajectory`.
 #[derive(Debug)]
@@ -15,6 +15,8 @@ pub struct TrajectoryModel {
     setup: Setup,
     spec: Spec,
     roles: Vec<Role>,
+    /// The slot of a run's change of each component of the lift, where it may have any.
+    lifts: [Option<usize>; 3],
     /// Quadratic drag in 1/m for one unit of the drag's parameter.
     drag_unit: f64,
 }
@@ -26,8 +28,8 @@ impl TrajectoryModel {
             (Some(m), Some(d)) => bounce_audio::flight::drag_per_m(1.0, d, m, setup.air_density_kg_m3),
             _ => 1.0,
         };
-        let (spec, roles) = spec::build(&setup, drag_unit);
-        Self { setup, spec, roles, drag_unit }
+        let Built { spec, roles, lifts } = spec::build(&setup, drag_unit);
+        Self { setup, spec, roles, lifts, drag_unit }
     }
 
     /// What was measured.
@@ -35,7 +37,11 @@ impl TrajectoryModel {
         self.setup.axes
     }
 
-    /// Number of nuisance parameters of a run.
+    pub(super) fn gravity_m_s2(&self) -> f64 {
+        self.setup.gravity_m_s2
+    }
+
+    /// Number of nuisance parameters of a run: where it begins ([`Axes::starts`]), and what may differ from run to run.
     pub fn nuisance_count(&self) -> usize {
         self.spec.count(Scope::PerRun)
     }
@@ -47,10 +53,10 @@ impl DualModel for TrajectoryModel {
         run: &Run,
         shared: &[T],
         nuisance: &[T],
-        moving: &[usize],
+        moving: Moving<'_>,
         out: &mut [T],
     ) -> Result<(), String> {
-        let (flight, camera, closed) = self.effects(run, shared, moving);
+        let (flight, camera, closed) = self.effects(run, (shared, nuisance), moving);
         if run.kind == ROD {
             self.rod(&camera, nuisance, run.len(), out);
             return Ok(());
@@ -120,20 +126,20 @@ impl TrajectoryModel {
         start
     }
 
-    /// The flight and the camera at some shared parameters, and whether the flight's closed form will do: where nothing else is on,
+    /// The flight of a run and the camera at some parameters, and whether the flight's closed form will do: where nothing else is on,
     /// nor asked for its derivative.
     pub(super) fn effects<T: DualNum<Primitive = f64, Real = f64> + Copy>(
         &self,
         run: &Run,
-        shared: &[T],
-        moving: &[usize],
+        (shared, nuisance): (&[T], &[T]),
+        moving: Moving<'_>,
     ) -> (Flight<T>, Camera<T>, bool) {
         let zero = T::from(0.0);
         let mut flight = Flight::ballistic(self.setup.gravity_m_s2);
         let mut camera = Camera { scale: zero, tilt: [zero; 2], clock_rate: zero };
         let mut closed = true;
         for (slot, (role, value)) in self.roles.iter().zip(shared).enumerate() {
-            closed &= role.keeps_closed_form() || (value.re() == 0.0 && !moving.contains(&slot));
+            closed &= role.keeps_closed_form() || (value.re() == 0.0 && !moving.shared.contains(&slot));
             match role {
                 Role::Quadratic => flight.quadratic_per_m = *value * self.drag_unit,
                 Role::Linear => flight.linear_per_s = *value,
@@ -161,6 +167,11 @@ impl TrajectoryModel {
                 Role::TiltY => camera.tilt[1] = *value,
                 Role::ClockRate => camera.clock_rate = *value,
             }
+        }
+        for (lift, slot) in flight.lift_per_s.iter_mut().zip(self.lifts) {
+            let Some(slot) = slot else { continue };
+            closed &= nuisance[slot].re() == 0.0 && !moving.nuisance.contains(&slot);
+            *lift += nuisance[slot];
         }
         camera.scale += 1.0;
         (flight, camera, closed)
@@ -209,7 +220,7 @@ impl Model for TrajectoryModel {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.predict_dual(run, shared, nuisance, &[], out)
+        self.predict_dual(run, shared, nuisance, Moving::default(), out)
             .map_err(|reason| PredictError { run: run.label.clone(), reason })
     }
 

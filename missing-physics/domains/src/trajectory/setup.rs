@@ -13,7 +13,25 @@ pub enum Axes {
     Accelerometer,
 }
 
+/// The columns of x, y and z.
+pub(super) const PLACE: [&str; 3] = ["x_m", "y_m", "z_m"];
+
 impl Axes {
+    /// The columns that are measured, one a channel.
+    pub(super) fn channels(self) -> &'static [&'static str] {
+        match self {
+            Self::Height => &["z_m"],
+            Self::Plane => &["x_m", "z_m"],
+            Self::Space => &PLACE,
+            Self::Accelerometer => &["accel_z_m_s2"],
+        }
+    }
+
+    /// Number of unknowns of a run's start.
+    pub fn starts(self) -> usize {
+        2 * self.channels().len()
+    }
+
     /// Which of x, y and z (0 to 2) are seen, one a channel; none of them is felt.
     pub fn seen(self) -> &'static [usize] {
         match self {
@@ -21,6 +39,15 @@ impl Axes {
             Self::Plane => &[0, 2],
             Self::Space => &[0, 1, 2],
             Self::Accelerometer => &[],
+        }
+    }
+
+    /// The axes about which a spin pushes a ball across its path so that it is seen: within a picture, that across it.
+    pub(super) fn spins(self) -> std::ops::Range<usize> {
+        match self {
+            Self::Space => 0..3,
+            Self::Plane => 1..2,
+            Self::Height | Self::Accelerometer => 0..0,
         }
     }
 

@@ -74,8 +74,17 @@ impl Flying {
     }
 }
 
-/// The specification of a set-up and the meaning of each shared parameter, in order.
-pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
+/// The specification of a set-up.
+pub(super) struct Built {
+    pub(super) spec: Spec,
+    /// The meaning of each shared parameter, in order.
+    pub(super) roles: Vec<Role>,
+    /// The slot of a run's change of each component of the lift, where it may have any.
+    pub(super) lifts: [Option<usize>; 3],
+}
+
+/// The specification of a set-up.
+pub(super) fn build(setup: &Setup, drag_unit: f64) -> Built {
     let mut flying = Flying { b: SpecBuilder::default(), roles: Vec::new() };
     let b = &mut flying;
     let felt = setup.axes == Axes::Accelerometer;
@@ -93,7 +102,8 @@ pub(super) fn build(setup: &Setup, drag_unit: f64) -> (Spec, Vec<Role>) {
     }
     terms(b, setup.axes);
     start(b, setup.axes);
-    (flying.b.build_unchecked(), flying.roles)
+    let lifts = if setup.axes.along_ground() && !setup.spin { spins(b, setup.axes) } else { [None; 3] };
+    Built { spec: flying.b.build_unchecked(), roles: flying.roles, lifts }
 }
 
 /// Drags of the air; the parameter of the quadratic one, whose unit is that of a drag coefficient where the ball's size is known.
@@ -144,9 +154,8 @@ fn terms(b: &mut Flying, axes: Axes) {
         );
     }
     if axes.along_ground() {
-        let places: Vec<&str> = axes.seen().iter().map(|k| ["x_m", "y_m", "z_m"][*k]).collect();
         let free = f64::NEG_INFINITY;
-        b.term(Role::Stiff, ("stiffness_per_s2", "1/s^2"), free, 0.1, "-(r - r(0))", &places);
+        b.term(Role::Stiff, ("stiffness_per_s2", "1/s^2"), free, 0.1, "-(r - r(0))", axes.channels());
         b.term(Role::PushX, ("push_x_m_s2", "m/s^2"), free, 0.1, "e_x", &[]);
         if axes == Axes::Space {
             b.term(Role::PushY, ("push_y_m_s2", "m/s^2"), free, 0.1, "e_y", &[]);
@@ -170,6 +179,23 @@ fn start(b: &mut Flying, axes: Axes) {
     for axis in axes.seen() {
         b.b.nuisance(["vx0_m_s", "vy0_m_s", "vz0_m_s"][*axis], "m/s", UNBOUNDED, 1.0);
     }
+}
+
+/// A spin that differs from run to run: the slot of each component of the lift.
+fn spins(b: &mut Flying, axes: Axes) -> [Option<usize>; 3] {
+    let names = ["lift_change_x_per_s", "lift_change_y_per_s", "lift_change_z_per_s"];
+    let changes: Vec<ParameterRef> =
+        names[axes.spins()].iter().map(|name| b.b.nuisance(name, "1/s", [-20.0, 20.0], 0.1)).collect();
+    let text = [
+        "a spin that differs from run to run",
+        "Each run's ball spins in its own way.",
+        "a = (lift + change of the run) x v",
+        "Laird and Ware 1982, doi:10.2307/2529876 (random effects)",
+    ];
+    b.b.between_runs("spin-by-run", &changes, text, &["magnus-lift"]);
+    let mut lifts = [None; 3];
+    axes.spins().zip(&changes).for_each(|(axis, change)| lifts[axis] = Some(change.slot));
+    lifts
 }
 
 /// Effects that a height alone shows.
@@ -211,9 +237,10 @@ fn along_ground(b: &mut Flying, setup: &Setup, drag: ParameterRef) {
     } else {
         let lifts =
             [(Role::LiftX, "lift_x_per_s"), (Role::LiftY, "lift_y_per_s"), (Role::LiftZ, "lift_z_per_s")];
-        // Within the plane a ball is lifted by spin about the axis across it.
-        let within = if space { 0..3 } else { 1..2 };
-        let lift = lifts[within].iter().map(|(r, n)| b.shared(*r, n, "1/s", [-20.0, 20.0], 0.1)).collect();
+        let lift = lifts[setup.axes.spins()]
+            .iter()
+            .map(|(r, n)| b.shared(*r, n, "1/s", [-20.0, 20.0], 0.1))
+            .collect();
         (lift, "a = lift x v")
     };
     let text = [

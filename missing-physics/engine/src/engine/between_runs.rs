@@ -7,8 +7,7 @@ use crate::engine::course::{Compared, Course, draw};
 use crate::engine::input::DiagnoseError;
 use crate::fit::prediction::predictions;
 use crate::locate::locations::locate;
-use crate::model::PredictError;
-use crate::runs::spread::FEWEST_RUNS;
+use crate::model::{FEWEST_RUNS_THAT_DIFFER, PredictError};
 use crate::selection::candidate::Candidate;
 use crate::selection::main_cause::Judge;
 use crate::selection::ranking::{Best, Ranking, clearly};
@@ -21,7 +20,7 @@ impl Course<'_> {
     pub(super) fn wanted(&self) -> Vec<usize> {
         let problem = &self.begun.problem;
         let mut wanted = problem.spec().asked();
-        if problem.rows.len() >= FEWEST_RUNS {
+        if problem.rows.len() >= FEWEST_RUNS_THAT_DIFFER {
             wanted.extend(problem.spec().between_runs());
         }
         wanted

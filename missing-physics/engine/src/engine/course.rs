@@ -181,6 +181,9 @@ impl Course<'_> {
             }
         };
         if cause.is_none() && explained.is_none() {
+            if let Some((judge, best)) = self.differing_runs(compared) {
+                return Ok(Conclusion { judge, near: None, cause, explained: Some(best), replaced: None });
+            }
             let near = judge.near();
             let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
             let cause = beside.main_cause()?.or_else(|| near.as_ref()?.main_cause());
@@ -197,6 +200,23 @@ impl Course<'_> {
         let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
         let cause = beside.main_cause()?.or_else(|| judge.main_cause());
         Ok(Conclusion { judge, near: None, cause, explained: None, replaced: chosen })
+    }
+
+    /// The preferred set, where something in it differs from run to run and it takes away nearly all, each member most of what is left without
+    /// it; with a judge of its parts.
+    fn differing_runs<'c>(&'c self, compared: &'c Compared) -> Option<(Judge<'c>, &'c Best)> {
+        let Begun { problem, rule, .. } = self.begun;
+        let Compared { ranking, best, rough, .. } = compared;
+        let best = best.as_ref()?;
+        // What is rejected as clearly as can be is another thing, which differing runs and a mechanism imitate.
+        let floor = 1.0 / (self.options.replicates as f64 + 1.0);
+        if best.p_value <= (0.1 * clearly(self.options.alpha)).max(1.5 * floor) {
+            return None;
+        }
+        let chosen = ranking.at(best.at);
+        let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
+        let judge = (!self.alike(chosen)).then(|| Judge::new(problem, rule, ranking.all(), rough, parts))?;
+        judge.takes_nearly_all(&chosen.set).then_some((judge, best))
     }
 
     /// A judge of a set's parts, where the set holds: noise that is correlated as long as the runs are is no noise, and a member without
@@ -273,7 +293,7 @@ impl Course<'_> {
     }
 
     /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of
-    /// what is left without them.
+    /// what is left without them; or is that set, where the doubt is half as likely by chance.
     fn less_beside_a_leftover(
         &self,
         ranking: &Ranking,
@@ -282,13 +302,18 @@ impl Course<'_> {
     ) -> Option<MainCause> {
         let Begun { problem, rule, .. } = self.begun;
         let chosen = ranking.at(best.at);
-        if best.p_value > self.options.alpha || chosen.set.len() < 2 {
+        if best.p_value > self.options.alpha {
             return None;
         }
+        // Beside a leftover intervals follow from derivatives, which a threshold between two jumps has not.
+        let modes = problem.model.extensions().modes;
+        let smooth =
+            chosen.selection.added().all(|slot| modes.is_none_or(|modes| modes.jumps(slot).is_empty()));
+        let doubted = smooth && best.p_value <= 0.5 * self.options.alpha;
         let cause = Judge::new(problem, rule, ranking.all(), rough, |c| self.alike(c)).main_cause();
         cause.filter(|cause| {
             let less = &cause.chosen.candidate;
-            less.set.len() < chosen.set.len() && nested(less, chosen)
+            less.set.len() < chosen.set.len() && nested(less, chosen) || doubted && less.set == chosen.set
         })
     }
 

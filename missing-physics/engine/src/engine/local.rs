@@ -125,6 +125,14 @@ impl BesideLocal<'_> {
                 chosen = w;
             }
         }
+        // Where the baseline leaves hardly more than noise, a part of it is taken away by many a pair.
+        if self
+            .judge
+            .least_squares(&[])
+            .is_some_and(|nothing| self.counted(nothing.chi2) < chosen.left + CLEAR)
+        {
+            return Ok(None);
+        }
         // What a local cause does not take away most of has another reason.
         if chosen.smaller < SMALLER {
             return Ok(None);

@@ -111,15 +111,15 @@ impl SpecBuilder {
         &mut self.spec.mechanisms[at]
     }
 
-    /// What may differ from run to run ([`Mechanism::between_runs`]) by a parameter of each run, with the texts of [`Self::mechanism`].
+    /// What may differ from run to run ([`Mechanism::between_runs`]) by parameters of each run, with the texts of [`Self::mechanism`].
     pub fn between_runs(
         &mut self,
         id: &str,
-        parameter: ParameterRef,
+        parameters: &[ParameterRef],
         text: [&str; 4],
         confused_with: &[&str],
     ) {
-        self.mechanism(id, &[parameter], text, confused_with).between_runs = true;
+        self.mechanism(id, parameters, text, confused_with).between_runs = true;
     }
 
     /// The mechanism of an identifier, to be added to.

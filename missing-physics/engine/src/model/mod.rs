@@ -16,4 +16,7 @@ pub use extensions::{
     WindowedModel,
 };
 pub use simulation::{Experiment, Model, Pair, difference_points, finite_differences};
-pub use spec::{Derived, DerivedPerRun, Mechanism, OfParameters, OfRun, Over, Parameter, Scope, Spec, Term};
+pub use spec::{
+    Derived, DerivedPerRun, FEWEST_RUNS_THAT_DIFFER, Mechanism, OfParameters, OfRun, Over, Parameter, Scope,
+    Spec, Term,
+};

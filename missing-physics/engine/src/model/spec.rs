@@ -127,6 +127,9 @@ pub struct Mechanism {
     pub between_runs: bool,
 }
 
+/// Runs from which on what differs between them ([`Mechanism::between_runs`]) is looked for: fewer say nothing of it.
+pub const FEWEST_RUNS_THAT_DIFFER: usize = 3;
+
 /// A candidate term of an unknown law: a parameter of the model that no mechanism frees.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Term {

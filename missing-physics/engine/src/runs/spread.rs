@@ -8,12 +8,10 @@ use crate::estimate::reach::{Z95, student};
 use crate::fit::bordered::BorderedNormal;
 use crate::fit::columns::normal_of_run;
 use crate::fit::optimum::{Fit, covariance};
-use crate::model::PredictError;
+use crate::model::{FEWEST_RUNS_THAT_DIFFER, PredictError};
 use crate::problem::Problem;
 use crate::selection::candidate::Candidate;
 
-/// Fewer runs say nothing of how runs differ.
-pub(crate) const FEWEST_RUNS: usize = 3;
 /// Chance, over all parameters, that runs which do not differ are said to.
 const BY_CHANCE: f64 = 0.01;
 
@@ -30,7 +28,7 @@ pub(crate) struct Spread {
 pub(crate) fn spread(problem: &Problem<'_>, candidate: &Candidate) -> Result<Option<Spread>, PredictError> {
     let Candidate { selection, fit, .. } = candidate;
     let (runs, n) = (problem.rows.len(), selection.shared.len());
-    if runs < FEWEST_RUNS || n == 0 {
+    if runs < FEWEST_RUNS_THAT_DIFFER || n == 0 {
         return Ok(None);
     }
     let of_run = |run: usize| -> Result<(DMatrix<f64>, Vec<f64>), PredictError> {

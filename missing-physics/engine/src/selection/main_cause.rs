@@ -292,6 +292,12 @@ impl<'a> Judge<'a> {
         left <= LEAST * self.base && set.iter().all(|m| self.leaves_at_least(&without(set, *m), left))
     }
 
+    /// Whether a set takes away nearly all of the misfit of unseen data, and each member most of what is left without it.
+    pub(crate) fn takes_nearly_all(&self, set: &[usize]) -> bool {
+        self.share(set).is_some_and(|share| share >= NEARLY_ALL)
+            && self.at(set).is_some_and(|at| self.each_helps(at))
+    }
+
     /// Whether each member of a set takes away most of what is left without it.
     fn each_helps(&self, at: usize) -> bool {
         let set = &self.all[at].set;

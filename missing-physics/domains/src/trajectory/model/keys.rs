@@ -46,10 +46,10 @@ fn fit(
     free: &[usize],
     sigma: &[f64],
 ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let nuisance_count = model.nuisance_count();
+    let nuisance_count = model.axes().starts();
     let nuisance_free: Vec<usize> = (0..nuisance_count).collect();
     let mut shared = vec![0.0; model.spec().count(Scope::Shared)];
-    let mut nuisances = vec![vec![0.0; nuisance_count]; runs.len()];
+    let mut nuisances = vec![vec![0.0; model.nuisance_count()]; runs.len()];
     for (run, nuisance) in runs.iter().zip(&mut nuisances) {
         model.nuisance_start(run, nuisance);
     }
@@ -89,7 +89,7 @@ fn fit(
             shared[slot] += step[i];
         }
         for (r, nuisance) in nuisances.iter_mut().enumerate() {
-            for (i, nuisance) in nuisance.iter_mut().enumerate() {
+            for (i, nuisance) in nuisance.iter_mut().take(nuisance_count).enumerate() {
                 *nuisance += step[free.len() + r * nuisance_count + i];
             }
         }

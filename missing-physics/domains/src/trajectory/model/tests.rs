@@ -83,7 +83,7 @@ fn a_rod_shows_the_camera_and_nothing_else() {
     }
     let rod =
         Run { label: "rod".into(), inputs: vec![vec![0.0, 1.0]], outputs: vec![vec![0.0; 2]; 3], kind: ROD };
-    let nuisance = [0.3, -0.4, 0.5, 7.0, 7.0, 7.0];
+    let nuisance = [0.3, -0.4, 0.5, 7.0, 7.0, 7.0, 0.2, 0.2, 0.2];
     let mut out = [f64::NAN; 6];
     model.predict(&rod, &shared, &nuisance, &mut out).unwrap();
     // e_z turned by -0.03 about x, then by 0.01 about y.
@@ -108,7 +108,7 @@ fn the_start_of_a_parabola_is_found() {
     };
     let model = TrajectoryModel::new(setup);
     let mut run = run(3, false);
-    let truth = [0.1, -0.2, 1.5, 3.0, 0.4, 5.0];
+    let truth = [0.1, -0.2, 1.5, 3.0, 0.4, 5.0, 0.0, 0.0, 0.0];
     let shared = vec![0.0; model.spec().count(Scope::Shared)];
     let mut out = vec![0.0; 36];
     model.predict(&run, &shared, &truth, &mut out).unwrap();
@@ -116,7 +116,7 @@ fn the_start_of_a_parabola_is_found() {
         run.outputs[c].copy_from_slice(&out[12 * c..12 * (c + 1)]);
     }
     run.outputs[1][4] = f64::NAN;
-    let mut nuisance = [0.0; 6];
+    let mut nuisance = [0.0; 9];
     model.nuisance_start(&run, &mut nuisance);
     for (a, b) in nuisance.iter().zip(truth) {
         assert!((a - b).abs() < 1e-9, "{nuisance:?}");
