@@ -1,5 +1,8 @@
 //! What every domain does with its table: runs, noise, resolution.
 
+#[cfg(any(feature = "custom", feature = "motion", feature = "trajectory"))]
+use missing_physics::data::Run;
+
 use crate::recording::{Column, ReadError, Table, quoted};
 
 /// Standard gravity, m/s^2 (CGPM 1901).
@@ -76,6 +79,44 @@ pub(super) fn calibration(
 ) -> Result<Vec<Option<f64>>, ReadError> {
     let noise = header.section("noise")?;
     channels.iter().map(|name| noise.number(name, f64::MIN_POSITIVE, 1e12)).collect()
+}
+
+/// The steps in which the sensors of all channels give their readings, of which columns say `steps`: none where readings were taken as they
+/// changed.
+#[cfg(any(feature = "custom", feature = "motion", feature = "trajectory"))]
+pub(super) fn sensor_steps(runs: &[Run], steps: impl Iterator<Item = f64>) -> Vec<f64> {
+    let of_sensor = |(channel, step)| if taken_at_changes(runs, channel, step) { 0.0 } else { step };
+    steps.enumerate().map(of_sensor).collect()
+}
+
+/// Whether a channel's readings were taken as they changed, each a step from the one before at a moment of its own (the ticks of an encoder, the
+/// bars of a fence that falls through a light gate): such readings are exact, and their step is none of a sensor's. The first input is the time.
+#[cfg(any(feature = "custom", feature = "motion", feature = "trajectory"))]
+fn taken_at_changes(runs: &[Run], channel: usize, step: f64) -> bool {
+    /// Part of the changes that are of one step: some may have been missed.
+    const MOST: f64 = 0.75;
+    /// Two spans are alike to this part of them where a clock took the readings.
+    const EVEN: f64 = 1e-3;
+    if step <= 0.0 {
+        return false;
+    }
+    let (mut changes, mut single, mut uneven) = (0_usize, 0_usize, false);
+    for run in runs {
+        let Some(times) = run.inputs.first() else { return false };
+        let rows = times.iter().zip(&run.outputs[channel]).filter(|(_, value)| value.is_finite());
+        let rows: Vec<(f64, f64)> = rows.map(|(t, value)| (*t, *value)).collect();
+        let spans: Vec<f64> = rows.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+        uneven |= spans.windows(2).any(|pair| (pair[1] / pair[0] - 1.0).abs() > EVEN);
+        for pair in rows.windows(2) {
+            let by = ((pair[1].1 - pair[0].1) / step).round().abs();
+            if by < 0.5 {
+                return false;
+            }
+            changes += 1;
+            single += usize::from(by < 1.5);
+        }
+    }
+    uneven && single as f64 >= MOST * changes as f64 && changes > 0
 }
 
 /// The step of a column's readings where they are clearly steps of one size, else 0.

@@ -4,13 +4,14 @@ use crate::adequacy::test::Adequacy;
 use crate::data::Run;
 use crate::diagnosis::{
     ChannelFit, ChannelNoise, Closest, Curves, Diagnosis, Estimate, MechanismReport, NoiseSource, Outlier,
-    RunDifference, RunSpread, RunValue, SetReport, Verdict,
+    RunDifference, RunSpread, RunValue, Scatter, SetReport, Verdict,
 };
 use crate::estimate::estimates::{estimates, of_mechanism};
 use crate::estimate::open_noise::with_open_noise;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::predictions;
 use crate::model::{Mechanism, PredictError};
+use crate::noise::process::Shape;
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::repaired::Repaired;
@@ -151,9 +152,18 @@ impl Answer<'_> {
                     correlated_share: share,
                     correlation_rows: length,
                     correlation_length: length * self.problem.step,
+                    scatter: self.scatter(c, &shape, fit.noise.sigma[c]),
                 }
             })
             .collect()
+    }
+
+    /// What scatters and adds up in a channel, beside white noise of one sigma.
+    fn scatter(&self, channel: usize, shape: &Shape, white: f64) -> Option<Scatter> {
+        let errors = self.problem.model.extensions().errors?;
+        let unit = self.problem.accumulated[channel].filter(|_| shape.accumulated > 0.0)?;
+        let sigma = white * shape.accumulated / unit;
+        Some(Scatter { of: errors.step().to_owned(), sigma, memory: shape.memory, white })
     }
 
     pub(crate) fn errors(&self, fit: &Fit, score: &HeldOut) -> Result<Vec<ChannelFit>, PredictError> {

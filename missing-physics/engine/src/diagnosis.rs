@@ -71,6 +71,21 @@ pub struct ChannelNoise {
     pub correlation_rows: f64,
     /// Correlation length of that part along the noise variable, in that variable's unit; 0 for white noise.
     pub correlation_length: f64,
+    /// What scatters and adds up along a run, so that it makes that part.
+    pub scatter: Option<Scatter>,
+}
+
+/// A scatter from step to step whose effect adds up along a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scatter {
+    /// What scatters, in words ("the logarithm of the restitution").
+    pub of: String,
+    /// One sigma of a step, in the unit of what scatters.
+    pub sigma: f64,
+    /// Correlation of neighbouring steps, in [0, 1).
+    pub memory: f64,
+    /// One sigma of the white noise of a reading beside it, in the channel's unit.
+    pub white: f64,
 }
 
 /// One test of a model's adequacy.

@@ -216,7 +216,7 @@ impl<'a> Problem<'a> {
         page[shape % PAGE].get_or_init(|| {
             let shape = self.family.shape(shape);
             if shape.accumulated > 0.0 {
-                self.accumulating(run, channel, shape.accumulated)
+                self.accumulating(run, channel, shape)
             } else if shape.by_row {
                 let numbers: Vec<f64> = rows.valid[channel].iter().map(|&i| i as f64).collect();
                 Whitener::new(&numbers, 1.0, shape)
@@ -227,14 +227,14 @@ impl<'a> Problem<'a> {
     }
 
     /// The whitener of errors that accumulate, so many times the white ones; of white ones alone where the model says nothing of a run.
-    fn accumulating(&self, run: usize, channel: usize, size: f64) -> Whitener {
+    fn accumulating(&self, run: usize, channel: usize, shape: Shape) -> Whitener {
         let rows = &self.rows[run].valid[channel];
         let known = accumulated_errors(self.model, &self.recording.runs[run], channel);
         let (Some(errors), Some(unit)) = (known, self.accumulated[channel]) else {
             return Whitener::new(&self.rows[run].positions[channel], self.step, Shape::WHITE);
         };
-        let scaled = |&i: &usize| errors[i].iter().map(|v| size * v / unit).collect();
-        Whitener::of_accumulated(&rows.iter().map(scaled).collect::<Vec<Vec<f64>>>())
+        let scaled = |&i: &usize| errors[i].iter().map(|v| shape.accumulated * v / unit).collect();
+        Whitener::of_accumulated(&rows.iter().map(scaled).collect::<Vec<Vec<f64>>>(), shape.memory)
     }
 
     /// Picks the measured rows of a channel out of a column over all rows.

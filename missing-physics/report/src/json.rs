@@ -94,7 +94,8 @@ pub fn json(d: &Diagnosis, context: &ReportContext) -> String {
 
 fn noise(n: &ChannelNoise) -> Value {
     value!({"channel": n.channel, "sigma": n.sigma, "source": n.source.word(),
-        "correlated_share": n.correlated_share, "correlation_length": n.correlation_length})
+        "correlated_share": n.correlated_share, "correlation_length": n.correlation_length,
+        "scatter": n.scatter.as_ref().map(|s| value!({"of": s.of, "sigma": s.sigma, "memory": s.memory, "white": s.white}))})
 }
 
 fn place(l: &Location) -> Value {

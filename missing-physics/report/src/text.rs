@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use missing_physics::diagnosis::{
-    Diagnosis, Law, Location, MechanismReport, NEARLY_ALL, RunDifference, RunSpread, RunValue, SetReport,
-    Verdict,
+    ChannelNoise, Diagnosis, Law, Location, MechanismReport, NEARLY_ALL, RunDifference, RunSpread, RunValue,
+    SetReport, Verdict,
 };
 
 use super::context::ReportContext;
@@ -106,7 +106,10 @@ pub fn tried(d: &Diagnosis) -> Vec<String> {
 pub(super) fn headline(d: &Diagnosis) -> String {
     let p = p_value(d);
     match d.verdict {
-        Verdict::Adequate => format!("The simulation explains this recording to within its noise ({p})."),
+        Verdict::Adequate => match slow_errors(d) {
+            Some(slow) => format!("The simulation explains this recording, if {slow} is noise ({p})."),
+            None => format!("The simulation explains this recording to within its noise ({p})."),
+        },
         Verdict::Explained => {
             format!("The simulation does not explain this recording ({p}); {} does.", named(d, &d.chosen))
         }
@@ -370,8 +373,13 @@ fn better(d: &Diagnosis) -> Vec<String> {
         .zip(&d.after)
         .map(|(before, after)| {
             let noise = d.noise.iter().find(|n| n.channel == before.channel);
-            let noise = noise
-                .map_or_else(String::new, |n| format!(" (noise {})", in_unit(n.sigma, 2, &unit(&n.channel))));
+            let noise = noise.map_or_else(String::new, |n| {
+                let (sigma, of) = match &n.scatter {
+                    Some(scatter) => (scatter.white, "noise of each reading"),
+                    None => (n.sigma, "noise"),
+                };
+                format!(" ({of} {})", in_unit(sigma, 2, &unit(&n.channel)))
+            });
             format!(
                 "{}: error on {unseen} {} -> {}{noise}",
                 before.channel,
@@ -385,9 +393,38 @@ fn better(d: &Diagnosis) -> Vec<String> {
 /// Noise that is correlated over more rows than this can hide a slow misfit.
 const SLOW: f64 = 5.0;
 
+/// Errors most of whose variance is slow, in words; none where no channel has such.
+fn slow_errors(d: &Diagnosis) -> Option<String> {
+    let slow =
+        |n: &&ChannelNoise| n.scatter.is_none() && n.correlated_share > 0.5 && n.correlation_rows > SLOW;
+    let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
+    let of = |n: &ChannelNoise| {
+        let unit = d.channels.iter().find(|(c, _)| *c == n.channel).map_or("", |(_, u)| u.as_str());
+        let (size, over) = (in_unit(n.sigma, 2, unit), significant(n.correlation_length, 2));
+        format!("an error of {} of {size} that varies over {over} {along}", n.channel)
+    };
+    let all: Vec<String> = d.noise.iter().filter(slow).map(of).collect();
+    (!all.is_empty()).then(|| listed(&all))
+}
+
 /// A channel's noise, in one sentence.
-pub(super) fn noise_sentence(d: &Diagnosis, n: &missing_physics::diagnosis::ChannelNoise) -> String {
+pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
     let unit = d.channels.iter().find(|(c, _)| *c == n.channel).map(|(_, u)| u.clone()).unwrap_or_default();
+    if let Some(s) = &n.scatter {
+        let alike = if s.memory > 0.0 {
+            format!(", neighbours alike by {}", significant(s.memory, 2))
+        } else {
+            String::new()
+        };
+        return format!(
+            "{}: {} of each reading, and what adds up along a run: {} scatters by {}{alike} (from {})",
+            n.channel,
+            in_unit(s.white, 2, &unit),
+            s.of,
+            significant(s.sigma, 2),
+            n.source.word()
+        );
+    }
     let colour = if n.correlated_share > 0.0 {
         let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
         let over = significant(n.correlation_length, 2);

@@ -25,5 +25,6 @@ mod report;
 mod runs_differ;
 mod simulated;
 mod templates;
+mod ticks;
 mod unlisted;
 mod watch;

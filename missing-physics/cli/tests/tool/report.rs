@@ -71,3 +71,30 @@ fn several_recordings_have_a_page_over_them() {
     assert!(index.contains("href=\"a%20ball.html\"") && index.contains("1 unexplained, 1 without a report"));
     assert!(index.contains("recording.toml: no such file"));
 }
+
+/// A ball seen by a camera that sways: an error of a run's length is no noise of a reading's, and the first line says what is taken for noise.
+#[test]
+fn an_error_that_wanders_is_said_in_the_first_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+    let noise = Normal::new(0.0, 1.0).unwrap();
+    let mut data = String::from("run,t_s,z_m\n");
+    for run in 1..=6 {
+        let mut sways = 0.02 * noise.sample(&mut rng);
+        for row in 0..80 {
+            let t = f64::from(row) / 60.0;
+            sways = 0.95 * sways + (1.0_f64 - 0.95 * 0.95).sqrt() * 0.02 * noise.sample(&mut rng);
+            let z = 10.0 - 0.5 * 9.80665 * t * t + sways + 0.001 * noise.sample(&mut rng);
+            writeln!(data, "{run},{t:.5},{z:.5}").unwrap();
+        }
+    }
+    std::fs::write(folder.path().join("data.csv"), data).unwrap();
+    let header = "format = 1\ndomain = \"trajectory\"\ndata = \"data.csv\"\n[rig]\ngravity_m_s2 = 9.80665\n";
+    std::fs::write(folder.path().join("recording.toml"), header).unwrap();
+    let tool = env!("CARGO_BIN_EXE_missing-physics");
+    let output = std::process::Command::new(tool).arg("diagnose").arg(folder.path()).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let first = text.lines().next().unwrap();
+    let beginning = "The simulation explains this recording, if an error of z_m of 0.0";
+    assert!(first.starts_with(beginning) && first.contains(" is noise (p = "), "{first}");
+}

@@ -128,14 +128,7 @@ pub(super) mod tests {
     /// Where angles are heard well, whitened errors are white and of the size that they should have.
     #[test]
     fn chance_is_white_where_angles_are_small() {
-        let spread = Spread {
-            time_s: 3e-5,
-            place_m: [1e-3; 2],
-            kappa: 1e4,
-            approach_rad: 0.01,
-            restitution: 0.0,
-            between_drops: 0.0,
-        };
+        let spread = Spread::heard(1e-3);
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let drop = drop();
         let likely = Linear::about_straight(&drop, &EFFECTS).likely(&EFFECTS, &spread).unwrap();
@@ -160,14 +153,7 @@ pub(super) mod tests {
         for (i, place) in wild.places_m.iter_mut().enumerate() {
             place[1] += if i % 2 == 0 { 0.05 } else { -0.05 };
         }
-        let spread = Spread {
-            time_s: 3e-5,
-            place_m: [0.05; 2],
-            kappa: 1e4,
-            approach_rad: 0.01,
-            restitution: 0.0,
-            between_drops: 0.0,
-        };
+        let spread = Spread::heard(0.05);
         let mut linear = Linear::about_straight(&wild, &EFFECTS);
         for _ in 0..ROUNDS {
             linear = linear.likely(&EFFECTS, &spread).unwrap();

@@ -78,12 +78,27 @@ type Effect = fn(&mut Effects) -> &mut f64;
 struct Nuisance {
     effect: Effect,
     width: f64,
+    /// Whether it is never below zero.
+    positive: bool,
 }
 
 impl Nuisance {
     const fn new(effect: Effect, width: f64) -> Self {
-        Self { effect, width }
+        Self { effect, width, positive: false }
     }
+
+    const fn positive(effect: Effect, width: f64) -> Self {
+        Self { effect, width, positive: true }
+    }
+}
+
+/// What is known of a nuisance beforehand.
+struct Beforehand {
+    precision: f64,
+    /// How far it is from the likeliest.
+    departure: f64,
+    /// By how much it may fall.
+    least: f64,
 }
 
 /// What a fit may change about the effects before noise is judged by what is left; not friction, which is told from chance
@@ -91,7 +106,7 @@ impl Nuisance {
 const NUISANCES: [Nuisance; 6] = [
     Nuisance::new(|e| &mut e.restitution, 0.3),
     Nuisance::new(|e| &mut e.slope_s_m, 0.1),
-    Nuisance::new(|e| &mut e.drag_per_m, 0.5),
+    Nuisance::positive(|e| &mut e.drag_per_m, 0.5),
     Nuisance::new(|e| &mut e.table[0], 0.3),
     Nuisance::new(|e| &mut e.table[1], 0.3),
     Nuisance::new(|e| &mut e.walk_s, 1e-4),
@@ -139,8 +154,7 @@ fn nuisances(drops: &[Drop]) -> Vec<Nuisance> {
 #[derive(Clone, Copy)]
 struct Likelihood<'a> {
     drops: &'a [(Linear, DVector<f64>, DMatrix<f64>)],
-    /// What is known of the nuisances beforehand: the precision of each, and how far the effects are from the likeliest.
-    beforehand: &'a [[f64; 2]],
+    beforehand: &'a [Beforehand],
     calibration: Calibration,
     start: Spread,
 }
@@ -219,10 +233,8 @@ impl Likelihood<'_> {
     /// Minus twice the logarithm, up to a constant, and the nuisances' best values.
     fn value(&self, spread: &Spread) -> Option<(f64, DVector<f64>)> {
         let columns = self.beforehand.len();
-        let precision =
-            DVector::from_iterator(columns, self.beforehand.iter().map(|[precision, _]| *precision));
-        let departure =
-            DVector::from_iterator(columns, self.beforehand.iter().map(|[_, departure]| *departure));
+        let precision = DVector::from_iterator(columns, self.beforehand.iter().map(|b| b.precision));
+        let departure = DVector::from_iterator(columns, self.beforehand.iter().map(|b| b.departure));
         let mut normal = DMatrix::from_diagonal(&precision);
         let mut pull = precision.component_mul(&departure);
         let (mut total, mut squares) = (0.0, pull.dot(&departure));
@@ -240,9 +252,20 @@ impl Likelihood<'_> {
         let factor = normal.cholesky()?;
         let lower = factor.l_dirty();
         let determinant: f64 = (0..columns).map(|i| lower[(i, i)].ln()).sum();
-        let best = factor.solve(&pull);
-        let prior = self.calibration.prior(spread);
-        Some((total + squares - pull.dot(&best) + 2.0 * determinant + prior, -best))
+        let mut moved = -factor.solve(&pull);
+        let mut fitted = total + squares + pull.dot(&moved) + 2.0 * determinant;
+        // What would fall below zero stays there, and the others are what they are then.
+        for (at, Beforehand { least, .. }) in self.beforehand.iter().enumerate() {
+            let short = least - moved[at];
+            if short > 0.0 {
+                let mut one = DVector::zeros(columns);
+                one[at] = 1.0;
+                let column = factor.solve(&one);
+                fitted += short * short / column[at];
+                moved += column.scale(short / column[at]);
+            }
+        }
+        Some((fitted + self.calibration.prior(spread), moved))
     }
 }
 
@@ -332,9 +355,11 @@ fn judge_beside(
         let parts: Vec<_> = linear.iter().map(|l| with_design(l, &begin, nuisances)).collect();
         // A hand sends balls nowhere, beforehand; the other effects are those that the drops begin with.
         let expected = Effects { heads: [0.0; 2], outwards_per_m: 0.0, ..*effects };
-        let beforehand: Vec<[f64; 2]> = (nuisances.iter())
-            .map(|Nuisance { effect, width }| {
-                [width.powi(-2), *effect(&mut begin.clone()) - *effect(&mut expected.clone())]
+        let beforehand: Vec<Beforehand> = (nuisances.iter())
+            .map(|Nuisance { effect, width, positive }| {
+                let [now, likeliest] = [&begin, &expected].map(|effects| *effect(&mut effects.clone()));
+                let least = if *positive { -now } else { f64::NEG_INFINITY };
+                Beforehand { precision: width.powi(-2), departure: now - likeliest, least }
             })
             .collect();
         let likelihood = Likelihood { drops: &parts, beforehand: &beforehand, calibration, start: spread };

@@ -51,11 +51,7 @@ impl TimesModel {
     /// `stated`: whether the clock's sigma is.
     pub(super) fn new(setup: Setup, restitution: f64, height_m: Option<f64>, stated: bool) -> Self {
         let (spec, layout, begins, leaves) = build_times(&setup, restitution);
-        let longest_noise = match setup.unheard[1] {
-            2.. => f64::INFINITY,
-            _ if setup.listened || stated => LONGEST_IN_ONE,
-            _ => LONGEST_MARKED,
-        };
+        let longest_noise = if setup.listened || stated { LONGEST_IN_ONE } else { LONGEST_MARKED };
         let largest_scatter = if setup.unheard[1] > 1 { f64::INFINITY } else { SCATTER_IN_ONE };
         let scattered = HashMap::new();
         Self { setup, spec, layout, begins, leaves, height_m, longest_noise, largest_scatter, scattered }
@@ -268,6 +264,10 @@ impl ErrorModel for TimesModel {
 
     fn accumulated(&self, run: &Run, _channel: usize) -> Option<Vec<Vec<f64>>> {
         self.scattered.get(&run.label).cloned()
+    }
+
+    fn step(&self) -> &str {
+        "the logarithm of the restitution"
     }
 
     fn largest_step(&self) -> f64 {

@@ -26,6 +26,19 @@ pub(super) struct Spread {
 }
 
 impl Spread {
+    /// Impacts heard to 10 mm of sound in the air, places to `place_m`, of a ball and a table that scatter by a hundredth.
+    #[cfg(test)]
+    pub(super) fn heard(place_m: f64) -> Self {
+        Self {
+            time_s: 3e-5,
+            place_m: [place_m; 2],
+            kappa: 1e4,
+            approach_rad: 0.01,
+            restitution: 0.0,
+            between_drops: 0.0,
+        }
+    }
+
     /// One sigma of a whitened error in each channel: its unit is that of what was measured.
     pub(super) fn of_channels(&self) -> [f64; PER_IMPACT] {
         [self.time_s, self.place_m[0], self.place_m[1]]

@@ -143,14 +143,11 @@ fn joint(
         Some(channel) => channels[channel].unit.clone(),
         None => section.optional_text("unit", "a unit, such as \"rad\"")?.unwrap_or_default().to_owned(),
     };
-    let has = JointHas {
-        drive: section.flag("driven")?.unwrap_or(false),
-        turns: section.flag("turns")?.unwrap_or(false),
-        ..JointHas::default()
-    };
+    let has = JointHas { drive: section.flag("driven")?.unwrap_or(false), ..JointHas::default() };
+    let turns = section.flag("turns")?.unwrap_or(false);
     let reach = range[0].abs().max(range[1].abs());
     let units = units(&unit, force_unit);
-    Ok((JointSizes { force, speed, reach, range, units }, has))
+    Ok((JointSizes { force, speed, reach, range, turns, units }, has))
 }
 
 /// Units of what multiplies powers of speed and position to a force.
@@ -364,7 +361,7 @@ impl Machine {
         match first.map(|part| part.role) {
             Some(Role::Joint(joint, effect)) => {
                 let sizes = &self.joints[joint];
-                mechanics::joint_starts(effect, parameters, sizes, sizes.least_yield(self.step_s))
+                mechanics::joint_starts(effect, parameters, sizes, sizes.yields(self.step_s))
             }
             Some(Role::Input(input, effect)) => {
                 mechanics::input_starts(effect, parameters, self.inputs[input].range, self.step_s)

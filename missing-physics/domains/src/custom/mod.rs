@@ -18,7 +18,7 @@ use missing_physics::model::{Experiment, Quantity, Scope, Spec, SpecBuilder};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
 use crate::plausible;
-use crate::reading::{calibration, check_runs, number, resolution};
+use crate::reading::{calibration, check_runs, number, resolution, sensor_steps};
 use crate::recording::{Column, Header, ReadError, Source, Table, quoted};
 pub use answer::{Failure, fill, read_answer, read_batch};
 pub use machine::JointForce;
@@ -171,7 +171,8 @@ fn read(header: &Header, within: Option<Arc<dyn Simulator>>) -> Result<CheckedRe
         }
         None => Simulation::Precomputed(precomputed(&table, &simulated)?),
     };
-    let resolution = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution)).collect();
+    let steps = channels.iter().map(|c| table.numbers(&c.name).map_or(0.0, resolution));
+    let resolution = if along { sensor_steps(&runs, steps) } else { steps.collect() };
     let columns = channels.iter().chain(&inputs);
     let largest =
         |name: &str| table.numbers(name).unwrap_or_default().iter().fold(0.0, |m: f64, v| m.max(v.abs()));

@@ -17,7 +17,7 @@ pub(crate) fn joints<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, has: J
         load(d);
     }
     elastic(d, s);
-    if has.turns {
+    if s.turns {
         cogging(d, s);
     }
     if has.follows {
@@ -27,8 +27,8 @@ pub(crate) fn joints<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, has: J
     if has.inertia {
         inertia(d);
     }
-    if let Some(least) = has.least_yield {
-        yielding(d, s, least);
+    if let Some(yields) = has.yields {
+        yielding(d, s, yields);
     }
 }
 
@@ -267,8 +267,8 @@ fn inertia<D: Declares<JointEffect>>(d: &mut D) {
     );
 }
 
-/// A spring that yields, at `least` or more.
-fn yielding<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, least: f64) {
+/// A spring that yields, between two displacements.
+fn yielding<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, [least, most]: [f64; 2]) {
     if !d.wants("hysteresis") {
         return;
     }
@@ -279,9 +279,9 @@ fn yielding<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, least: f64) {
         JointEffect::Yield,
         "yield",
         &s.units.position,
-        0.03 * s.reach,
-        [least, 2.0 * s.reach],
-        0.03 * s.reach,
+        (0.03 * s.reach).min(0.3 * most),
+        [least, most],
+        (0.03 * s.reach).min(0.3 * most),
     );
     d.mechanism(
         "hysteresis",

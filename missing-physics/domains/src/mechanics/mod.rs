@@ -74,6 +74,8 @@ pub(crate) struct JointSizes {
     pub(crate) reach: f64,
     /// Smallest and largest position.
     pub(crate) range: [f64; 2],
+    /// It rotates, so that effects periodic in the angle make sense.
+    pub(crate) turns: bool,
     pub(crate) units: JointUnits,
 }
 
@@ -90,9 +92,12 @@ pub(crate) struct JointUnits {
 }
 
 impl JointSizes {
-    /// The smallest displacement at which a spring can be seen to yield: a part of what passes between rows. Below it is dry friction.
-    pub(crate) fn least_yield(&self, step_s: f64) -> f64 {
-        (0.25 * self.speed * step_s).clamp(1e-4 * self.reach, 0.03 * self.reach)
+    /// The smallest and the largest displacement at which a spring is seen to yield. The one is a part of what passes between rows: below it
+    /// is dry friction. The other is near the reach, and a radian of a joint that turns: no bearing is wound up so far before it slides.
+    pub(crate) fn yields(&self, step_s: f64) -> [f64; 2] {
+        let least = (0.25 * self.speed * step_s).clamp(1e-4 * self.reach, 0.03 * self.reach);
+        let most = (2.0 * self.reach).min(if self.turns { 1.0 } else { f64::INFINITY });
+        [least.min(0.1 * most), most]
     }
 }
 
@@ -103,10 +108,8 @@ pub(crate) struct JointHas {
     pub(crate) drive: bool,
     /// It follows the command of a position, so that there can be play between the two.
     pub(crate) follows: bool,
-    /// It rotates, so that effects periodic in the angle make sense.
-    pub(crate) turns: bool,
-    /// Where a spring that yields can be followed: the smallest displacement at which it does.
-    pub(crate) least_yield: Option<f64>,
+    /// Where a spring that yields can be followed: the smallest and the largest displacement at which it does.
+    pub(crate) yields: Option<[f64; 2]>,
     /// All accelerations can be made smaller by one factor.
     pub(crate) inertia: bool,
 }

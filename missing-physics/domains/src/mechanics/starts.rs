@@ -7,13 +7,13 @@ use super::{InputEffect, JointEffect, JointSizes, OutputEffect};
 /// Starts.
 type Starts = Vec<Vec<(usize, f64)>>;
 
-/// Starts of a joint's mechanism whose parameters are `own`, the first of which is `effect`; `least_yield` is the smallest displacement at
-/// which a spring yields.
+/// Starts of a joint's mechanism whose parameters are `own`, the first of which is `effect`; a spring `yields` between two
+/// displacements.
 pub(crate) fn joint_starts(
     effect: JointEffect,
     parameters: &[usize],
     s: &JointSizes,
-    least_yield: f64,
+    [least, most]: [f64; 2],
 ) -> Starts {
     let Some(&first) = parameters.first() else { return Vec::new() };
     let (force, [low, high]) = (s.force, s.range);
@@ -44,7 +44,7 @@ pub(crate) fn joint_starts(
             .collect(),
         JointEffect::YieldStiffness => [3e-3, 0.02, 0.1, 0.4]
             .iter()
-            .map(|y| (y * s.reach).max(least_yield))
+            .map(|y| (y * s.reach).clamp(least, 0.9 * most))
             .map(|y| vec![(first, 0.05 * force / y), (parameters[1], y)])
             .collect(),
         _ => Vec::new(),

@@ -166,8 +166,7 @@ impl<'a> Effects<'a> {
         let has = JointHas {
             drive: stated.drive.is_some(),
             follows: stated.follows,
-            turns: stated.turns,
-            least_yield: Some(sizes.least_yield(scales.step_s)),
+            yields: Some(sizes.yields(scales.step_s)),
             inertia: true,
         };
         mechanics::joints(&mut Carrier { effects: self, of, role: |e| Role::Joint(joint, e) }, sizes, has);

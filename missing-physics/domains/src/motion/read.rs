@@ -5,7 +5,7 @@ use missing_physics::model::Quantity;
 
 use super::equations::Equations;
 use super::units;
-use crate::reading::{calibration, check_runs, number};
+use crate::reading::{calibration, check_runs, number, sensor_steps};
 use crate::recording::{Column, Header, ReadError};
 
 /// A run with fewer rows says nothing beyond its own start.
@@ -72,8 +72,8 @@ pub(super) fn read(header: &Header) -> Result<(Equations, Recording), ReadError>
     }
     let names: Vec<&str> = equations.outputs.iter().map(|o| o.name.as_str()).collect();
     let quantity = |name: &str| Quantity::new(name, units::text(name));
-    let measured: Vec<Vec<f64>> =
-        outputs.iter().map(|c| c.iter().copied().filter(|v| v.is_finite()).collect()).collect();
+    let steps = outputs.iter().map(|c| quantum(c.iter().copied().filter(|v| v.is_finite()).collect()));
+    let resolution = sensor_steps(&runs, steps);
     let recording = Recording {
         channels: names.iter().map(|n| quantity(n)).collect(),
         variables: std::iter::once(quantity("t_s"))
@@ -82,7 +82,7 @@ pub(super) fn read(header: &Header) -> Result<(Equations, Recording), ReadError>
         runs,
         noise_along: Some(0),
         calibration: calibration(header, &names)?,
-        resolution: measured.into_iter().map(quantum).collect(),
+        resolution,
     };
     drop(table);
     Ok((equations, recording))

@@ -11,7 +11,7 @@ use missing_physics::model::{Quantity, Spec};
 
 use crate::domain::{CheckedRecording, Domain, Loaded, Template};
 use crate::plausible;
-use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution};
+use crate::reading::{GRAVITY_M_S2, calibration, check_runs, number, resolution, sensor_steps};
 use crate::recording::{Column, Header, ReadError, Table};
 pub use model::TrajectoryModel;
 use setup::PLACE;
@@ -120,13 +120,14 @@ impl Domain for Trajectory {
         let unit = if axes == Axes::Accelerometer { "m/s^2" } else { "m" };
         let mut variables = vec![Quantity::new("t_s", "s")];
         variables.extend(SPIN.iter().take(spins.len()).map(|n| Quantity::new(*n, "rad/s")));
+        let resolution = sensor_steps(&runs, columns.iter().map(|c| resolution(c)));
         let recording = Recording {
             channels: channel_names.iter().map(|n| Quantity::new(*n, unit)).collect(),
             variables,
             runs,
             noise_along: Some(0),
             calibration,
-            resolution: columns.iter().map(|c| resolution(c)).collect(),
+            resolution,
         };
         let experiments = experiments::experiments(&model, &recording);
         let hint = match axes {

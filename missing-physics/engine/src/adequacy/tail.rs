@@ -15,6 +15,7 @@ impl Null {
     pub(crate) fn new(law: Law, draws: Vec<f64>) -> Self {
         let moments = Moments::of(draws.iter().copied());
         let tail = match law {
+            Law::Sum if sees_nothing(&draws) => Tail::Constant,
             Law::Sum => Tail::sum(moments),
             Law::Largest => Tail::largest(moments),
             Law::Rare => Tail::counted(draws.iter().copied()),
@@ -31,6 +32,9 @@ impl Null {
     /// wide itself, which data do not.
     pub(crate) fn p_of_draw(&self, draw: usize) -> f64 {
         let value = self.draws[draw];
+        if matches!(self.tail, Tail::Constant) {
+            return 1.0;
+        }
         let others = || {
             let others = self.moments?.without(value);
             others.or_else(|| {
@@ -48,6 +52,15 @@ impl Null {
             (Law::Rare, _) => 1.0,
         }
     }
+}
+
+/// Whether a sum of squares, in units of the noise, is less than one in nearly all worlds: what it looks for has been fitted, as the mean of a run
+/// whose zero is free, and what is left of it is how fits end.
+fn sees_nothing(draws: &[f64]) -> bool {
+    /// Of the worlds.
+    const NEARLY_ALL: f64 = 0.99;
+    let small = draws.iter().filter(|draw| **draw < 1.0).count();
+    !draws.is_empty() && small as f64 >= NEARLY_ALL * draws.len() as f64
 }
 
 /// The upper tail of a statistic's null distribution: a gamma law with its mean and variance, or the normal law that it becomes; of the
@@ -186,6 +199,15 @@ mod tests {
         }
         // A gamma law would be too sure by far.
         assert!(sum.p(40.0) < 0.1 * largest.p(40.0));
+    }
+
+    /// What is less than the noise in nearly all worlds sees nothing, however far beyond them the data are; squares of normal numbers see.
+    #[test]
+    fn a_sum_that_is_fitted_away_sees_nothing() {
+        let squares = |scale: f64| (1..1000).map(|k| scale * f64::from(k % 37) / 37.0).collect::<Vec<f64>>();
+        let [fitted, seen] = [0.02, 4.0].map(|scale| Null::new(Law::Sum, squares(scale)));
+        assert_eq!([fitted.p(0.3), fitted.p_of_draw(5)], [1.0; 2]);
+        assert!(seen.p(60.0) < 1e-3 && seen.p_of_draw(5) < 1.0);
     }
 
     /// A statistic that varies by rounding alone (three rows, one of them a thousand times too deep) once took minutes.

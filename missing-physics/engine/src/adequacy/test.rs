@@ -30,6 +30,11 @@ const UNDIRECTED_WEIGHT: f64 = 3.0;
 /// ... and one that looks for it in one run, one stretch or at one frequency only, so much.
 const NARROW_WEIGHT: f64 = 10.0;
 
+/// The least p value that so many replicates can show.
+pub(crate) fn p_floor(replicates: usize) -> f64 {
+    1.0 / (replicates as f64 + 1.0)
+}
+
 /// Tests a fitted model against the mechanisms `rivals`, smooth functions of every variable, serial correlation, shifts of
 /// runs and of intervals, and the calibrated noise.
 pub(crate) fn test(
@@ -42,7 +47,7 @@ pub(crate) fn test(
     seed: u64,
 ) -> Result<Adequacy, PredictError> {
     let observed = residuals(problem, fit)?;
-    let floor = 1.0 / (replicates as f64 + 1.0);
+    let floor = p_floor(replicates);
     if to_the_last_digit(problem, &observed) {
         return Ok(Adequacy { p_value: 1.0, p_floor: floor, tests: Vec::new() });
     }

@@ -6,7 +6,6 @@ use crate::answer::Answer;
 use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict};
 use crate::engine::begin::{Begun, rough_sigmas};
 use crate::engine::input::{DiagnoseError, Options};
-use crate::engine::local::BesideLocal;
 use crate::estimate::limits::limits;
 use crate::experiment;
 use crate::fit::prediction::{predictions, residuals};
@@ -16,17 +15,15 @@ use crate::law::sparse::{selected, sparse};
 use crate::locate::locations::locate;
 use crate::model::{Experiment, PredictError};
 use crate::noise::rough::RoughNoise;
-use crate::noise::rule::NoiseState;
 use crate::observer::{Observer, Progress};
 use crate::problem::Problem;
 use crate::runs::contradicting::{Contradicting, contradicting};
-use crate::selection::candidate::{Candidate, candidate, nested};
+use crate::selection::candidate::{Candidate, candidate};
 use crate::selection::confusion::confusion;
 use crate::selection::held_out::held_out;
-use crate::selection::main_cause::{Judge, Judged, MainCause};
+use crate::selection::main_cause::{Judge, MainCause};
 use crate::selection::ranking::{Best, Ranking, clearly};
 use crate::selection::search::{Searched, search};
-use crate::selection::share::Cut;
 
 /// The random numbers of a law's test.
 const OF_LAW: u64 = 1 << 32;
@@ -54,7 +51,7 @@ pub(super) struct Compared {
     pub(super) ranking: Ranking,
     /// Mechanisms that could not be fitted, with the reason.
     unfitted: Vec<(usize, PredictError)>,
-    best: Option<Best>,
+    pub(super) best: Option<Best>,
     /// Sigmas of the white noise, by channel.
     pub(super) white: Vec<f64>,
     /// The noise beside which sets are judged: white, or with a correlation over a few rows.
@@ -62,14 +59,14 @@ pub(super) struct Compared {
 }
 
 /// What sets of mechanisms say of the data.
-struct Conclusion<'a> {
-    judge: Judge<'a>,
+pub(super) struct Conclusion<'a> {
+    pub(super) judge: Judge<'a>,
     /// A judge of a single run by data close to those seen, where the other names nothing.
-    near: Option<Judge<'a>>,
-    cause: Option<MainCause>,
-    explained: Option<&'a Best>,
+    pub(super) near: Option<Judge<'a>>,
+    pub(super) cause: Option<MainCause>,
+    pub(super) explained: Option<&'a Best>,
     /// What would explain the data, where less of it beside a cause in a part of them says clearly more.
-    replaced: Option<&'a Candidate>,
+    pub(super) replaced: Option<&'a Candidate>,
 }
 
 /// The way from a fitted baseline to an answer.
@@ -84,7 +81,7 @@ pub(super) struct Course<'a> {
 }
 
 impl Course<'_> {
-    fn tell(&self, stage: &str, done: f64) -> Result<(), DiagnoseError> {
+    pub(super) fn tell(&self, stage: &str, done: f64) -> Result<(), DiagnoseError> {
         tell(self.observer, stage, done)
     }
 
@@ -141,13 +138,6 @@ impl Course<'_> {
         Ok(End::Answer(Box::new(outcome)))
     }
 
-    /// Readings that were set aside, and that a conclusion's fit of all others foretells.
-    fn foretold(&self, compared: &Compared, conclusion: &Conclusion<'_>) -> Result<Vec<Place>, PredictError> {
-        let explained = || conclusion.explained.map(|best| compared.ranking.at(best.at));
-        let by = conclusion.cause.as_ref().map(|cause| &cause.chosen.candidate).or_else(explained);
-        by.map_or_else(|| Ok(Vec::new()), |by| self.begun.foretold(&by.fit))
-    }
-
     /// Every set worth looking at, the preferred one, and the noise beside which they are judged.
     fn compared(&self) -> Result<Compared, DiagnoseError> {
         let (mut ranking, unfitted) = self.compare(&self.wanted())?;
@@ -159,76 +149,6 @@ impl Course<'_> {
             (ranking, best) = (other, Some(clear));
         }
         Ok(Compared { ranking, unfitted, best, white, rough })
-    }
-
-    /// What the sets say: one that explains the data, a main cause beside a leftover or beside a cause in a part of the data, or neither.
-    fn conclusion<'c>(&'c self, compared: &'c Compared) -> Result<Conclusion<'c>, DiagnoseError> {
-        let Begun { problem, rule, baseline, .. } = self.begun;
-        let Compared { ranking, best, rough, .. } = compared;
-        let all = ranking.all();
-        let explained = self.explains(ranking, best.as_ref());
-        let sound = explained.and_then(|best| self.sound(compared, ranking.at(best.at)));
-        let (judge, cause) = match sound {
-            // What explains the data doubtfully is weighed against less of it beside a leftover.
-            Some(judge) => {
-                (judge, explained.and_then(|best| self.less_beside_a_leftover(ranking, best, rough)))
-            }
-            None => {
-                self.tell("what the closest explanation leaves", 0.0)?;
-                let judge = Judge::new(problem, rule, all, rough, |c| self.alike(c));
-                let cause = judge.main_cause();
-                (judge, cause)
-            }
-        };
-        if cause.is_none() && explained.is_none() {
-            if let Some((judge, best)) = self.differing_runs(compared) {
-                return Ok(Conclusion { judge, near: None, cause, explained: Some(best), replaced: None });
-            }
-            let near = judge.near();
-            let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
-            let cause = beside.main_cause()?.or_else(|| near.as_ref()?.main_cause());
-            return Ok(Conclusion { judge, near, cause, explained, replaced: None });
-        }
-        // What takes away nearly all of the misfit has something beside it, which an interval may well fit as well.
-        let chosen = explained.map(|best| ranking.at(best.at)).filter(|_| cause.is_none());
-        let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
-        let members = chosen.map(|set| beside.members(set)).transpose()?.flatten();
-        let Some(members) = members else {
-            return Ok(Conclusion { judge, near: None, cause, explained, replaced: None });
-        };
-        let judge = Judge::new(problem, rule, all, rough, |c| c.set.len() <= members && self.alike(c));
-        let beside = BesideLocal { problem, baseline, all, judge: &judge, noise: rough };
-        let cause = beside.main_cause()?.or_else(|| judge.main_cause());
-        Ok(Conclusion { judge, near: None, cause, explained: None, replaced: chosen })
-    }
-
-    /// The preferred set, where something in it differs from run to run and it takes away nearly all, each member most of what is left without
-    /// it; with a judge of its parts.
-    fn differing_runs<'c>(&'c self, compared: &'c Compared) -> Option<(Judge<'c>, &'c Best)> {
-        let Begun { problem, rule, .. } = self.begun;
-        let Compared { ranking, best, rough, .. } = compared;
-        let best = best.as_ref()?;
-        // What is rejected as clearly as can be is another thing, which differing runs and a mechanism imitate.
-        let floor = 1.0 / (self.options.replicates as f64 + 1.0);
-        if best.p_value <= (0.1 * clearly(self.options.alpha)).max(1.5 * floor) {
-            return None;
-        }
-        let chosen = ranking.at(best.at);
-        let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
-        let judge = (!self.alike(chosen)).then(|| Judge::new(problem, rule, ranking.all(), rough, parts))?;
-        judge.takes_nearly_all(&chosen.set).then_some((judge, best))
-    }
-
-    /// A judge of a set's parts, where the set holds: noise that is correlated as long as the runs are is no noise, and a member without
-    /// which unseen data are predicted better is imitating something else.
-    fn sound<'c>(&'c self, compared: &'c Compared, chosen: &Candidate) -> Option<Judge<'c>> {
-        let Begun { problem, rule, .. } = self.begun;
-        let Compared { ranking, white, rough, .. } = compared;
-        if slow(problem, &chosen.fit.noise, white) {
-            return None;
-        }
-        let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
-        Some(Judge::new(problem, rule, ranking.all(), rough, parts)).filter(|judge| judge.holds(&chosen.set))
     }
 
     /// The answer that follows from a conclusion.
@@ -256,7 +176,7 @@ impl Course<'_> {
             }
             (Some(cause), _, None) => {
                 let mut diagnosis = self.partly(answer, adequacy, before, ranking, &cause, rough)?;
-                diagnosis.remarks.extend(seen_near_by(answer, &judge, &cause));
+                diagnosis.remarks.extend(Self::seen_near_by(answer, &judge, &cause));
                 (diagnosis, Some(cause.chosen.least_squares))
             }
             (None, Some(chosen), _) if !self.alike(ranking.at(chosen.at)) => {
@@ -292,31 +212,6 @@ impl Course<'_> {
         Ok(Outcome { diagnosis, contradicting })
     }
 
-    /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of
-    /// what is left without them; or is that set, where the doubt is half as likely by chance.
-    fn less_beside_a_leftover(
-        &self,
-        ranking: &Ranking,
-        best: &Best,
-        rough: &RoughNoise,
-    ) -> Option<MainCause> {
-        let Begun { problem, rule, .. } = self.begun;
-        let chosen = ranking.at(best.at);
-        if best.p_value > self.options.alpha {
-            return None;
-        }
-        // Beside a leftover intervals follow from derivatives, which a threshold between two jumps has not.
-        let modes = problem.model.extensions().modes;
-        let smooth =
-            chosen.selection.added().all(|slot| modes.is_none_or(|modes| modes.jumps(slot).is_empty()));
-        let doubted = smooth && best.p_value <= 0.5 * self.options.alpha;
-        let cause = Judge::new(problem, rule, ranking.all(), rough, |c| self.alike(c)).main_cause();
-        cause.filter(|cause| {
-            let less = &cause.chosen.candidate;
-            less.set.len() < chosen.set.len() && nested(less, chosen) || doubted && less.set == chosen.set
-        })
-    }
-
     /// Errors of the baseline.
     fn before(&self, answer: &Answer<'_>) -> Result<Vec<ChannelFit>, PredictError> {
         answer.errors(&self.least_squares.fit, &held_out(&self.begun.problem, self.least_squares)?)
@@ -333,13 +228,13 @@ impl Course<'_> {
     }
 
     /// The preferred set, where it explains the data: it has been selected to fit, so that only a clear failure speaks against it.
-    fn explains<'b>(&self, ranking: &Ranking, best: Option<&'b Best>) -> Option<&'b Best> {
+    pub(super) fn explains<'b>(&self, ranking: &Ranking, best: Option<&'b Best>) -> Option<&'b Best> {
         best.filter(|b| b.p_value > clearly(self.options.alpha) && ranking.gains(b.at))
     }
 
     /// Where nothing that was asked for explains the data: what nobody has asked for, if it explains them and they are clear.
     fn unasked(&self, white: &[f64], rough: &RoughNoise) -> Result<Option<(Ranking, Best)>, DiagnoseError> {
-        let Begun { problem, rule, .. } = self.begun;
+        let Begun { problem, .. } = self.begun;
         let mechanisms = &problem.spec().mechanisms;
         if mechanisms.iter().all(|m| !m.unasked) {
             return Ok(None);
@@ -351,10 +246,8 @@ impl Course<'_> {
         let best = self.best(&mut ranking)?;
         let holds = self.explains(&ranking, best.as_ref()).is_some_and(|best| {
             let chosen = ranking.at(best.at);
-            let parts = |c: &Candidate| c.set.iter().all(|m| chosen.set.contains(m));
             chosen.set.iter().any(|&m| mechanisms[m].unasked)
-                && !slow(problem, &chosen.fit.noise, white)
-                && Judge::new(problem, rule, ranking.all(), rough, parts).holds(&chosen.set)
+                && self.sound(&ranking, chosen, (white, rough)).is_some()
         });
         Ok(best.filter(|_| holds).map(|best| (ranking, best)))
     }
@@ -423,7 +316,12 @@ impl Course<'_> {
         diagnosis.chosen = answer.ids(&chosen.set);
         diagnosis.explained_share = judge.share(&chosen.set);
         let after = predictions(problem, &chosen.fit)?;
-        if let Some(score) = ranking.score_of(&chosen.set) {
+        // Beside noise that accumulates a fit minimises what each step adds, and not the sum that its errors are of.
+        let by_its_sum = judge.least_squares(&chosen.set).filter(|_| chosen.accumulates(problem));
+        if let Some(fit) = by_its_sum {
+            let summed = Candidate { fit: fit.clone(), ..chosen.clone() };
+            diagnosis.after = answer.errors(fit, &held_out(problem, &summed)?)?;
+        } else if let Some(score) = ranking.score_of(&chosen.set) {
             diagnosis.after = answer.errors_of(&after, score);
         }
         draw(&mut diagnosis, &after);
@@ -494,7 +392,7 @@ impl Course<'_> {
 
     /// The p value of a model with a law; none where its noise is a slow error.
     fn left_by_law(&self, with_law: &Candidate, white: &[f64]) -> Result<Option<f64>, PredictError> {
-        if slow(&self.begun.problem, &with_law.fit.noise, white) {
+        if with_law.slow(&self.begun.problem, white) {
             return Ok(None);
         }
         Ok(Some(self.test(with_law, OF_LAW)?.p_value))
@@ -537,18 +435,6 @@ fn tell_law(diagnosis: &mut Diagnosis, answer: &Answer<'_>, found: Found, beside
     diagnosis.law = Some(Law { beside: answer.ids(&beside.set), ..found.law });
 }
 
-/// What is said of a main cause that was found by pieces of a single run, where whole fifths left out show less of it.
-fn seen_near_by(answer: &Answer<'_>, judge: &Judge<'_>, cause: &MainCause) -> Option<String> {
-    let Judged { candidate, cut, .. } = &cause.chosen;
-    let far = judge.share(&candidate.set).filter(|_| *cut == Cut::Hundredths)?;
-    Some(format!(
-        "{}: named by hundredths of the run, every fifth of them left out; of whole fifths left out, where what dies away lies in one of \
-         them, {:.0} % of the misfit",
-        answer.names(&candidate.set),
-        (100.0 * far).floor()
-    ))
-}
-
 /// Which sets stand whoever asked for their members: each that nobody has asked for takes away so much that a cause which is like it to
 /// a thirtieth would be told apart from it.
 fn clear_cases(problem: &Problem<'_>, all: &[Candidate], white: &[f64]) -> Result<Vec<bool>, PredictError> {
@@ -571,19 +457,6 @@ fn clear_cases(problem: &Problem<'_>, all: &[Candidate], white: &[f64]) -> Resul
         })
     };
     Ok(all.iter().zip(&squares).map(clear).collect())
-}
-
-/// Whether a channel's noise is a slow error: correlated over a good part of a run, and large beside the white noise.
-fn slow(problem: &Problem<'_>, noise: &NoiseState, white: &[f64]) -> bool {
-    /// Part of a run over which noise of an instrument may be correlated.
-    const LONG: f64 = 0.25;
-    /// Times the white noise.
-    const LARGE: f64 = 3.0;
-    (0..problem.channels()).any(|c| {
-        let shape = problem.family.shape(noise.shape[c]);
-        let rows = problem.count(c) as f64 / problem.rows.len().max(1) as f64;
-        shape.correlated > 0.0 && shape.length_steps > LONG * rows && noise.sigma[c] > LARGE * white[c]
-    })
 }
 
 /// Puts what a fit predicts into the curves.

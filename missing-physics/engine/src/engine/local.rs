@@ -133,8 +133,9 @@ impl BesideLocal<'_> {
         {
             return Ok(None);
         }
-        // What a local cause does not take away most of has another reason.
-        if chosen.smaller < SMALLER {
+        // What a local cause does not take away most of has another reason; and what predicts runs left out worse than nothing does is at work in none.
+        let worse = self.judge.share(&self.all[chosen.at].set).is_none_or(|share| share <= 0.0);
+        if chosen.smaller < SMALLER || worse {
             return Ok(None);
         }
         if !self.acts(chosen.at) {

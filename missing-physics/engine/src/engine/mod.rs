@@ -2,6 +2,7 @@
 
 pub(crate) mod begin;
 mod between_runs;
+mod conclusion;
 mod course;
 mod input;
 mod local;

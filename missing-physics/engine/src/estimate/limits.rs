@@ -16,8 +16,12 @@ pub(crate) fn limits(problem: &Problem<'_>, rule: &NoiseRule, baseline: &Candida
         let Ok(fitted) = candidate(problem, rule, &[m], &[], &baseline.fit, &[]) else { return Vec::new() };
         let beside =
             |p: &&usize| mechanism.shape_parameters.contains(p) || mechanism.integer_parameters.contains(p);
-        let no_size: Vec<&str> =
-            mechanism.parameters.iter().filter(beside).map(|&p| spec.parameters[p].name.as_str()).collect();
+        // What follows from a mechanism and is there without it is none of its sizes.
+        let there = mechanism.derived.iter().filter(|derived| (derived.value)(&baseline.fit.shared) != 0.0);
+        let no_size: Vec<&str> = (mechanism.parameters.iter().filter(beside))
+            .map(|&p| spec.parameters[p].name.as_str())
+            .chain(there.map(|derived| derived.name.as_str()))
+            .collect();
         of_mechanism(problem, &fitted, mechanism, rule, false)
             .into_iter()
             .filter(|e| !no_size.contains(&e.name.as_str()))

@@ -29,6 +29,10 @@ pub(crate) fn extended(
     }
     // What is added is off at first, and the rest where it was without it.
     let Ok(fitted) = candidate(&wide, rule, &start.set, &[], &near, &[vec![]]) else { return Ok(None) };
+    // At a bound a law is a part of another one.
+    if fitted.fit.at_bound.iter().any(|slot| *slot >= model.inner_shared) {
+        return Ok(None);
+    }
     let Ok(score) = held_out(&wide, &fitted) else { return Ok(None) };
     if !improves(seen, &score) {
         return Ok(None);

@@ -57,6 +57,11 @@ pub trait ErrorModel: Sync {
         None
     }
 
+    /// What scatters in those steps, in words ("the logarithm of the restitution").
+    fn step(&self) -> &str {
+        "the step"
+    }
+
     /// The largest standard deviation that such a step may have; what is larger is physics. No limit by default.
     fn largest_step(&self) -> f64 {
         f64::INFINITY

@@ -82,6 +82,9 @@ const LENGTHS: Axis = Axis { from: 0.69, step: 0.05, count: 55 };
 
 /// Logarithms of the size of accumulated errors in white sigmas: 0.03 to 400.
 const SIZES: Axis = Axis { from: -3.5, step: 0.1, count: 96 };
+/// Correlations of neighbouring steps of errors that accumulate: what remembers more than a step or two is no scatter, but differs from run
+/// to run.
+const MEMORIES: Axis = Axis { from: 0.0, step: 0.1, count: 7 };
 /// Sizes of accumulated errors that are tried one by one.
 const FEW_SIZES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
@@ -102,13 +105,14 @@ impl Kind {
             Self::Rough | Self::ByRow => [WHOLE, CORRELATIONS],
             Self::Mixed => [SHARES, MIXED_CORRELATIONS],
             Self::Smooth => [SHARES, LENGTHS],
-            Self::Accumulated => [WHOLE, SIZES],
+            Self::Accumulated => [MEMORIES, SIZES],
         }
     }
 
+    /// The shape at a point of the axes.
     fn shape(self, log_odds: f64, length: f64) -> Shape {
         if self == Self::Accumulated {
-            return Shape { accumulated: length.exp(), ..Shape::WHITE };
+            return Shape { accumulated: length.exp(), memory: log_odds, ..Shape::WHITE };
         }
         let smooth = self == Self::Smooth;
         let length_steps = if smooth { length.exp() } else { -1.0 / length.tanh().ln() };
@@ -168,8 +172,11 @@ impl Family {
         let Some(lattice) = self.lattices.iter().find(|l| Some(l.kind) == Kind::of(shape)) else {
             return Vec::new();
         };
-        let log_odds = (shape.correlated / (1.0 - shape.correlated)).ln();
-        let i = if lattice.shares.count == 1 { 0 } else { lattice.shares.nearest(log_odds) };
+        let share = match lattice.kind {
+            Kind::Accumulated => shape.memory,
+            _ => (shape.correlated / (1.0 - shape.correlated)).ln(),
+        };
+        let i = if lattice.shares.count == 1 { 0 } else { lattice.shares.nearest(share) };
         let length = match lattice.kind {
             Kind::Accumulated => shape.accumulated.ln(),
             Kind::Smooth => shape.length_steps.ln(),
@@ -265,6 +272,7 @@ mod tests {
                 let odds = |s: &Shape| (s.correlated / (1.0 - s.correlated).max(1e-12)).ln();
                 let accumulates = shape.accumulated > 0.0;
                 assert!(accumulates || (odds(&shape) - odds(&centre)).abs() < 0.11);
+                assert!((shape.memory - centre.memory).abs() < 0.11);
                 let size = |s: &Shape| if s.accumulated > 0.0 { s.accumulated } else { s.length_steps };
                 assert!((size(&shape) / size(&centre)).ln().abs() < 0.5);
             }

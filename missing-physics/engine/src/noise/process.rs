@@ -25,12 +25,20 @@ pub struct Shape {
     /// How large the errors are that accumulate along a run as the model says, beside white noise: ratio of their root mean square to
     /// its sigma.
     pub accumulated: f64,
+    /// Correlation of neighbouring steps of those errors: what scatters remembers.
+    pub memory: f64,
 }
 
 impl Shape {
     /// White noise.
-    pub const WHITE: Self =
-        Self { correlated: 0.0, length_steps: 0.0, smooth: false, by_row: false, accumulated: 0.0 };
+    pub const WHITE: Self = Self {
+        correlated: 0.0,
+        length_steps: 0.0,
+        smooth: false,
+        by_row: false,
+        accumulated: 0.0,
+        memory: 0.0,
+    };
 
     /// Share of the variance that is correlated, and over how many steps, in runs of so many: errors that accumulate are, over a run.
     pub fn correlation(&self, steps: f64) -> (f64, f64) {
@@ -60,7 +68,7 @@ impl Shape {
     /// slow effect) has to show most.
     pub fn log_prior(&self) -> f64 {
         if self.accumulated > 0.0 {
-            -1.0
+            if self.memory > 0.0 { -2.0 } else { -1.0 }
         } else if self.correlated <= 0.0 {
             0.0
         } else if self.correlated >= 1.0 && !self.smooth {
@@ -151,13 +159,15 @@ impl Whitener {
         Self { steps, kind, root: Vec::new(), log_determinant }
     }
 
-    /// A whitener for white noise of unit variance and errors that accumulate: `accumulated[row]` times independent standard normal
-    /// numbers, as many in each row. Of white noise alone where these are no numbers.
-    pub fn of_accumulated(accumulated: &[Vec<f64>]) -> Self {
+    /// A whitener for white noise of unit variance and errors that accumulate: `accumulated[row]` times standard normal numbers, as many
+    /// in each row, of which neighbours are correlated by `memory`, and others by its powers. Of white noise alone where these are no
+    /// numbers.
+    pub fn of_accumulated(accumulated: &[Vec<f64>], memory: f64) -> Self {
         let n = accumulated.len();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let one = |i: usize, j: usize| f64::from(u8::from(i == j));
-        let covariance = DMatrix::from_fn(n, n, |i, j| one(i, j) + dot(&accumulated[i], &accumulated[j]));
+        let steps = accumulated.first().map_or(0, Vec::len);
+        let adds = DMatrix::from_fn(n, steps, |row, step| accumulated[row][step]);
+        let alike = DMatrix::from_fn(steps, steps, |i, j| memory.powi(i.abs_diff(j) as i32));
+        let covariance = DMatrix::identity(n, n) + &adds * alike * adds.transpose();
         let Some(factor) = covariance.cholesky() else {
             return Self { steps: Vec::new(), kind: Kind::White, root: Vec::new(), log_determinant: 0.0 };
         };
@@ -381,18 +391,29 @@ mod tests {
         }
     }
 
-    /// Errors that accumulate: the dense covariance again, and a shift of one row as whitening shows it.
+    /// Errors that accumulate, of steps that forget or remember: the dense covariance again, and a shift of one row as whitening shows it.
     #[test]
     fn accumulated_errors_are_whitened_by_their_covariance() {
+        for memory in [0.0, 0.6] {
+            accumulated_errors_with(memory);
+        }
+    }
+
+    fn accumulated_errors_with(memory: f64) {
         let accumulated: Vec<Vec<f64>> = (0..9)
             .map(|row| (0..7).map(|step| 0.4 * f64::from((row - step).max(0)).powf(1.3)).collect())
             .collect();
         let dense = DMatrix::from_fn(9, 9, |i, j| {
-            let shared: f64 = accumulated[i].iter().zip(&accumulated[j]).map(|(a, b)| a * b).sum();
-            shared + f64::from(u8::from(i == j))
+            let mut shared = f64::from(u8::from(i == j));
+            for (step, a) in accumulated[i].iter().enumerate() {
+                for (other, b) in accumulated[j].iter().enumerate() {
+                    shared += a * b * memory.powf((step as f64 - other as f64).abs());
+                }
+            }
+            shared
         });
         let factor = dense.cholesky().expect("positive definite");
-        let whitener = Whitener::of_accumulated(&accumulated);
+        let whitener = Whitener::of_accumulated(&accumulated, memory);
         let y = DVector::from_fn(9, |i, _| (1.7 * i as f64).cos());
         let mut white = y.as_slice().to_vec();
         whitener.whiten(&mut white);

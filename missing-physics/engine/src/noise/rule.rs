@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use crate::model::FEWEST_RUNS_THAT_DIFFER;
 use crate::noise::process::Shape;
 use crate::problem::Problem;
 
@@ -30,6 +31,8 @@ pub(crate) struct NoiseRule {
     pub(crate) against_colour: f64,
     /// The largest product of a channel's sigma and the size of accumulated errors that is believed; `None` where none accumulate.
     pub(crate) most_accumulated: Vec<Option<f64>>,
+    /// Whether steps of accumulated errors may be alike: in too few runs such errors look like what a model lacks.
+    pub(crate) may_remember: bool,
     /// The smallest sigma that is believed, by channel (a reading has a last digit).
     pub(crate) floor: Vec<f64>,
 }
@@ -43,7 +46,7 @@ impl NoiseRule {
 
     /// Whether a shape between the allowed ones may be chosen.
     pub(crate) fn admits(&self, shape: &Shape) -> bool {
-        shape.length_steps <= self.longest
+        shape.length_steps <= self.longest && (shape.memory <= 0.0 || self.may_remember)
     }
 
     /// The rule beside a leftover: what is known of a channel's noise is only the least that there is.
@@ -138,6 +141,7 @@ pub(crate) fn noise_rule(problem: &Problem<'_>) -> NoiseRule {
             .collect(),
         longest,
         most_accumulated,
+        may_remember: problem.rows.len() >= FEWEST_RUNS_THAT_DIFFER,
         floor,
     }
 }

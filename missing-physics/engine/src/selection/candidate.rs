@@ -219,6 +219,25 @@ fn begun(
 }
 
 impl Candidate {
+    /// Whether a channel's noise is a slow error: correlated over a good part of a run, and large beside the white noise.
+    pub(crate) fn slow(&self, problem: &Problem<'_>, white: &[f64]) -> bool {
+        /// Part of a run over which noise of an instrument may be correlated.
+        const LONG: f64 = 0.25;
+        /// Times the white noise.
+        const LARGE: f64 = 3.0;
+        let noise = &self.fit.noise;
+        (0..problem.channels()).any(|c| {
+            let shape = problem.family.shape(noise.shape[c]);
+            let rows = problem.count(c) as f64 / problem.rows.len().max(1) as f64;
+            shape.correlated > 0.0 && shape.length_steps > LONG * rows && noise.sigma[c] > LARGE * white[c]
+        })
+    }
+
+    /// Whether errors accumulate in its noise.
+    pub(crate) fn accumulates(&self, problem: &Problem<'_>) -> bool {
+        self.fit.noise.shape.iter().any(|&shape| problem.family.shape(shape).accumulated > 0.0)
+    }
+
     /// Takes the place of a worse fit of this set: whole numbers that it left open stay so where they are likely still.
     pub(crate) fn in_place_of(mut self, worse: Self, problem: &Problem<'_>, rule: &NoiseRule) -> Self {
         let integers = problem.integer_slots(&self.set);

@@ -7,14 +7,7 @@ use super::*;
 #[test]
 fn impacts_of_which_only_arrivals_are_known_are_rows_too() {
     let corners = [[0.0, 0.0, 0.1], [0.6, 0.0, 0.1], [0.6, 0.6, 0.1], [0.0, 0.6, 0.1]];
-    let spread = Spread {
-        time_s: 3e-5,
-        place_m: [1e-3; 2],
-        kappa: 1e4,
-        approach_rad: 0.01,
-        restitution: 0.0,
-        between_drops: 0.0,
-    };
+    let spread = Spread::heard(1e-3);
     let numbers: Vec<f64> = (1..=6).map(f64::from).collect();
     for (count, rows, spare) in [(4, 6, 1), (3, 4, 0)] {
         let microphones = Microphones { places_m: corners[..count].to_vec(), speed_of_sound_m_s: 340.0 };
