@@ -55,6 +55,16 @@ fn assert_found(world: &Concealed) {
     assert!((from - hidden.from).abs() < CLOSE * extent, "{from} m, and not {} m", hidden.from);
 }
 
+/// A hull that rolls, of whose law no test can be made, since the hull capsizes under what is near by: the law is said, and no answer is lost by it.
+#[test]
+fn a_law_under_which_a_hull_nearly_capsizes_is_said() {
+    let maker = makers().iter().find(|maker| maker.domain() == "motion").unwrap();
+    let world = maker.conceal(Hidden::Imitated, 17_210_609_811_643_631_418);
+    let (_, answer) = diagnosed(&world);
+    assert!(answer.chosen.is_empty());
+    assert!(answer.law.is_some_and(|law| law.p_value.is_none()));
+}
+
 /// Each at the impact before it or the one after it, and nothing else.
 #[test]
 fn impacts_that_went_unheard_are_found_one_by_one() {

@@ -383,19 +383,18 @@ impl Course<'_> {
         }
         if let Some((mut found, beside)) = found {
             if let Some(with_law) = &found.of_terms {
-                found.law.p_value = self.left_by_law(with_law, white)?;
+                found.law.p_value = self.left_by_law(with_law, white);
             }
             tell_law(diagnosis, answer, found, beside);
         }
         Ok(())
     }
 
-    /// The p value of a model with a law; none where its noise is a slow error.
-    fn left_by_law(&self, with_law: &Candidate, white: &[f64]) -> Result<Option<f64>, PredictError> {
-        if with_law.slow(&self.begun.problem, white) {
-            return Ok(None);
-        }
-        Ok(Some(self.test(with_law, OF_LAW)?.p_value))
+    /// The p value of a model with a law; none where its noise is a slow error, or where alternatives near by predict nothing, as where what is
+    /// simulated runs away under the law.
+    fn left_by_law(&self, with_law: &Candidate, white: &[f64]) -> Option<f64> {
+        let tested = || self.test(with_law, OF_LAW).ok();
+        (!with_law.slow(&self.begun.problem, white)).then(tested)?.map(|test| test.p_value)
     }
 
     /// A law of candidate terms, no more of them than a main cause has members, that leaves nothing where that cause leaves something: then the
@@ -416,7 +415,7 @@ impl Course<'_> {
         if !nearer || law.score.log_score <= with_cause.log_score + LEAST_GAIN {
             return Ok(None);
         }
-        let Some(p_value) = self.left_by_law(&law.fitted, white)? else { return Ok(None) };
+        let Some(p_value) = self.left_by_law(&law.fitted, white) else { return Ok(None) };
         if p_value <= clearly(self.options.alpha) {
             return Ok(None);
         }
