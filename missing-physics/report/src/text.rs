@@ -217,8 +217,8 @@ pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
     format!(
         "{}: measured less simulated is {} on average, at most {} ({:.0} sigma, {:.0} % of the misfit)",
         place_words(d, l),
-        in_unit(mean, 2, &unit),
-        in_unit(l.largest_residual, 2, &unit),
+        in_unit(mean, 2, unit),
+        in_unit(l.largest_residual, 2, unit),
         l.z,
         100.0 * l.share,
     )
@@ -240,7 +240,7 @@ pub(super) fn as_if(d: &Diagnosis) -> Vec<String> {
 /// What the chosen mechanisms leave, in one sentence.
 pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
     let unit = unit_of(d, &l.channel);
-    let (left, noise) = (in_unit(l.rms, 2, &unit), in_unit(l.sigma, 2, &unit));
+    let (left, noise) = (in_unit(l.rms, 2, unit), in_unit(l.sigma, 2, unit));
     format!("{}: {left} rms is left, beside noise of {noise}", place_words(d, l))
 }
 
@@ -313,9 +313,9 @@ pub(super) fn limits(d: &Diagnosis) -> Vec<String> {
     lines.into_iter().map(|(id, sizes)| format!("{id}: {}", sizes.join(", "))).collect()
 }
 
-fn unit_of(d: &Diagnosis, name: &str) -> String {
-    let known = d.channels.iter().chain(&d.variables).find(|(n, _)| n == name);
-    known.map(|(_, u)| u.clone()).unwrap_or_default()
+/// The unit of a channel or a variable; nothing where it has none.
+fn unit_of<'d>(d: &'d Diagnosis, name: &str) -> &'d str {
+    d.channels.iter().chain(&d.variables).find(|(n, _)| n == name).map_or("", |(_, unit)| unit.as_str())
 }
 
 /// Channel, runs and interval of a place.
@@ -365,8 +365,6 @@ fn better(d: &Diagnosis) -> Vec<String> {
     if d.chosen.is_empty() && d.law.is_none() {
         return Vec::new();
     }
-    let unit =
-        |name: &str| d.channels.iter().find(|(n, _)| n == name).map(|(_, u)| u.clone()).unwrap_or_default();
     let unseen = if d.curves.len() > 1 { "runs left out" } else { "the part left out" };
     d.before
         .iter()
@@ -378,13 +376,13 @@ fn better(d: &Diagnosis) -> Vec<String> {
                     Some(scatter) => (scatter.white, "noise of each reading"),
                     None => (n.sigma, "noise"),
                 };
-                format!(" ({of} {})", in_unit(sigma, 2, &unit(&n.channel)))
+                format!(" ({of} {})", in_unit(sigma, 2, unit_of(d, &n.channel)))
             });
             format!(
                 "{}: error on {unseen} {} -> {}{noise}",
                 before.channel,
                 significant(before.heldout_rmse, 3),
-                in_unit(after.heldout_rmse, 3, &unit(&before.channel)),
+                in_unit(after.heldout_rmse, 3, unit_of(d, &before.channel)),
             )
         })
         .collect()
@@ -399,8 +397,8 @@ fn slow_errors(d: &Diagnosis) -> Option<String> {
         |n: &&ChannelNoise| n.scatter.is_none() && n.correlated_share > 0.5 && n.correlation_rows > SLOW;
     let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
     let of = |n: &ChannelNoise| {
-        let unit = d.channels.iter().find(|(c, _)| *c == n.channel).map_or("", |(_, u)| u.as_str());
-        let (size, over) = (in_unit(n.sigma, 2, unit), significant(n.correlation_length, 2));
+        let (size, over) =
+            (in_unit(n.sigma, 2, unit_of(d, &n.channel)), significant(n.correlation_length, 2));
         format!("an error of {} of {size} that varies over {over} {along}", n.channel)
     };
     let all: Vec<String> = d.noise.iter().filter(slow).map(of).collect();
@@ -409,7 +407,7 @@ fn slow_errors(d: &Diagnosis) -> Option<String> {
 
 /// A channel's noise, in one sentence.
 pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
-    let unit = d.channels.iter().find(|(c, _)| *c == n.channel).map(|(_, u)| u.clone()).unwrap_or_default();
+    let unit = unit_of(d, &n.channel);
     if let Some(s) = &n.scatter {
         let alike = if s.memory > 0.0 {
             format!(", neighbours alike by {}", significant(s.memory, 2))
@@ -419,7 +417,7 @@ pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
         return format!(
             "{}: {} of each reading, and what adds up along a run: {} scatters by {}{alike} (from {})",
             n.channel,
-            in_unit(s.white, 2, &unit),
+            in_unit(s.white, 2, unit),
             s.of,
             significant(s.sigma, 2),
             n.source.word()
@@ -434,7 +432,7 @@ pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
     } else {
         ", white".into()
     };
-    format!("{}: {}{colour} (from {})", n.channel, in_unit(n.sigma, 2, &unit), n.source.word())
+    format!("{}: {}{colour} (from {})", n.channel, in_unit(n.sigma, 2, unit), n.source.word())
 }
 
 struct Page(String);

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 use serde_json::Value;
 
-use super::simulated::{answer_in, assert_named, follow};
+use super::simulated::{answer_in, assert_named, follow, interval};
 
 /// What bends a flight beside gravity, and the picture.
 #[derive(Clone, Copy, Default)]
@@ -65,8 +65,6 @@ fn what_bends_a_flight_in_the_picture_is_named() {
 fn the_drag_beside_a_wind_has_its_size() {
     let answer = diagnosed(Hidden { drag_per_m: 0.03, wind_m_s: 3.0, ..Hidden::default() });
     assert_named(&answer, &[("wind", 3.0)]);
-    let mechanisms = answer["mechanisms"].as_array().unwrap();
-    let drag = mechanisms.iter().find(|m| m["id"] == "quadratic-drag").unwrap();
-    let [low, high] = [0, 1].map(|end| drag["parameters"][0]["ci95"][end].as_f64().unwrap());
-    assert!((low..high).contains(&0.03) && high - low < 0.005, "{drag}");
+    let drag = interval(&answer, "quadratic-drag");
+    assert!(drag.contains(&0.03) && drag.end - drag.start < 0.005, "{drag:?}");
 }

@@ -1,6 +1,7 @@
 //! Simulated machines, and what the tool says of them.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+use std::ops::Range;
 use std::process::Command;
 
 use serde_json::Value;
@@ -21,6 +22,13 @@ pub(super) fn answer_in(domain: &str, header: &str, data: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
+/// The interval of a mechanism's first parameter.
+pub(super) fn interval(answer: &Value, id: &str) -> Range<f64> {
+    let of = answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == id).unwrap();
+    let [low, high] = [0, 1].map(|end| of["parameters"][0]["ci95"][end].as_f64().unwrap());
+    low..high
+}
+
 /// The mechanisms that an answer names are these, and the interval of the first parameter of each holds its value.
 pub(super) fn assert_named(answer: &Value, truth: &[(&str, f64)]) {
     let named: Vec<&str> =
@@ -28,10 +36,8 @@ pub(super) fn assert_named(answer: &Value, truth: &[(&str, f64)]) {
     let expected: Vec<&str> = truth.iter().map(|t| t.0).collect();
     assert_eq!(named, expected, "{}", answer["verdict"]);
     for (id, value) in truth {
-        let of = answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == *id).unwrap();
-        let interval = &of["parameters"][0]["ci95"];
-        let [low, high] = [0, 1].map(|end| interval[end].as_f64().unwrap());
-        assert!((low..high).contains(value), "{id}: {value}, {interval}");
+        let interval = interval(answer, id);
+        assert!(interval.contains(value), "{id}: {value}, {interval:?}");
     }
 }
 

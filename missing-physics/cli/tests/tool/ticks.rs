@@ -8,7 +8,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::simulated::{answer, answer_in};
+use super::simulated::{answer, answer_in, interval};
 
 const FLYWHEEL: &str = r#"
 [model]
@@ -42,10 +42,8 @@ fn the_damping_of_a_wheel_is_found_from_the_times_of_its_ticks() {
     let answer = answer(FLYWHEEL, &data);
     let names = format!("{}{}", answer["chosen"], answer["confused_with"]);
     assert!(names.contains("quadratic-damping"), "{}: {names}", answer["verdict"]);
-    let of =
-        answer["mechanisms"].as_array().unwrap().iter().find(|m| m["id"] == "quadratic-damping").unwrap();
-    let [low, high] = [0, 1].map(|end| of["parameters"][0]["ci95"][end].as_f64().unwrap());
-    assert!((low..high).contains(&coefficient) && high - low < 0.2 * coefficient, "{low} to {high}");
+    let found = interval(&answer, "quadratic-damping");
+    assert!(found.contains(&coefficient) && found.end - found.start < 0.2 * coefficient, "{found:?}");
 }
 
 /// A fence of bars that falls through a light gate.

@@ -33,9 +33,8 @@ pub(super) struct TimesModel {
     scattered: HashMap<String, Vec<Vec<f64>>>,
 }
 
-/// Impacts over which errors may hang together where there is one drop: heard ones, by their fading loudness, and any whose size is
-/// stated ...
-const LONGEST_IN_ONE: f64 = 3.0;
+/// Impacts over which errors may hang together: heard ones, by their fading loudness, and any whose size is stated ...
+const LONGEST_HEARD: f64 = 3.0;
 /// ... and those that were marked one by one, of a size that is not known: neighbours alike by a third (exp(-1)).
 const LONGEST_MARKED: f64 = 1.0;
 
@@ -51,7 +50,7 @@ impl TimesModel {
     /// `stated`: whether the clock's sigma is.
     pub(super) fn new(setup: Setup, restitution: f64, height_m: Option<f64>, stated: bool) -> Self {
         let (spec, layout, begins, leaves) = build_times(&setup, restitution);
-        let longest_noise = if setup.listened || stated { LONGEST_IN_ONE } else { LONGEST_MARKED };
+        let longest_noise = if setup.listened || stated { LONGEST_HEARD } else { LONGEST_MARKED };
         let largest_scatter = if setup.unheard[1] > 1 { f64::INFINITY } else { SCATTER_IN_ONE };
         let scattered = HashMap::new();
         Self { setup, spec, layout, begins, leaves, height_m, longest_noise, largest_scatter, scattered }
@@ -257,7 +256,7 @@ impl Model for TimesModel {
 }
 
 impl ErrorModel for TimesModel {
-    /// Over many drops a wandering error averages out; in a single one it would hide all physics, and is taken for none.
+    /// An error that wanders along a drop would hide all physics; what adds up along it is a scatter of the restitution.
     fn longest_correlation(&self) -> f64 {
         self.longest_noise
     }

@@ -109,14 +109,14 @@ impl Kind {
         }
     }
 
-    /// The shape at a point of the axes.
-    fn shape(self, log_odds: f64, length: f64) -> Shape {
+    /// The shape at a point of the axes: log odds of the correlated share, or the memory of errors that accumulate, and length, or their size.
+    fn shape(self, share: f64, length: f64) -> Shape {
         if self == Self::Accumulated {
-            return Shape { accumulated: length.exp(), memory: log_odds, ..Shape::WHITE };
+            return Shape { accumulated: length.exp(), memory: share, ..Shape::WHITE };
         }
         let smooth = self == Self::Smooth;
         let length_steps = if smooth { length.exp() } else { -1.0 / length.tanh().ln() };
-        let correlated = if log_odds.is_finite() { 1.0 / (1.0 + (-log_odds).exp()) } else { 1.0 };
+        let correlated = if share.is_finite() { 1.0 / (1.0 + (-share).exp()) } else { 1.0 };
         Shape { correlated, length_steps, smooth, by_row: self == Self::ByRow, ..Shape::WHITE }
     }
 }
