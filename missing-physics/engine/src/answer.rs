@@ -261,12 +261,13 @@ impl Answer<'_> {
         best: Option<&Best>,
     ) -> Result<Vec<MechanismReport>, PredictError> {
         let sets: Vec<(&Candidate, f64)> = ranking.physical().collect();
-        let Some(best) = best.map(|b| ranking.at(b.at)) else {
-            return Ok(self.reports(ranking, None, &sets, false));
-        };
-        let open = with_open_noise(self.problem, self.rule, best);
-        let (reported, between_runs) = self.allowing_for_runs(open.as_ref().unwrap_or(best))?;
-        Ok(self.reports(ranking, Some(&reported), &sets, between_runs.is_empty()))
+        let Some(best) = best else { return Ok(self.reports(ranking, &[], &sets, false)) };
+        let chosen = ranking.at(best.at);
+        let open = with_open_noise(self.problem, self.rule, chosen);
+        let (reported, between_runs) = self.allowing_for_runs(open.as_ref().unwrap_or(chosen))?;
+        let rivals = ranking.rivals(best).into_iter().filter(|c| c.set != chosen.set);
+        let answer: Vec<&Candidate> = std::iter::once(&reported).chain(rivals).collect();
+        Ok(self.reports(ranking, &answer, &sets, between_runs.is_empty()))
     }
 
     /// The same where a leftover is in the model: of all sets, the main cause and its rivals count.
@@ -279,18 +280,19 @@ impl Answer<'_> {
         let evidence: Vec<f64> = all().map(|c| c.evidence).collect();
         let sets: Vec<(&Candidate, f64)> = all().zip(probabilities(&evidence)).collect();
         let (reported, _) = self.allowing_for_runs(&cause.chosen.candidate)?;
-        Ok(self.reports(ranking, Some(&reported), &sets, false))
+        Ok(self.reports(ranking, &[&reported], &sets, false))
     }
 
+    /// Every mechanism: as it is in the answer, the preferred set and then its rivals, else in the likeliest set that has it.
     fn reports(
         &self,
         ranking: &Ranking,
-        best: Option<&Candidate>,
+        answer: &[&Candidate],
         sets: &[(&Candidate, f64)],
         profile: bool,
     ) -> Vec<MechanismReport> {
         let mut reports: Vec<MechanismReport> = (self.problem.spec().named().into_iter())
-            .filter_map(|m| self.mechanism(m, ranking, best, sets, profile))
+            .filter_map(|m| self.mechanism(m, ranking, answer, sets, profile))
             .collect();
         reports.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         reports
@@ -300,7 +302,7 @@ impl Answer<'_> {
         &self,
         m: usize,
         ranking: &Ranking,
-        best: Option<&Candidate>,
+        answer: &[&Candidate],
         sets: &[(&Candidate, f64)],
         profile: bool,
     ) -> Option<MechanismReport> {
@@ -308,10 +310,10 @@ impl Answer<'_> {
         let alone = ranking.of(&[m]);
         // Beside one that brings it along as a companion a mechanism is at work without being a member.
         let holds = |c: &&Candidate| self.problem.at_work(&c.set).contains(&m);
-        let holder = best.filter(holds).or_else(|| sets.iter().map(|p| p.0).find(holds)).or(alone)?;
+        let holder = answer.iter().copied().chain(sets.iter().map(|p| p.0)).find(holds).or(alone)?;
         let scored = if ranking.score_of(&holder.set).is_some() { &holder.set[..] } else { &[m] };
         let score = ranking.score_of(scored);
-        let profile = profile && best.is_some_and(|b| b.set == holder.set);
+        let profile = profile && answer.first().is_some_and(|best| best.set == holder.set);
         let holding = sets.iter().filter(|(c, _)| holds(c));
         let channels = &self.problem.recording.channels;
         Some(MechanismReport {

@@ -22,8 +22,8 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
         page.entry("where", &where_sentence(d, place));
     }
     as_if(d).into_iter().for_each(|line| page.entry("where", &line));
-    for line in what(d) {
-        page.entry("what", &line);
+    for (label, line) in what(d) {
+        page.entry(label, &line);
     }
     for line in closest(d) {
         page.entry("closest", &line);
@@ -37,8 +37,8 @@ pub fn text(d: &Diagnosis, _: &ReportContext) -> String {
             page.entry("law", &left);
         }
     }
-    for line in better(d) {
-        page.entry("better", &line);
+    for (label, line) in unseen_errors(d) {
+        page.entry(label, &line);
     }
     for place in d.leftover.iter().take(3) {
         page.entry("left", &leftover_sentence(d, place));
@@ -105,13 +105,16 @@ pub fn tried(d: &Diagnosis) -> Vec<String> {
 /// The verdict in one sentence.
 pub(super) fn headline(d: &Diagnosis) -> String {
     let p = p_value(d);
+    let if_noise = slow_errors(d).map(|slow| format!(", if {slow} is noise"));
+    let provided = if_noise.as_deref().unwrap_or_default();
     match d.verdict {
-        Verdict::Adequate => match slow_errors(d) {
-            Some(slow) => format!("The simulation explains this recording, if {slow} is noise ({p})."),
-            None => format!("The simulation explains this recording to within its noise ({p})."),
-        },
+        Verdict::Adequate => {
+            let within = if_noise.as_deref().unwrap_or(" to within its noise");
+            format!("The simulation explains this recording{within} ({p}).")
+        }
         Verdict::Explained => {
-            format!("The simulation does not explain this recording ({p}); {} does.", named(d, &d.chosen))
+            let named = named(d, &d.chosen);
+            format!("The simulation does not explain this recording ({p}); {named} does{provided}.")
         }
         Verdict::Partly => {
             let sets: Vec<String> =
@@ -128,7 +131,7 @@ pub(super) fn headline(d: &Diagnosis) -> String {
             let sets: Vec<String> =
                 std::iter::once(&d.chosen).chain(&d.confused_with).map(|s| named(d, s)).collect();
             format!(
-                "The simulation does not explain this recording ({p}); {} explain it equally well.",
+                "The simulation does not explain this recording ({p}); {} explain it equally well{provided}.",
                 listed(&sets)
             )
         }
@@ -343,25 +346,26 @@ fn place_words(d: &Diagnosis, l: &Location) -> String {
     format!("{}, {runs}{interval}", l.channel)
 }
 
-fn what(d: &Diagnosis) -> Vec<String> {
+/// The mechanisms of the answer, then others that are probable beside them.
+fn what(d: &Diagnosis) -> Vec<(&'static str, String)> {
     if d.verdict == Verdict::Adequate {
         return Vec::new();
     }
-    let said = |m: &&MechanismReport| {
-        let in_answer = d.chosen.contains(&m.id) || d.confused_with.iter().flatten().any(|id| *id == m.id);
-        in_answer || (m.probability > 0.05 && d.verdict != Verdict::Unexplained)
+    let in_answer = |m: &MechanismReport| {
+        d.chosen.contains(&m.id) || d.confused_with.iter().flatten().any(|id| *id == m.id)
     };
-    d.mechanisms
-        .iter()
-        .filter(said)
-        .map(|m| {
-            let parameters: Vec<String> = m.parameters.iter().map(estimate).collect();
-            format!("{}: {}; probability {}", m.name, parameters.join(", "), probability(m.probability))
-        })
-        .collect()
+    let line = |m: &MechanismReport| {
+        let parameters: Vec<String> = m.parameters.iter().map(estimate).collect();
+        format!("{}: {}; probability {}", m.name, parameters.join(", "), probability(m.probability))
+    };
+    let (named, others): (Vec<_>, Vec<_>) = d.mechanisms.iter().partition(|m| in_answer(m));
+    let probable = |m: &&MechanismReport| m.probability > 0.05 && d.verdict != Verdict::Unexplained;
+    let named = named.into_iter().map(|m| ("what", line(m)));
+    named.chain(others.into_iter().filter(probable).map(|m| ("also", line(m)))).collect()
 }
 
-fn better(d: &Diagnosis) -> Vec<String> {
+/// Errors of unseen data before and after, by channel, each with what the one is beside the other.
+fn unseen_errors(d: &Diagnosis) -> Vec<(&'static str, String)> {
     if d.chosen.is_empty() && d.law.is_none() {
         return Vec::new();
     }
@@ -378,12 +382,13 @@ fn better(d: &Diagnosis) -> Vec<String> {
                 };
                 format!(" ({of} {})", in_unit(sigma, 2, unit_of(d, &n.channel)))
             });
-            format!(
+            let line = format!(
                 "{}: error on {unseen} {} -> {}{noise}",
                 before.channel,
                 significant(before.heldout_rmse, 3),
                 in_unit(after.heldout_rmse, 3, unit_of(d, &before.channel)),
-            )
+            );
+            (if after.heldout_rmse > before.heldout_rmse { "worse" } else { "better" }, line)
         })
         .collect()
 }

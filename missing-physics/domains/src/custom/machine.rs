@@ -71,7 +71,7 @@ pub(super) fn declare(
         if name.is_empty() || machine.names.iter().any(|n| n == name) {
             return Err(section.unfit("name", quoted(name), expected));
         }
-        let (sizes, has) = joint(header, section, channels, runs)?;
+        let (sizes, has) = joint(header, section, channels, runs, clock.step_s)?;
         let without = section.texts("without")?.unwrap_or_default();
         let at = machine.joints.len();
         let mut carrier = Carrier {
@@ -110,6 +110,7 @@ fn joint(
     section: &Section<'_>,
     channels: &[Quantity],
     runs: &[Run],
+    step_s: f64,
 ) -> Result<(JointSizes, JointHas), ReadError> {
     let position = section.text("position", "the name of its position")?;
     let channel = channels.iter().position(|c| c.name == position);
@@ -147,7 +148,7 @@ fn joint(
     let turns = section.flag("turns")?.unwrap_or(false);
     let reach = range[0].abs().max(range[1].abs());
     let units = units(&unit, force_unit);
-    Ok((JointSizes { force, speed, reach, range, turns, units }, has))
+    Ok((JointSizes { force, speed, reach, range, step_s, turns, units }, has))
 }
 
 /// Units of what multiplies powers of speed and position to a force.
@@ -361,7 +362,7 @@ impl Machine {
         match first.map(|part| part.role) {
             Some(Role::Joint(joint, effect)) => {
                 let sizes = &self.joints[joint];
-                mechanics::joint_starts(effect, parameters, sizes, sizes.yields(self.step_s))
+                mechanics::joint_starts(effect, parameters, sizes)
             }
             Some(Role::Input(input, effect)) => {
                 mechanics::input_starts(effect, parameters, self.inputs[input].range, self.step_s)

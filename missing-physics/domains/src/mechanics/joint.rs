@@ -7,7 +7,6 @@ use missing_physics::model::UNBOUNDED;
 
 const WEN: &str = "Wen 1976, doi:10.1061/JMCEA3.0002106";
 const NORDIN: &str = "Nordin and Gutman 2002, doi:10.1016/S0005-1098(02)00047-X";
-const PERIODS: [f64; 2] = [1.0, 60.0];
 
 /// Declares the mechanisms of a joint that make sense for it.
 pub(crate) fn joints<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, has: JointHas) {
@@ -16,9 +15,12 @@ pub(crate) fn joints<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, has: J
     if has.drive {
         load(d);
     }
-    elastic(d, s);
-    if s.turns {
-        cogging(d, s);
+    if !s.unheld() {
+        springs(d, s);
+    }
+    constant(d, s);
+    if let Some(most) = s.periods() {
+        cogging(d, s, most);
     }
     if has.follows {
         play(d, s);
@@ -130,7 +132,7 @@ fn load<D: Declares<JointEffect>>(d: &mut D) {
     );
 }
 
-fn elastic<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes) {
+fn springs<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes) {
     let force = 0.1 * s.force;
     for (power, (kind, what, equation)) in [
         ("stiffness", "a spring", "-k x"),
@@ -159,30 +161,34 @@ fn elastic<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes) {
             &["stiffness", "cubic-stiffness", "quadratic-stiffness"],
         );
     }
-    if d.wants("constant-force") {
-        let level = d.parameter(JointEffect::Constant, "level", &s.units.force, 0.0, UNBOUNDED, force);
-        d.mechanism(
-            "constant-force",
-            &[level],
-            [
-                "a constant force",
-                "A force that is always the same: a weight, a slope, a bias.",
-                "+level",
-                TEXTBOOK,
-            ],
-            &["input-offset", "asymmetric-friction"],
-        );
-    }
 }
 
-fn cogging<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes) {
+fn constant<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes) {
+    if !d.wants("constant-force") {
+        return;
+    }
+    let level = d.parameter(JointEffect::Constant, "level", &s.units.force, 0.0, UNBOUNDED, 0.1 * s.force);
+    d.mechanism(
+        "constant-force",
+        &[level],
+        [
+            "a constant force",
+            "A force that is always the same: a weight, a slope, a bias.",
+            "+level",
+            TEXTBOOK,
+        ],
+        &["input-offset", "asymmetric-friction"],
+    );
+}
+
+fn cogging<D: Declares<JointEffect>>(d: &mut D, s: &JointSizes, most: f64) {
     if !d.wants("cogging") {
         return;
     }
     let force = 0.1 * s.force;
     let amplitude = d.parameter(JointEffect::CogAmplitude, "amplitude", &s.units.force, 0.0, POSITIVE, force);
     let phase = d.parameter(JointEffect::CogPhase, "phase_rad", "rad", 0.0, [-PI, PI], 1.0);
-    let periods = d.parameter(JointEffect::CogPeriods, "periods", "", 1.0, PERIODS, 1.0);
+    let periods = d.parameter(JointEffect::CogPeriods, "periods", "", 1.0, [1.0, most], 1.0);
     let m = d.mechanism(
         "cogging",
         &[amplitude, phase, periods],

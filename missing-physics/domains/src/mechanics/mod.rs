@@ -7,6 +7,8 @@ mod joint;
 mod output;
 mod starts;
 
+use std::f64::consts::{PI, TAU};
+
 use missing_physics::model::{Mechanism, ParameterRef};
 
 pub(crate) use clock::Clock;
@@ -63,6 +65,13 @@ pub(crate) enum OutputEffect {
     Lower,
 }
 
+/// A joint that is slow has this part of its typical speed.
+const SLOW: f64 = 0.25;
+/// The largest number of periods a turn that is looked for.
+const MOST_PERIODS: f64 = 60.0;
+/// A spring is wound up by so many turns at the most: those that a motor makes before its gear.
+const TURNS_OF_A_SPRING: f64 = 20.0;
+
 /// Sizes of a joint's motion: what effects and their bounds are measured by.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct JointSizes {
@@ -74,6 +83,8 @@ pub(crate) struct JointSizes {
     pub(crate) reach: f64,
     /// Smallest and largest position.
     pub(crate) range: [f64; 2],
+    /// Time between rows, s.
+    pub(crate) step_s: f64,
     /// It rotates, so that effects periodic in the angle make sense.
     pub(crate) turns: bool,
     pub(crate) units: JointUnits,
@@ -92,12 +103,24 @@ pub(crate) struct JointUnits {
 }
 
 impl JointSizes {
-    /// The smallest and the largest displacement at which a spring is seen to yield. The one is a part of what passes between rows: below it
-    /// is dry friction. The other is near the reach, and a radian of a joint that turns: no bearing is wound up so far before it slides.
-    pub(crate) fn yields(&self, step_s: f64) -> [f64; 2] {
-        let least = (0.25 * self.speed * step_s).clamp(1e-4 * self.reach, 0.03 * self.reach);
+    /// The smallest and the largest displacement at which a spring is seen to yield; none where the one is near the other. The one is a part
+    /// of what passes between rows: below it is dry friction. The other is near the reach, and a radian of a joint that turns: no bearing is
+    /// wound up so far before it slides.
+    pub(crate) fn yields(&self) -> Option<[f64; 2]> {
+        let least = (SLOW * self.speed * self.step_s).clamp(1e-4 * self.reach, 0.03 * self.reach);
         let most = (2.0 * self.reach).min(if self.turns { 1.0 } else { f64::INFINITY });
-        [least.min(0.1 * most), most]
+        (least <= 0.5 * most).then_some([least, most])
+    }
+
+    /// The largest number of periods a turn that rows can show: of two rows a period where the joint is slow. None where they show none.
+    pub(crate) fn periods(&self) -> Option<f64> {
+        let most = (PI / (SLOW * self.speed * self.step_s)).min(MOST_PERIODS).floor();
+        (self.turns && most >= 1.0).then_some(most)
+    }
+
+    /// Whether the joint turns so often that no spring can hold it.
+    pub(crate) fn unheld(&self) -> bool {
+        self.units.position == "rad" && self.range[1] - self.range[0] > TURNS_OF_A_SPRING * TAU
     }
 }
 

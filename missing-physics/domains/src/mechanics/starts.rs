@@ -9,12 +9,7 @@ type Starts = Vec<Vec<(usize, f64)>>;
 
 /// Starts of a joint's mechanism whose parameters are `own`, the first of which is `effect`; a spring `yields` between two
 /// displacements.
-pub(crate) fn joint_starts(
-    effect: JointEffect,
-    parameters: &[usize],
-    s: &JointSizes,
-    [least, most]: [f64; 2],
-) -> Starts {
+pub(crate) fn joint_starts(effect: JointEffect, parameters: &[usize], s: &JointSizes) -> Starts {
     let Some(&first) = parameters.first() else { return Vec::new() };
     let (force, [low, high]) = (s.force, s.range);
     match effect {
@@ -27,7 +22,7 @@ pub(crate) fn joint_starts(
             .collect(),
         JointEffect::LoadFraction => [0.05, 0.3].map(|f| vec![(first, f)]).to_vec(),
         // In proportion to its amplitude, a wave of any phase is a sum of these two: the better one leads to it.
-        JointEffect::CogAmplitude => (1..=24)
+        JointEffect::CogAmplitude => (1..=s.periods().map_or(0, |most| most.min(24.0) as u32))
             .flat_map(|n| {
                 [0.5, 0.5 + FRAC_PI_2].map(|phase| {
                     vec![(first, 0.02 * force), (parameters[1], phase), (parameters[2], f64::from(n))]
@@ -42,9 +37,10 @@ pub(crate) fn joint_starts(
                     .map(|k| vec![(first, low + at * (high - low)), (parameters[1], k * force / s.reach)])
             })
             .collect(),
-        JointEffect::YieldStiffness => [3e-3, 0.02, 0.1, 0.4]
-            .iter()
-            .map(|y| (y * s.reach).clamp(least, 0.9 * most))
+        JointEffect::YieldStiffness => (s.yields().iter())
+            .flat_map(|&[least, most]| {
+                [3e-3, 0.02, 0.1, 0.4].map(|y| (y * s.reach.min(most)).clamp(least, 0.9 * most))
+            })
             .map(|y| vec![(first, 0.05 * force / y), (parameters[1], y)])
             .collect(),
         _ => Vec::new(),

@@ -166,7 +166,7 @@ impl<'a> Effects<'a> {
         let has = JointHas {
             drive: stated.drive.is_some(),
             follows: stated.follows,
-            yields: Some(sizes.yields(scales.step_s)),
+            yields: sizes.yields(),
             inertia: true,
         };
         mechanics::joints(&mut Carrier { effects: self, of, role: |e| Role::Joint(joint, e) }, sizes, has);

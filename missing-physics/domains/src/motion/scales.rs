@@ -102,6 +102,7 @@ impl Scales {
                     speed: rms(&states[joint.velocity]),
                     reach: low.abs().max(high.abs()).max(1e-9),
                     range: [low, high],
+                    step_s: self.step_s,
                     turns: joint.turns,
                     units,
                 }

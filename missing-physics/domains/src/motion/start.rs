@@ -189,7 +189,7 @@ pub(super) fn mechanism(
     match roles[spec.slots()[first]] {
         Role::Joint(joint, effect) => {
             let sizes = &scales.joints[joint];
-            mechanics::joint_starts(effect, parameters, sizes, sizes.yields(scales.step_s))
+            mechanics::joint_starts(effect, parameters, sizes)
         }
         Role::Input(input, effect) => {
             mechanics::input_starts(effect, parameters, scales.inputs[input].range, scales.step_s)

@@ -1,5 +1,6 @@
 //! What goes into a diagnosis, and why there is none.
 
+use crate::adequacy::test::p_floor;
 use crate::data::{Recording, RecordingError};
 use crate::model::{Experiment, PredictError, Scope, Spec, SpecError};
 
@@ -103,7 +104,7 @@ pub(super) fn check(recording: &Recording, options: &Options) -> Result<(), Diag
         let value = options.replicates as f64;
         return Err(DiagnoseError::Option { name: "replicates", value, expected: "at least 19" });
     }
-    if options.alpha * (options.replicates as f64 + 1.0) < 1.0 {
+    if options.alpha < p_floor(options.replicates) {
         let expected = "at least 1 / (replicates + 1), the smallest p value that so many replicates can show";
         return Err(DiagnoseError::Option { name: "alpha", value: options.alpha, expected });
     }

@@ -137,7 +137,7 @@ impl<'a> Extended<'a> {
         let start =
             (0..omegas.len()).max_by(|&a, &b| powers[a].total_cmp(&powers[b])).map_or(lowest, |k| omegas[k]);
         let scale = 1.0 / span.max(f64::MIN_POSITIVE);
-        let bounds = [0.5 * lowest, highest];
+        let bounds = [lowest, highest];
         let parameters = oscillation(&problem.recording, &fit.noise.sigma, bounds, start, scale);
         Ok(Some(Self::new(problem.model, &problem.recording, parameters, Added::Periodic)))
     }

@@ -10,6 +10,8 @@ const GROUPS: usize = 40;
 pub(crate) const STAYS: f64 = 1.0;
 /// Likelihoods that differ by this part of their sum are the same: as they are where the same readings are moved, but for rounding.
 const EVEN: f64 = 1e-3;
+/// Two ways to the same likelihood differ by this part of it at most.
+const ROUNDING: f64 = 1e-6;
 /// A subset of the runs is sought among so many at most.
 const SUBSETS: usize = 64;
 
@@ -272,9 +274,11 @@ impl Scan<'_> {
             .map(|(interval, form)| Edges { interval, form, worth: worth(interval, form) })
             .filter(|edges| edges.worth.is_finite())
             .collect();
-        let Some(best) = likeliest(judged.iter()).filter(|best| best.worth >= found.worth()) else {
-            return found;
-        };
+        // What acts all along has no edges to be found, unless others are better by more than rounding.
+        let all_along = found.interval == (0, found.bins.len());
+        let rounding = ROUNDING * found.worth().abs() * if all_along { 1.0 } else { -1.0 };
+        let better = |best: &&Edges| best.worth >= found.worth() + rounding;
+        let Some(best) = likeliest(judged.iter()).filter(better) else { return found };
         // Edges that may be anywhere are worth what they are on average, not what the best of them is.
         let likelihoods = judged.iter().map(|e| (0.5 * (e.worth - best.worth)).exp());
         let average = best.worth + 2.0 * (likelihoods.sum::<f64>() / judged.len() as f64).ln();

@@ -264,8 +264,12 @@ impl<'a> Judge<'a> {
         self.judged(at).is_some_and(|judged| self.each_acts(&judged))
     }
 
-    /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them.
+    /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them; none where the baseline
+    /// predicts them within their noise.
     pub(crate) fn closest(&self) -> Option<Judged> {
+        if self.base <= self.misfit_of_noise() {
+            return None;
+        }
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
             .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
             .filter_map(|i| self.least_squares[i].as_ref().map(|least_squares| (least_squares.seen, i)))

@@ -3,7 +3,7 @@
 
 use crate::common::{Curve, mechanism, parameter, recording};
 use missing_physics::data::{Recording, Run};
-use missing_physics::diagnosis::Diagnosis;
+use missing_physics::diagnosis::{Diagnosis, Verdict};
 use missing_physics::engine::{Options, diagnose};
 use missing_physics::model::{Mechanism, Model};
 use missing_physics::observer::Silent;
@@ -117,6 +117,21 @@ fn a_mechanism_that_cannot_be_fitted_is_named() {
     let found = answer(&model, &draw(|x| 0.5 * x));
     let said = found.remarks.iter().any(|r| r.starts_with("a slope could not be fitted: "));
     assert!(said, "{:?}", found.remarks);
+}
+
+/// A mechanism whose effect can be computed nowhere is named, and loses no answer.
+#[test]
+fn a_mechanism_that_cannot_be_computed_loses_no_answer() {
+    let parameters = ["offset", "slope", "curvature"].map(|name| parameter(name, 0.0, ANY)).into();
+    let law = |s: &[f64], _: &[f64], x: f64| if s[1] == 0.0 { s[0] + s[2] * x * x } else { f64::NAN };
+    let model =
+        Curve::new(parameters, vec![mechanism("a-slope", vec![1]), mechanism("a-curvature", vec![2])], law);
+    let found = answer(&model, &draw(|x| 0.5 * x * x));
+    assert_eq!(found.chosen, ["a-curvature"]);
+    let said = found.remarks.iter().any(|r| r.starts_with("a slope could not be fitted: "));
+    assert!(said, "{:?}", found.remarks);
+    // As where nothing is wrong.
+    assert_eq!(answer(&model, &draw(|_| 0.5)).verdict, Verdict::Adequate);
 }
 
 /// Moving air acts through drag, which is free then: drag with moving air is the same set by another name, and is counted once.

@@ -146,6 +146,17 @@ fn of_order(problem: &Problem<'_>, run: usize) -> [f64; ORDER] {
     [x, 1.5 * x * x - 0.5]
 }
 
+/// What each free parameter does to the rows of a run.
+fn columns(
+    problem: &Problem<'_>,
+    wide: &Selection,
+    fit: &Fit,
+    run: usize,
+) -> Result<Vec<Vec<f64>>, PredictError> {
+    let unit = NoiseState { shape: vec![0; problem.channels()], sigma: vec![1.0; problem.channels()] };
+    whitened_columns(problem, wide, &unit, run, &fit.shared, &fit.nuisance[run])
+}
+
 /// The blocks of one run, one for each channel.
 fn blocks(
     problem: &Problem<'_>,
@@ -154,9 +165,8 @@ fn blocks(
     curves: &Curves,
     run: usize,
 ) -> Result<Vec<Block>, PredictError> {
-    let unit = NoiseState { shape: vec![0; problem.channels()], sigma: vec![1.0; problem.channels()] };
     let Layout { wide, n_nuisance, .. } = layout;
-    let columns = whitened_columns(problem, wide, &unit, run, &fit.shared, &fit.nuisance[run])?;
+    let columns = columns(problem, wide, fit, run)?;
     let mut start = 0;
     let mut row = Vec::with_capacity(problem.channels());
     for channel in 0..problem.channels() {
@@ -189,8 +199,32 @@ fn blocks(
 }
 
 impl<'a> Linearised<'a> {
-    /// Linearises around `fit`; the mechanisms in `rivals` become alternatives beside smooth functions of each variable.
+    /// Linearises around `fit`; the mechanisms in `rivals` become alternatives beside smooth functions of each variable, but for those whose
+    /// effect cannot be computed there.
     pub(crate) fn new(
+        problem: &'a Problem<'a>,
+        selection: &Selection,
+        fit: &Fit,
+        rivals: &[usize],
+        rule: &NoiseRule,
+    ) -> Result<Self, PredictError> {
+        Self::beside(problem, selection, fit, rivals, rule).or_else(|why| {
+            let computed: Vec<usize> = (rivals.iter().copied())
+                .filter(|&rival| {
+                    let (Layout { wide, .. }, _) = mechanisms(problem, selection, &[rival]);
+                    problem.by_run(|run| columns(problem, &wide, fit, run)).is_ok()
+                })
+                .collect();
+            if computed.len() == rivals.len() {
+                Err(why)
+            } else {
+                Self::beside(problem, selection, fit, &computed, rule)
+            }
+        })
+    }
+
+    /// The same beside all rivals.
+    fn beside(
         problem: &'a Problem<'a>,
         selection: &Selection,
         fit: &Fit,
