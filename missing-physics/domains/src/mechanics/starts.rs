@@ -7,8 +7,7 @@ use super::{InputEffect, JointEffect, JointSizes, OutputEffect};
 /// Starts.
 type Starts = Vec<Vec<(usize, f64)>>;
 
-/// Starts of a joint's mechanism whose parameters are `own`, the first of which is `effect`; a spring `yields` between two
-/// displacements.
+/// Starts of a joint's mechanism with these parameters, the first of which is `effect`.
 pub(crate) fn joint_starts(effect: JointEffect, parameters: &[usize], s: &JointSizes) -> Starts {
     let Some(&first) = parameters.first() else { return Vec::new() };
     let (force, [low, high]) = (s.force, s.range);
@@ -47,7 +46,7 @@ pub(crate) fn joint_starts(effect: JointEffect, parameters: &[usize], s: &JointS
     }
 }
 
-/// Starts of an input's mechanism whose parameters are `own`, the first of which is `effect`.
+/// Starts of an input's mechanism with these parameters, the first of which is `effect`.
 pub(crate) fn input_starts(
     effect: InputEffect,
     parameters: &[usize],
@@ -65,7 +64,7 @@ pub(crate) fn input_starts(
     }
 }
 
-/// Starts of an output's mechanism whose parameters are `own`, the first of which is `effect`.
+/// Starts of an output's mechanism with these parameters, the first of which is `effect`.
 pub(crate) fn output_starts(
     effect: OutputEffect,
     parameters: &[usize],
