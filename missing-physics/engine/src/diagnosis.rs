@@ -427,3 +427,13 @@ pub struct Diagnosis {
     /// Data and fits, for drawing.
     pub curves: Vec<Curves>,
 }
+
+/// Names in one phrase: "a, b and c"; "a; b and c" where a name has a comma of its own.
+pub fn listed(names: &[String]) -> String {
+    let between = if names.iter().any(|name| name.contains(", ")) { "; " } else { ", " };
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(between)),
+    }
+}

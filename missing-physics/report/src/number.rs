@@ -79,15 +79,6 @@ pub(super) fn probability(p: f64) -> String {
     }
 }
 
-/// Words joined with commas and a last "and".
-pub(super) fn listed(words: &[String]) -> String {
-    match words {
-        [] => String::new(),
-        [one] => one.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

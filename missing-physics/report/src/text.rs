@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use missing_physics::diagnosis::{
     ChannelNoise, Diagnosis, Law, Location, MechanismReport, NEARLY_ALL, RunDifference, RunSpread, RunValue,
-    SetReport, Verdict,
+    SetReport, Verdict, listed,
 };
 
 use super::context::ReportContext;
-use super::number::{estimate, in_unit, listed, p_value, p_words, probability, significant, with_error};
+use super::number::{estimate, in_unit, p_value, p_words, probability, significant, with_error};
 
 const WIDTH: usize = 100;
 const INDENT: usize = 9;
@@ -263,6 +263,9 @@ pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     std::iter::once(words).chain(parameters).collect()
 }
 
+/// Runs whose differences are said one by one.
+const SAID_RUNS: usize = 8;
+
 /// How runs differ, and which contradict the others, a line each.
 pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
     let differs = |of: &RunDifference| {
@@ -270,8 +273,18 @@ pub(super) fn runs(d: &Diagnosis) -> Vec<String> {
             format!("{} {} in run {}", with_error(r.value, r.standard_error), of.unit, r.run)
                 .replace("  ", " ")
         };
-        let values: Vec<String> = of.by_run.iter().map(value).collect();
-        format!("what is left looks like {}: {} = {}", of.name, of.parameter, values.join(", "))
+        let mut order: Vec<&RunValue> = of.by_run.iter().collect();
+        if order.len() > SAID_RUNS {
+            let errors = |r: &RunValue| (r.value / r.standard_error).abs();
+            order.sort_by(|a, b| errors(b).total_cmp(&errors(a)));
+        }
+        let (said, others) = order.split_at(order.len().min(SAID_RUNS));
+        let values: Vec<String> = said.iter().map(|r| value(r)).collect();
+        let others = match others {
+            [] => String::new(),
+            others => format!(", and by fewer standard errors in the other {} runs", others.len()),
+        };
+        format!("what is left looks like {}: {} = {}{others}", of.name, of.parameter, values.join(", "))
     };
     let spread = |s: &RunSpread| {
         // A name such as a rate's says nothing where several mechanisms have one.

@@ -1,6 +1,7 @@
 //! The tool, as a program that is run: one program of tests, linked once.
 
 mod accelerometer;
+mod arm;
 mod astray;
 mod bad_recordings;
 mod browser;

@@ -1,6 +1,7 @@
 //! How large a machine's motions, inputs and readings are: what effects and their bounds are measured by.
 
 use super::equations::Equations;
+use super::units::{quotient, text};
 use crate::mechanics::{Clock, JointSizes, JointUnits};
 
 /// Sizes of a recording.
@@ -82,20 +83,14 @@ impl Scales {
             .iter()
             .map(|joint| {
                 let [low, high] = range(states[joint.position].iter().copied());
-                let unit = super::units::text(&equations.states[joint.position].name);
-                let of =
-                    |suffix: &str| if unit.is_empty() { String::new() } else { format!("{unit}/{suffix}") };
-                let position = &unit;
+                let position = text(&equations.states[joint.position].name);
+                let per = |unit: &str, power: i32| quotient(unit, &[(&position, power)]);
                 let units = JointUnits {
-                    speed: of("s"),
-                    force: of("s^2"),
-                    damping: ["1/s".to_owned(), per(position), format!("s/({position})^2")],
-                    stiffness: [
-                        "1/s^2".to_owned(),
-                        format!("1/(s^2 {position})"),
-                        format!("1/(s^2 {position}^2)"),
-                    ],
-                    position: unit.clone(),
+                    speed: quotient(&position, &[("s", 1)]),
+                    force: quotient(&position, &[("s", 2)]),
+                    damping: ["1/s".to_owned(), per("", 1), per("s", 2)],
+                    stiffness: ["1/s^2".to_owned(), per("1/s^2", 1), per("1/s^2", 2)],
+                    position,
                 };
                 JointSizes {
                     force: rms(&rates[joint.velocity]),
@@ -111,9 +106,4 @@ impl Scales {
         self.levels = equations.levels.iter().map(|&l| range(states[l].iter().copied())).collect();
         self
     }
-}
-
-/// One over a unit.
-fn per(unit: &str) -> String {
-    if unit.is_empty() { String::new() } else { format!("1/{unit}") }
 }

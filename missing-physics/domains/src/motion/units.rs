@@ -78,7 +78,7 @@ pub(super) fn of_rate(unit: &str) -> Option<&'static str> {
 pub(super) fn text_of_rate(name: &str) -> String {
     match of(name) {
         None => "1/s".into(),
-        Some(unit) => of_rate(unit).map_or_else(|| format!("{unit}/s"), str::to_owned),
+        Some(unit) => of_rate(unit).map_or_else(|| quotient(unit, &[("s", 1)]), str::to_owned),
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::adequacy::outliers::Place;
 use crate::adequacy::test::{self, Adequacy};
 use crate::answer::Answer;
-use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict};
+use crate::diagnosis::{ChannelFit, Confusion, Diagnosis, Law, Verdict, listed};
 use crate::engine::begin::{Begun, rough_sigmas};
 use crate::engine::input::{DiagnoseError, Options};
 use crate::estimate::limits::limits;
@@ -462,13 +462,5 @@ fn clear_cases(problem: &Problem<'_>, all: &[Candidate], white: &[f64]) -> Resul
 pub(super) fn draw(diagnosis: &mut Diagnosis, predictions: &[Vec<Vec<f64>>]) {
     for (curves, after) in diagnosis.curves.iter_mut().zip(predictions) {
         curves.after.clone_from(after);
-    }
-}
-
-fn listed(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }

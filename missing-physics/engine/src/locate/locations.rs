@@ -16,6 +16,9 @@ use crate::noise::rough::RoughNoise;
 use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
+/// Standard errors in half an interval of 95 %.
+const CI95: f64 = 1.96;
+
 /// What is looked at: a baseline's columns, beside which unknowns act along variables.
 struct Ground<'a> {
     /// By run: of nuisance parameters, of shared ones, and what the baseline leaves.
@@ -308,7 +311,9 @@ impl Places<'_> {
         let within = cause.within(along);
         let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
         let runs: Vec<bool> = cause.runs.iter().enumerate().map(|(r, acts)| *acts && touched(r)).collect();
-        let as_if = unknown.is_model_s().then(|| AsIf {
+        // A size that may as well be nothing says nothing.
+        let known = cause.sizes.iter().any(|(_, [size, error])| size.abs() > CI95 * error);
+        let as_if = (known && unknown.is_model_s()).then(|| AsIf {
             what: unknown.described.name.clone(),
             sizes: cause.sizes.iter().map(|(c, size)| estimate(unknown, *c, *size)).collect(),
         });
@@ -362,7 +367,6 @@ impl Places<'_> {
 
 /// A size with its interval.
 fn estimate(unknown: &Unknown<'_>, component: usize, [value, error]: [f64; 2]) -> Estimate {
-    const CI95: f64 = 1.96;
     let Quantity { name, unit } = unknown.described.components[component].clone();
     Estimate { name, unit, value, ci95: [value - CI95 * error, value + CI95 * error] }
 }

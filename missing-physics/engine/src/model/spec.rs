@@ -127,6 +127,13 @@ pub struct Mechanism {
     pub between_runs: bool,
 }
 
+impl Mechanism {
+    /// What it is, wherever it acts: its identifier without the place (`coulomb-friction` of `coulomb-friction@hinge`).
+    pub(crate) fn kind(&self) -> &str {
+        self.id.split_once('@').map_or(&self.id, |(kind, _)| kind)
+    }
+}
+
 /// Runs from which on what differs between them ([`Mechanism::between_runs`]) is looked for: fewer say nothing of it.
 pub const FEWEST_RUNS_THAT_DIFFER: usize = 3;
 

@@ -21,6 +21,8 @@ use crate::selection::share::{Cut, unseen_misfit};
 
 /// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
 const NEEDED: f64 = 5.0;
+/// Wald's statistic at which a mechanism's size is as large as its standard error: of a smaller one nothing is known.
+const SIZE_KNOWN: f64 = 1.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
 /// be imitating the leftover. So must what a set leaves be with a cause in a part of the data.
 pub(crate) const SMALLER: f64 = 3.0;
@@ -208,8 +210,8 @@ impl<'a> Judge<'a> {
                 .collect();
             let needed = |i: usize| {
                 self.judged(i).filter(|j| {
-                    // Beyond a smaller set that takes away nearly all.
-                    (found.is_none() || self.each_acts(j)) && self.needed(i, j) && self.beats_its_parts(j)
+                    let least = if found.is_none() { SIZE_KNOWN } else { 2.0 * NEEDED };
+                    self.each_acts(j, least) && self.needed(i, j) && self.beats_its_parts(j)
                 })
             };
             let mut judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
@@ -261,7 +263,7 @@ impl<'a> Judge<'a> {
 
     /// Whether a candidate is an explanation beside a leftover, each member of which acts there.
     pub(crate) fn acts(&self, at: usize) -> bool {
-        self.judged(at).is_some_and(|judged| self.each_acts(&judged))
+        self.judged(at).is_some_and(|judged| self.each_acts(&judged, 2.0 * NEEDED))
     }
 
     /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them; none where the baseline
@@ -374,9 +376,9 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Whether each member of a set acts, with errors that allow for the leftover: its parameters differ from where it is off by as
-    /// much as is asked of a log Bayes factor (Wald's statistic, twice that).
-    fn each_acts(&self, judged: &Judged) -> bool {
+    /// Whether each member of a set acts, with errors that allow for the leftover: Wald's statistic of its parameters against where it is off is
+    /// above `least`.
+    fn each_acts(&self, judged: &Judged, least: f64) -> bool {
         let Candidate { set, selection, fit, .. } = &judged.candidate;
         let covariance = covariance(&fit.information);
         let acts = |m: &usize| {
@@ -393,8 +395,7 @@ impl<'a> Judge<'a> {
                 at.iter().map(|&i| fit.shared[selection.shared[i]] - off(i)),
             );
             let of_it = covariance.select_rows(&at).select_columns(&at);
-            at.is_empty()
-                || of_it.cholesky().is_none_or(|c| departure.dot(&c.solve(&departure)) > 2.0 * NEEDED)
+            at.is_empty() || of_it.cholesky().is_none_or(|c| departure.dot(&c.solve(&departure)) > least)
         };
         set.iter().all(acts)
     }
@@ -422,7 +423,7 @@ impl<'a> Judge<'a> {
                 && self.each_helps(i)
         };
         let others: Vec<usize> = (0..self.all.len()).into_par_iter().filter(other).collect();
-        let mut rivals: Vec<Judged> = others
+        let rivals: Vec<Judged> = others
             .into_par_iter()
             .filter_map(|i| self.judged(i))
             .filter(|j| {
@@ -430,6 +431,16 @@ impl<'a> Judge<'a> {
                     || j.misfit < RIVAL_MISFIT * chosen.misfit
             })
             .collect();
+        // One that only adds to another is no further answer.
+        let adds = |judged: &Judged| {
+            let set = &judged.candidate.set;
+            let part = |other: &Judged| {
+                let less = &other.candidate.set;
+                less.len() < set.len() && less.iter().all(|m| set.contains(m))
+            };
+            rivals.iter().any(part) && !self.each_acts(judged, 2.0 * NEEDED)
+        };
+        let mut rivals: Vec<Judged> = rivals.iter().filter(|judged| !adds(judged)).cloned().collect();
         rivals.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
         rivals.truncate(MOST_RIVALS);
         rivals

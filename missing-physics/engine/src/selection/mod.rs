@@ -11,4 +11,5 @@ mod prior;
 pub(crate) mod ranking;
 pub(crate) mod screening;
 pub(crate) mod search;
+pub(crate) mod several_places;
 pub(crate) mod share;

@@ -10,7 +10,7 @@ use crate::selection::candidate::{Candidate, HEAT, candidate, without_more};
 
 /// How many sets of one size are tried with one more mechanism.
 pub(super) const BEAM: usize = 3;
-/// The largest set tried.
+/// The largest set of mechanisms of different kinds that is tried.
 pub(super) const MOST: usize = 3;
 
 /// The evidence of a set that is an explanation.
@@ -24,7 +24,7 @@ pub(super) fn best_evidence<'a>(of: impl Iterator<Item = &'a Candidate>) -> f64 
 }
 
 /// The fit of a larger set some steps on, without what a part of it has not.
-fn without_the_rest(problem: &Problem<'_>, part: &[usize], whole: &Fit) -> Option<Fit> {
+pub(super) fn without_the_rest(problem: &Problem<'_>, part: &[usize], whole: &Fit) -> Option<Fit> {
     let begins = without_more(problem, part, whole);
     let selection = problem.select(part, &[]);
     let start = (&begins.shared[..], &begins.nuisance[..]);

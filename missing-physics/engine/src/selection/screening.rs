@@ -19,8 +19,12 @@ const FOLLOWED: usize = 14;
 /// Starts of one mechanism that are followed, and looked at again where more than those were, that differ in its shape: of that a step promises
 /// least reliably, the more so where a larger cause is missing.
 const SHAPES: usize = 3;
-/// So many.
+/// So many steps.
 const STEPS: usize = 4;
+/// Mechanisms that are followed for longer, of those that fall short of what one step promises.
+const LATE: usize = 3;
+/// So many steps.
+const STEPS_AGAIN: usize = 10;
 /// Starts of a mechanism that are looked at again beside others: those that promised most beside nothing.
 const STARTS: usize = 2;
 
@@ -29,6 +33,9 @@ pub(crate) struct Promising {
     pub(crate) mechanism: usize,
     pub(crate) start: Guess,
 }
+
+/// What one step from a start of a mechanism leaves, the mechanism by its number among those that are looked at, and the start by its number.
+type Scored = (f64, usize, usize);
 
 /// Mechanisms, each with the starts that are looked at.
 pub(crate) struct Screening {
@@ -69,10 +76,10 @@ impl Screening {
     ) -> Vec<Promising> {
         self.begin(parent, anew);
         let tried: Vec<(usize, usize)> = (0..self.looked_at.len())
-            .filter(|&k| !parent.set.contains(&self.looked_at[k].0))
+            .filter(|&k| problem.may_join(&parent.set, self.looked_at[k].0))
             .flat_map(|k| (0..self.looked_at[k].1.len()).map(move |start| (k, start)))
             .collect();
-        let mut scored: Vec<(f64, usize, usize)> = Vec::new();
+        let mut scored: Vec<Scored> = Vec::new();
         let mut linearised: HashMap<(usize, usize), NormalEquations> = HashMap::new();
         let first_steps = tried.into_par_iter().map(|(k, start)| {
             let (mechanism, starts) = &self.looked_at[k];
@@ -99,24 +106,51 @@ impl Screening {
                 first.push((k, start));
             }
         }
-        let known: Vec<_> = first.into_iter().filter_map(|at| Some((at, linearised.remove(&at)?))).collect();
-        let mut followed: Vec<(f64, Promising)> = known
-            .into_par_iter()
-            .filter_map(|((k, start), linear)| {
-                follow(problem, parent, self.looked_at[k].0, &self.looked_at[k].1[start], linear)
-            })
-            .collect();
-        self.forget(problem, &scored);
-        followed.retain(|(left, _)| *left < parent.fit.chi2 - 1.0);
-        followed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut seen = Vec::new();
-        followed.retain(|(_, promising)| {
-            let new = !seen.contains(&promising.mechanism);
-            seen.push(promising.mechanism);
-            new
+        let known: Vec<_> = first.iter().filter_map(|at| Some((*at, linearised.remove(at)?))).collect();
+        let followed = known.into_par_iter().filter_map(|((k, start), linear)| {
+            let at = (self.looked_at[k].0, &self.looked_at[k].1[start][..]);
+            follow(End::after(STEPS), problem, parent, at, linear)
         });
-        followed.truncate(KEPT);
-        followed.into_iter().map(|(_, promising)| promising).collect()
+        let followed = best_of_each(followed.collect(), parent);
+        let again = self.again(problem, parent, &scored, &first, &followed);
+        self.forget(problem, &scored);
+        let mut best = best_of_each(followed.into_iter().chain(again).collect(), parent);
+        best.truncate(KEPT);
+        best.into_iter().map(|(_, promising)| promising).collect()
+    }
+
+    /// Mechanisms of which one step promises more than the last of those that are kept has reached, but which have not reached that themselves:
+    /// followed for longer, and from the start that promises most of those that were not followed.
+    fn again(
+        &self,
+        problem: &Problem<'_>,
+        parent: &Candidate,
+        scored: &[Scored],
+        first: &[(usize, usize)],
+        followed: &[(f64, Promising)],
+    ) -> Vec<(f64, Promising)> {
+        let least = followed.get(KEPT - 1).map_or(parent.fit.chi2 - 1.0, |(left, _)| *left);
+        let reached = |k: usize| followed.iter().find(|(_, p)| p.mechanism == self.looked_at[k].0);
+        let mut late: Vec<usize> = Vec::new();
+        for &(_, k, _) in scored.iter().filter(|(left, ..)| *left < least) {
+            if !late.contains(&k) && late.len() < LATE && reached(k).is_none_or(|(left, _)| *left > least) {
+                late.push(k);
+            }
+        }
+        let starts = |k: usize| {
+            let other = scored.iter().find(|(_, of, start)| *of == k && !first.contains(&(k, *start)));
+            let other = other.map(|(_, _, start)| self.looked_at[k].1[*start].clone());
+            let on = reached(k).map(|(_, promising)| promising.start.clone());
+            other.into_iter().chain(on).map(move |start| (self.looked_at[k].0, start))
+        };
+        let starts: Vec<(usize, Guess)> = late.into_iter().flat_map(starts).collect();
+        let follow = |(mechanism, start): (usize, Guess)| {
+            let (selection, shared) = with_one_more(problem, parent, mechanism, &start);
+            let at = (&shared[..], &parent.fit.nuisance[..]);
+            let (_, linear) = after_one_step(problem, &selection, &parent.fit.noise, at)?;
+            follow(End::after(STEPS_AGAIN), problem, parent, (mechanism, &start), linear)
+        };
+        starts.into_par_iter().filter_map(follow).collect()
     }
 
     /// The shape that a mechanism has at one of its starts; all starts are alike of one that has none.
@@ -127,7 +161,7 @@ impl Screening {
         starts[start].iter().copied().filter(|(slot, _)| of_shape(*slot)).collect()
     }
 
-    fn forget(&mut self, problem: &Problem<'_>, scored: &[(f64, usize, usize)]) {
+    fn forget(&mut self, problem: &Problem<'_>, scored: &[Scored]) {
         for k in 0..self.looked_at.len() {
             let mut kept: Vec<Guess> = Vec::new();
             let mut shapes: Vec<Guess> = Vec::new();
@@ -174,17 +208,30 @@ fn with_one_more(
     (problem.select(&set, &[]), shared)
 }
 
+/// Of each mechanism where it leaves least, less than its parent does; the least first.
+fn best_of_each(mut followed: Vec<(f64, Promising)>, parent: &Candidate) -> Vec<(f64, Promising)> {
+    followed.retain(|(left, _)| *left < parent.fit.chi2 - 1.0);
+    followed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut seen = Vec::new();
+    followed.retain(|(_, promising)| {
+        let new = !seen.contains(&promising.mechanism);
+        seen.push(promising.mechanism);
+        new
+    });
+    followed
+}
+
 /// The sum of squares that is left after some steps from a start, and where they lead the mechanism.
 fn follow(
+    end: End,
     problem: &Problem<'_>,
     parent: &Candidate,
-    mechanism: usize,
-    start: &[(usize, f64)],
+    (mechanism, start): (usize, &[(usize, f64)]),
     linear: NormalEquations,
 ) -> Option<(f64, Promising)> {
     let (selection, shared) = with_one_more(problem, parent, mechanism, start);
     let at = (&shared[..], &parent.fit.nuisance[..]);
-    let fit = descend(End::after(STEPS).roughly(), problem, &selection, &parent.fit.noise, at, linear);
+    let fit = descend(end.roughly(), problem, &selection, &parent.fit.noise, at, linear);
     let of = &problem.spec().mechanisms[mechanism];
     let shared = |p: &&usize| problem.spec().parameters[**p].scope == Scope::Shared;
     let slots = of.parameters.iter().chain(&of.companions).filter(shared).map(|&p| problem.slots[p]);

@@ -12,6 +12,7 @@ use crate::problem::{Problem, RunRows};
 use crate::selection::candidate::{Candidate, Guess, candidate, finish};
 use crate::selection::parts::{BEAM, MOST, best_evidence, from_larger, unknown_parts, worth};
 use crate::selection::screening::{Promising, Screening};
+use crate::selection::several_places::{MOST_MEMBERS, NEEDED, without_each};
 use crate::statistics::median;
 
 /// Sets within this log evidence of the best may become it once their best top is found.
@@ -29,7 +30,8 @@ pub(crate) struct Searched {
     pub(crate) unfitted: Vec<(usize, PredictError)>,
 }
 
-/// Tries sets of mechanisms: each alone, then the best ones with one more, to three at work; `None` where `tell` stops it.
+/// Tries sets of mechanisms: each alone, then the best ones with one more, to three at work, and to more where these are of three kinds; `None`
+/// where `tell` stops it.
 pub(crate) fn search(
     problem: &Problem<'_>,
     rule: &NoiseRule,
@@ -78,6 +80,9 @@ pub(crate) fn search(
             grow(problem, rule, &mut screening, &mut all, &mut unfitted, (&[best], allowed));
         }
     }
+    if !widen(problem, rule, &mut screening, &mut all, &mut unfitted, (allowed, tell)) {
+        return None;
+    }
     from_larger(problem, rule, &mut all);
     // Beside a leftover no difference between neighbouring tops decides anything.
     let likeliest = all.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence));
@@ -85,6 +90,44 @@ pub(crate) fn search(
         polish(problem, rule, &mut all);
     }
     Some(Searched { all, unfitted })
+}
+
+/// Goes on from the likeliest set of three with mechanisms of its kinds at other places (friction in each joint of an arm), one at a time, as long
+/// as each is clearly needed; then without those that were needed only until others came. Whether it was not stopped.
+fn widen(
+    problem: &Problem<'_>,
+    rule: &NoiseRule,
+    screening: &mut Option<Screening>,
+    all: &mut Vec<Candidate>,
+    unfitted: &mut Vec<(usize, PredictError)>,
+    (allowed, tell): (&[usize], &(dyn Fn(f64) -> bool + Sync)),
+) -> bool {
+    let likeliest =
+        |all: &[Candidate]| (0..all.len()).max_by(|&a, &b| worth(&all[a]).total_cmp(&worth(&all[b])));
+    let Some(mut best) = likeliest(all).filter(|_| screening.is_some()) else { return true };
+    if problem.at_work(&all[best].set).len() < MOST {
+        return true;
+    }
+    let three = best;
+    while all[best].set.len() < MOST_MEMBERS && !down_to_noise(problem, rule, &all[best]) {
+        let known = all.len();
+        grow(problem, rule, screening, all, unfitted, (&[best], allowed));
+        let Some(better) = likeliest(all).filter(|&i| i >= known) else { break };
+        if worth(&all[better]) < worth(&all[best]) + NEEDED {
+            break;
+        }
+        best = better;
+        if !tell(1.0) {
+            return false;
+        }
+    }
+    while best != three {
+        let known = all.len();
+        all.extend(without_each(problem, rule, all, best));
+        let Some(better) = likeliest(all).filter(|&i| i >= known) else { break };
+        best = better;
+    }
+    true
 }
 
 /// Fits the sets of a layer with one more mechanism each.
@@ -199,7 +242,7 @@ fn want(
     start: Option<Guess>,
 ) {
     let mut set = all[parent].set.clone();
-    if set.contains(&mechanism) {
+    if !problem.may_join(&set, mechanism) {
         return;
     }
     set.push(mechanism);

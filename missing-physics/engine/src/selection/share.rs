@@ -13,6 +13,10 @@ use crate::problem::{Problem, Selection};
 /// Groups in which runs, or the rows of a single run, are left out.
 const FOLDS: usize = 5;
 
+/// Times by which the standard error of a nuisance parameter is larger without the rows that are left out from which on the others do not tell it: a
+/// start that has faded by the end of the first piece.
+const UNTOLD: f64 = 10.0;
+
 /// Into what the rows of a single run are cut, before every fifth piece is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
@@ -34,7 +38,7 @@ impl Cut {
 /// Sum of squares, in units of the noise beside which slow effects are seen, by which unseen data miss a fit beyond the noise.
 ///
 /// Each run (or each of five groups of runs) is left out in turn, its nuisance parameters then fitted to it; of a single run, every fifth
-/// of its pieces. Fits are plain least squares: a slow misfit is not taken for noise.
+/// of its pieces, its nuisance parameters then fitted to all of it where the rest of the rows does not tell them. Fits are plain least squares: a slow misfit is not taken for noise.
 pub(crate) fn unseen_misfit(
     problem: &Problem<'_>,
     selection: &Selection,
@@ -76,7 +80,15 @@ pub(crate) fn unseen_misfit(
         };
         let (others, start) = (without(true), (&fit.shared[..], &fit.nuisance[..]));
         let trained = solve_until(End::again(problem), &others, selection, white, start)?;
-        Ok(miss(residuals_at(&without(false), &trained.shared, &trained.nuisance)?))
+        let error = |fit: &Fit, i: usize| fit.nuisance_errors[0].error[i];
+        let told = |i: usize| error(&trained, i) < UNTOLD * error(fit, i);
+        let nuisance = if (0..selection.nuisance.len()).all(told) {
+            trained.nuisance
+        } else {
+            let start = (&trained.shared[..], &trained.nuisance[..]);
+            solve_until(End::again(problem), problem, &known, white, start)?.nuisance
+        };
+        Ok(miss(residuals_at(&without(false), &trained.shared, &nuisance)?))
     };
     let chords = (runs > 1).then(|| Chords::new(problem, selection, white, fit)).transpose()?;
     let of_fold = |fold: usize| chords.as_ref().map_or_else(|| of_rows(fold), |chords| of_runs(chords, fold));

@@ -6,11 +6,11 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Diagnosis, Law, NextExperiment, Verdict};
+use missing_physics::diagnosis::{Diagnosis, Law, NextExperiment, Verdict, listed};
 
 use super::context::ReportContext;
 use super::figure::FIGURE_STYLE;
-use super::number::{estimate, listed, p_value, significant};
+use super::number::{estimate, p_value, significant};
 use super::svg::{CHART_STYLE, escape};
 use super::text::{
     as_if, closest, headline, law_kind, left_by_law, leftover_sentence, limits, noise_sentence, runs,

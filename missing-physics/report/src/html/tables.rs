@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use missing_physics::diagnosis::{Confusion, Diagnosis, Outlier};
+use missing_physics::diagnosis::{Confusion, Diagnosis, Outlier, listed};
 
 use super::list;
 use crate::context::ReportContext;
-use crate::number::{listed, significant};
+use crate::number::significant;
 use crate::quantity::label;
 use crate::runs::{by_misfit, residuals, sigma};
 use crate::svg::escape;
