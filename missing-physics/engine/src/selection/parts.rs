@@ -23,6 +23,11 @@ pub(super) fn best_evidence<'a>(of: impl Iterator<Item = &'a Candidate>) -> f64 
     of.map(worth).fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// Where the likeliest of the sets stands, of those that are explanations.
+pub(super) fn likeliest(all: &[Candidate]) -> Option<usize> {
+    (0..all.len()).max_by(|&a, &b| worth(&all[a]).total_cmp(&worth(&all[b])))
+}
+
 /// The fit of a larger set some steps on, without what a part of it has not.
 pub(super) fn without_the_rest(problem: &Problem<'_>, part: &[usize], whole: &Fit) -> Option<Fit> {
     let begins = without_more(problem, part, whole);

@@ -10,7 +10,7 @@ use crate::model::PredictError;
 use crate::noise::rule::NoiseRule;
 use crate::problem::{Problem, RunRows};
 use crate::selection::candidate::{Candidate, Guess, candidate, finish};
-use crate::selection::parts::{BEAM, MOST, best_evidence, from_larger, unknown_parts, worth};
+use crate::selection::parts::{BEAM, MOST, best_evidence, from_larger, likeliest, unknown_parts, worth};
 use crate::selection::screening::{Promising, Screening};
 use crate::selection::several_places::{MOST_MEMBERS, NEEDED, without_each};
 use crate::statistics::median;
@@ -74,8 +74,7 @@ pub(crate) fn search(
     if screening.is_some() {
         let known = all.len();
         all.extend(unknown_parts(problem, rule, &all));
-        let likeliest = (0..all.len()).max_by(|&a, &b| worth(&all[a]).total_cmp(&worth(&all[b])));
-        let found = likeliest.filter(|&best| best >= known && at_work(&all[best]) < MOST);
+        let found = likeliest(&all).filter(|&best| best >= known && at_work(&all[best]) < MOST);
         if let Some(best) = found.filter(|&best| !down_to_noise(problem, rule, &all[best])) {
             grow(problem, rule, &mut screening, &mut all, &mut unfitted, (&[best], allowed));
         }
@@ -102,8 +101,6 @@ fn widen(
     unfitted: &mut Vec<(usize, PredictError)>,
     (allowed, tell): (&[usize], &(dyn Fn(f64) -> bool + Sync)),
 ) -> bool {
-    let likeliest =
-        |all: &[Candidate]| (0..all.len()).max_by(|&a, &b| worth(&all[a]).total_cmp(&worth(&all[b])));
     let Some(mut best) = likeliest(all).filter(|_| screening.is_some()) else { return true };
     if problem.at_work(&all[best].set).len() < MOST {
         return true;
