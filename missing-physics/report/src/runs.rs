@@ -47,8 +47,14 @@ pub(super) fn residuals<'a>(
 
 /// One sigma of a channel's noise, if it is known and above zero.
 pub(super) fn sigma(d: &Diagnosis, c: usize) -> Option<f64> {
-    let noise = d.noise.iter().find(|n| n.channel == d.channels[c].0)?;
-    Some(noise.sigma).filter(|s| s.is_finite() && *s > 0.0)
+    sigma_of(d, &d.channels[c].0)
+}
+
+/// The same of a channel by name; beside a leftover that of the noise alone, since the channel's errors hold the leftover as well.
+pub(super) fn sigma_of(d: &Diagnosis, channel: &str) -> Option<f64> {
+    let left = d.leftover.iter().find(|place| place.channel == channel).map(|place| place.sigma);
+    let noise = || d.noise.iter().find(|n| n.channel == channel).map(|n| n.sigma);
+    left.or_else(noise).filter(|s| s.is_finite() && *s > 0.0)
 }
 
 /// The channels, those that miss first.

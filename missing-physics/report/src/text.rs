@@ -9,6 +9,7 @@ use missing_physics::diagnosis::{
 
 use super::context::ReportContext;
 use super::number::{estimate, in_unit, p_value, p_words, probability, significant, with_error};
+use super::runs::sigma_of;
 
 const WIDTH: usize = 100;
 const INDENT: usize = 9;
@@ -391,7 +392,7 @@ fn unseen_errors(d: &Diagnosis) -> Vec<(&'static str, String)> {
             let noise = noise.map_or_else(String::new, |n| {
                 let (sigma, of) = match &n.scatter {
                     Some(scatter) => (scatter.white, "noise of each reading"),
-                    None => (n.sigma, "noise"),
+                    None => (sigma_of(d, &n.channel).unwrap_or(n.sigma), "noise"),
                 };
                 format!(" ({of} {})", in_unit(sigma, 2, unit_of(d, &n.channel)))
             });

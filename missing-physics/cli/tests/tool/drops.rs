@@ -91,7 +91,7 @@ fn drag_is_found_where_a_restitution_wanders() {
 #[test]
 fn a_single_drop_is_doubted_no_more_often_than_promised() {
     let world = BounceWorld { runs: 1, noise_known: false, ..BounceWorld::drops() };
-    let p: Vec<f64> = (0..60).map(|seed| p_value(&world, 1900 + seed, 399)).collect();
+    let p: Vec<f64> = (0..60).map(|seed| p_value(&world, 1900 + seed, 199)).collect();
     let [five, one] = [0.05, 0.01].map(|level| p.iter().filter(|p| **p <= level).count());
     println!("{five} at 5 %, {one} at 1 % of {}", p.len());
     assert!(five < 9 && one < 3, "{five} at 5 %, {one} at 1 % of {}", p.len());

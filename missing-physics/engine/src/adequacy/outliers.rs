@@ -1,6 +1,6 @@
 //! Wild readings: set aside before anything is judged, and listed.
 
-use crate::adequacy::linearised::{JUMP, LAPSE, Linearised};
+use crate::adequacy::linearised::{JUMP, Linearised, longest_lapse};
 use crate::data::Recording;
 use crate::fit::alternate::fit;
 use crate::fit::prediction::residuals;
@@ -98,7 +98,7 @@ fn is_lapse(recording: &Recording, series: &[Aside]) -> bool {
     let (Some(first), Some(last)) = (series.first(), series.last()) else { return false };
     let rows = recording.runs[first.place.0].len();
     let far = series.iter().all(|wild| wild.z.abs() > JUMP);
-    far && series.len() * LAPSE <= rows && first.place.2 > 0 && last.place.2 + 1 < rows
+    far && series.len() <= longest_lapse(rows) && first.place.2 > 0 && last.place.2 + 1 < rows
 }
 
 /// Rows that stand in a series: what lasts is an effect, not an accident.

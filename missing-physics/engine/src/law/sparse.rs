@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::diagnosis::{Estimate, Law};
 use crate::estimate::estimates::estimates;
+use crate::fit::optimum::Fit;
 use crate::fit::prediction::predictions;
 use crate::law::added::AddedLaw;
 use crate::law::describe::number;
@@ -84,7 +85,7 @@ impl Sparse {
     }
 }
 
-/// The law of at most so many terms that forward selection ends at; none where the first gains nothing.
+/// The law of at most so many terms that forward selection ends at, without those that it needs no more; none where the first gains nothing.
 pub(crate) fn selected(
     problem: &Problem<'_>,
     rule: &NoiseRule,
@@ -95,6 +96,14 @@ pub(crate) fn selected(
     let spec = problem.spec();
     // The best of very many has to gain more.
     let least_gain = LEAST_GAIN + (spec.terms.len() as f64 / MANY as f64).max(1.0).ln();
+    let fitted = |terms: Vec<usize>, from: &Fit| -> Option<Sparse> {
+        let fitted = candidate(problem, rule, &start.set, &terms, from, &[vec![]]).ok()?;
+        let score = held_out(problem, &fitted).ok()?;
+        let sound = fitted.ruled_out.is_none() && fitted.evidence.is_finite();
+        sound.then_some(Sparse { terms, fitted, score })
+    };
+    let best =
+        |tried: Vec<Sparse>| tried.into_iter().max_by(|a, b| a.score.log_score.total_cmp(&b.score.log_score));
     let mut law: Option<Sparse> = None;
     while law.as_ref().is_none_or(|law| law.terms.len() < most) {
         let chosen = law.as_ref().map_or(&[][..], |law| &law.terms);
@@ -102,22 +111,28 @@ pub(crate) fn selected(
         let others = (0..spec.terms.len()).filter(|t| !chosen.contains(t)).collect();
         let tried: Vec<Sparse> = promising(problem, beside, chosen, others)
             .into_par_iter()
-            .filter_map(|t| {
-                let terms: Vec<usize> = chosen.iter().copied().chain([t]).collect();
-                let fitted = candidate(problem, rule, &start.set, &terms, &beside.fit, &[vec![]]).ok()?;
-                let score = held_out(problem, &fitted).ok()?;
-                let sound = fitted.ruled_out.is_none() && fitted.evidence.is_finite();
-                sound.then_some(Sparse { terms, fitted, score })
-            })
+            .filter_map(|t| fitted(chosen.iter().copied().chain([t]).collect(), &beside.fit))
             .collect();
         let bar = law.as_ref().map_or(seen.log_score, |law| law.score.log_score) + least_gain;
-        let best = tried.into_iter().max_by(|a, b| a.score.log_score.total_cmp(&b.score.log_score));
-        match best.filter(|best| best.score.log_score > bar) {
+        match best(tried).filter(|best| best.score.log_score > bar) {
             Some(best) => law = Some(best),
             None => break,
         }
     }
-    law
+    let mut law = law?;
+    // The first terms may have stood in for later ones.
+    while law.terms.len() > 1 {
+        let without = |&term: &usize| {
+            let terms = law.terms.iter().copied().filter(|t| *t != term).collect();
+            fitted(terms, &law.fitted.fit)
+        };
+        let tried: Vec<Sparse> = law.terms.par_iter().filter_map(without).collect();
+        match best(tried).filter(|best| best.score.log_score > law.score.log_score - least_gain) {
+            Some(fewer) => law = fewer,
+            None => break,
+        }
+    }
+    Some(law)
 }
 
 /// Of many terms those whose first step of a fit, beside a set with some already, gains most.

@@ -32,8 +32,9 @@ const LEAST: f64 = 0.5;
 const CHANCE: f64 = 3.0;
 /// A rival takes away at least this part of the misfit.
 const RIVAL_SHARE: f64 = 0.85;
-/// A set that leaves less than so many times what the chosen one leaves is not ruled out by that: with eight directions open to a smooth
-/// leftover, its log Bayes factor against one that is smaller by this factor is [`NEEDED`].
+/// Log Bayes factor of a leftover against one that is larger by a factor e, with eight directions open to a smooth leftover.
+const OF_A_FACTOR: f64 = 4.0;
+/// A set that leaves less than so many times what the chosen one leaves is not ruled out by that: its log Bayes factor is less than [`NEEDED`].
 const RIVAL_MISFIT: f64 = 3.5;
 /// Directions among smooth functions that a leftover may take.
 const DIRECTIONS: f64 = 6.0;
@@ -214,10 +215,15 @@ impl<'a> Judge<'a> {
                     self.each_acts(j, least) && self.needed(i, j) && self.beats_its_parts(j)
                 })
             };
-            let mut judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
-            judged.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
-            match judged.into_iter().next() {
-                Some(likeliest) => found = Some(likeliest),
+            let judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
+            let evidence = |j: &Judged| j.candidate.evidence;
+            let most = judged.iter().map(evidence).fold(f64::NEG_INFINITY, f64::max);
+            // Where the evidence beside a leftover does not decide, unseen data have a say.
+            let left = |j: &Judged| j.misfit + self.misfit_of_noise() / CHANCE;
+            let worth = |j: &Judged| evidence(j) - OF_A_FACTOR * left(j).ln();
+            let as_likely = judged.into_iter().filter(|j| evidence(j) > most - NEEDED);
+            match as_likely.max_by(|a, b| worth(a).total_cmp(&worth(b))) {
+                Some(best) => found = Some(best),
                 None if found.is_some() => break,
                 None => {}
             }

@@ -29,24 +29,24 @@ impl Line {
     }
 }
 
-/// The same with its term.
-struct WithTerm(Line, Spec);
+/// A curve with candidate terms.
+struct WithTerms(Curve, Spec);
 
-impl WithTerm {
-    fn new() -> Self {
-        let line = Line::new();
-        let quartic = Term {
-            parameter: 2,
-            formula: "x^4".into(),
+impl WithTerms {
+    /// Terms by formula, each with the parameter that is its coefficient.
+    fn new(curve: Curve, terms: &[(&str, usize)]) -> Self {
+        let term = |&(formula, parameter): &(&str, usize)| Term {
+            parameter,
+            formula: formula.into(),
             adds_to: Quantity::new("y", ""),
             variables: vec!["x".into()],
         };
-        let spec = Spec { terms: vec![quartic], ..line.0.spec().clone() };
-        Self(line, spec)
+        let spec = Spec { terms: terms.iter().map(term).collect(), ..curve.spec().clone() };
+        Self(curve, spec)
     }
 }
 
-impl Model for WithTerm {
+impl Model for WithTerms {
     fn spec(&self) -> &Spec {
         &self.1
     }
@@ -58,7 +58,7 @@ impl Model for WithTerm {
         nuisance: &[f64],
         out: &mut [f64],
     ) -> Result<(), PredictError> {
-        self.0.0.predict(run, shared, nuisance, out)
+        self.0.predict(run, shared, nuisance, out)
     }
 }
 
@@ -155,8 +155,29 @@ fn an_oscillation_of_every_other_row_is_the_slow_one() {
 
 #[test]
 fn terms_predict() {
-    let kept = kept(&WithTerm::new(), |x| x + 0.004 * x.powi(4));
+    let model = WithTerms::new(Line::new().0, &[("x^4", 2)]);
+    let kept = kept(&model, |x| x + 0.004 * x.powi(4));
     assert_eq!(kept.law, Some(AddedLaw::Terms { coefficients: vec!["quartic".into()] }));
+}
+
+/// Two terms, of which a third is nearly the sum: it comes first, and goes when both are there.
+#[test]
+fn a_term_that_stood_in_for_others_goes() {
+    let parameters = ["slope", "kink", "slow", "fast", "both"];
+    let parameters = parameters.map(|name| parameter(name, f64::from(name == "slope"), ANY)).into();
+    let law = |s: &[f64], _: &[f64], x: f64| {
+        let kink = s[1] * (x - 3.0).clamp(0.0, 0.1);
+        s[0] * x
+            + kink
+            + s[2] * x.sin()
+            + s[3] * (2.0 * x).cos()
+            + s[4] * (x.sin() + (2.0 * x).cos() + 0.4 * (5.0 * x).sin())
+    };
+    let curve = Curve::new(parameters, vec![mechanism("kink", vec![1])], law);
+    let model = WithTerms::new(curve, &[("sin(x)", 2), ("cos(2 x)", 3), ("both(x)", 4)]);
+    let kept = kept(&model, |x| x + x.sin() + 0.9 * (2.0 * x).cos());
+    let two = ["slow", "fast"].map(String::from).into();
+    assert_eq!(kept.law, Some(AddedLaw::Terms { coefficients: two }));
 }
 
 #[test]

@@ -17,5 +17,5 @@ mod shapes;
 mod solve;
 
 pub(crate) use curves::DEGREE;
-pub(crate) use outliers::{JUMP, LAPSE};
+pub(crate) use outliers::{JUMP, longest_lapse};
 pub(crate) use plane::{Linearised, Reading, ScoredNoise};

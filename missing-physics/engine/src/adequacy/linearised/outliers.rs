@@ -23,12 +23,19 @@ const SHOWN: f64 = 5.0;
 /// A channel with fewer measured rows has no scale of its own to judge a row by.
 const FEWEST_ROWS: usize = 24;
 
-/// A lapse of a sensor (a camera that followed something else, a contact that was lost) is at most one row in so many of its run.
-pub(crate) const LAPSE: usize = 100;
+/// A lapse of a sensor (a camera that followed something else, a contact that was lost) is at most one row in so many of its run,
+const LAPSE: usize = 100;
+/// or two in a run of so many rows.
+const TWO_ROWS: usize = 40;
 /// It begins and ends with jumps of so many robust sigmas of the steps from row to row,
 pub(crate) const JUMP: f64 = 25.0;
 /// and stays away by at least this part of the first jump; where it is over, the readings are back to within the rest.
 const AWAY: f64 = 0.5;
+
+/// Rows of the longest lapse in a run of so many.
+pub(crate) const fn longest_lapse(rows: usize) -> usize {
+    if rows >= TWO_ROWS && rows < 2 * LAPSE { 2 } else { rows / LAPSE }
+}
 
 /// How far a row lies from what all others say of it, in sigmas, and whether it stands alone.
 type RowScore = (f64, bool);
@@ -168,7 +175,7 @@ fn lapses(left: &[f64], resolution: f64) -> Vec<(Range<usize>, f64)> {
         return Vec::new();
     };
     let sigma = (usual / 0.6745).max(STEPS * resolution);
-    let (limit, longest) = (JUMP * sigma, left.len() / LAPSE);
+    let (limit, longest) = (JUMP * sigma, longest_lapse(left.len()));
     let mut found = Vec::new();
     let mut first = 1;
     while first < left.len() {
