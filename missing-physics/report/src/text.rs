@@ -442,9 +442,19 @@ pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
             n.source.word()
         );
     }
+    let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
+    let over = significant(n.correlation_length, 2);
+    let left = d.leftover.iter().find(|place| place.channel == n.channel);
+    if let Some(place) = left.filter(|_| n.correlated_share > 0.0) {
+        return format!(
+            "{}: {} (from {}); what is left beside it is taken for an error of {} that varies over {over} {along}",
+            n.channel,
+            in_unit(place.sigma, 2, unit),
+            n.source.word(),
+            in_unit(n.sigma, 2, unit)
+        );
+    }
     let colour = if n.correlated_share > 0.0 {
-        let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
-        let over = significant(n.correlation_length, 2);
         let blind =
             if n.correlation_rows > SLOW { ": a slow misfit of that size would not be seen" } else { "" };
         format!(", {:.0} % of its variance correlated over {over} {along}{blind}", 100.0 * n.correlated_share)
