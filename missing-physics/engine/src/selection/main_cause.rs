@@ -219,7 +219,7 @@ impl<'a> Judge<'a> {
             let evidence = |j: &Judged| j.candidate.evidence;
             let most = judged.iter().map(evidence).fold(f64::NEG_INFINITY, f64::max);
             // Where the evidence beside a leftover does not decide, unseen data have a say.
-            let left = |j: &Judged| j.misfit + self.misfit_of_noise() / CHANCE;
+            let left = |j: &Judged| j.misfit + self.rough.whole_spread(self.problem);
             let worth = |j: &Judged| evidence(j) - OF_A_FACTOR * left(j).ln();
             let as_likely = judged.into_iter().filter(|j| evidence(j) > most - NEEDED);
             match as_likely.max_by(|a, b| worth(a).total_cmp(&worth(b))) {
