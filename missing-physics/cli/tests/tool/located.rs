@@ -98,3 +98,22 @@ fn a_softer_stripe_of_the_table_is_found_where_it_is() {
         assert_eq!(place.as_if.as_ref().unwrap().what, "another restitution");
     }
 }
+
+/// A hull's baseline can be scaled: beside an amount of what was measured it would leave nothing, of whatever was measured.
+#[test]
+fn a_bump_on_the_way_of_a_hull_is_found_where_it_is() {
+    const PLAIN: f64 = 15.0;
+    let of_a_hull = |world: &Concealed| {
+        let bump = world.key.place.as_ref().is_some_and(|place| place.variable == "inclinometer_rad");
+        bump && world.key.strength.is_some_and(|strength| strength > PLAIN)
+    };
+    for world in worlds_of("motion", Hidden::Local).filter(of_a_hull).take(3) {
+        let (_, answer) = diagnosed(&world);
+        let (place, hidden) = (answer.location.first().unwrap(), world.key.place.as_ref().unwrap());
+        assert_eq!(place.variable.as_deref(), Some("inclinometer_rad"));
+        let (from, to) = (place.from.unwrap(), place.to.unwrap());
+        let both = to.min(hidden.to) - from.max(hidden.from);
+        assert!(both > 0.5 * (to.max(hidden.to) - from.min(hidden.from)), "{place:?} {hidden:?}");
+        assert_eq!(place.as_if.as_ref().unwrap().what, "a force");
+    }
+}

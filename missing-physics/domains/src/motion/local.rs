@@ -197,7 +197,9 @@ fn closed(times: &[f64], column: &[f64]) -> Option<Vec<f64>> {
     let (first, last) = (*known.first()?, *known.last()?);
     let at = |i: usize| {
         let next = known.partition_point(|&k| k < i);
-        if i <= first {
+        if column[i].is_finite() {
+            column[i]
+        } else if i <= first {
             column[first]
         } else if i >= last {
             column[last]

@@ -1,6 +1,7 @@
 //! Variables along which a cause may act in an interval, and bins along them.
 
 use crate::fit::optimum::Fit;
+use crate::fit::prediction::residuals;
 use crate::model::{LocalCauses, PredictError, Quantity};
 use crate::problem::Problem;
 
@@ -13,6 +14,9 @@ const FINER: usize = 12;
 pub(crate) struct Along {
     pub(crate) quantity: Quantity,
     pub(crate) values: Vec<Vec<f64>>,
+    /// What the baseline expects there, where a channel is the variable; the values else. The size of a cause goes along this: what was measured is
+    /// the baseline and the residual, so that beside a baseline that can be scaled a part of it would leave nothing.
+    pub(crate) expected: Vec<Vec<f64>>,
     /// Standard error of the values; zero where they are exact.
     pub(crate) error: f64,
 }
@@ -22,6 +26,27 @@ impl Along {
     pub(crate) fn counts(&self) -> bool {
         self.quantity.unit.is_empty() && self.values.iter().flatten().all(|value| value.fract() == 0.0)
     }
+
+    /// Values that are known to a standard error; what is expected is set by [`Self::expect`].
+    fn new(quantity: Quantity, values: Vec<Vec<f64>>, error: f64) -> Self {
+        Self { quantity, expected: values.clone(), values, error }
+    }
+
+    /// Takes the baseline's residuals, `[run][channel][measured row]`, off what is a channel, row by row.
+    fn expect(&mut self, problem: &Problem<'_>, left: &[Vec<Vec<f64>>]) {
+        let is_channel = |channel: &usize| {
+            let mut runs = problem.rows.iter().zip(&problem.recording.runs).zip(&self.values);
+            runs.all(|((rows, run), values)| {
+                rows.valid[*channel]
+                    .iter()
+                    .all(|&i| values[i].to_bits() == run.outputs[*channel][i].to_bits())
+            })
+        };
+        let Some(channel) = (0..problem.channels()).find(is_channel) else { return };
+        for ((rows, expected), left) in problem.rows.iter().zip(&mut self.expected).zip(left) {
+            rows.valid[channel].iter().zip(&left[channel]).for_each(|(&i, left)| expected[i] -= left);
+        }
+    }
 }
 
 /// The variables along which an interval may lie: the inputs, in the order of the recording (the number of the row where there are none),
@@ -30,15 +55,14 @@ pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, 
     let recording = &problem.recording;
     let causes = problem.model.extensions().local_causes;
     let errors = causes.map(LocalCauses::variable_errors).unwrap_or_default();
-    let input = |(v, quantity): (usize, &Quantity)| Along {
-        quantity: quantity.clone(),
-        values: recording.runs.iter().map(|run| run.inputs[v].clone()).collect(),
-        error: errors.get(v).copied().unwrap_or(0.0),
+    let input = |(v, quantity): (usize, &Quantity)| {
+        let values = recording.runs.iter().map(|run| run.inputs[v].clone()).collect();
+        Along::new(quantity.clone(), values, errors.get(v).copied().unwrap_or(0.0))
     };
     let mut all: Vec<Along> = recording.variables.iter().enumerate().map(input).collect();
     if all.is_empty() {
         let rows = recording.runs.iter().map(|run| (0..run.len()).map(|row| row as f64).collect());
-        all.push(Along { quantity: Quantity::new("row", ""), values: rows.collect(), error: 0.0 });
+        all.push(Along::new(Quantity::new("row", ""), rows.collect(), 0.0));
     }
     let Some(causes) = causes else { return Ok(all) };
     let states = causes.states();
@@ -53,7 +77,9 @@ pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, 
             && rows.all(|(v, run)| v.len() == run.len() && v.iter().all(|x| x.is_finite()))
     };
     let followed = states.into_iter().zip(values).filter(|(_, values)| whole(values));
-    all.extend(followed.map(|(quantity, values)| Along { quantity, values, error: 0.0 }));
+    all.extend(followed.map(|(quantity, values)| Along::new(quantity, values, 0.0)));
+    let left = residuals(problem, fit)?;
+    all.iter_mut().for_each(|along| along.expect(problem, &left));
     Ok(all)
 }
 

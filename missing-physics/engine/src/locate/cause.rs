@@ -32,6 +32,8 @@ const COUNT_PART: f64 = 0.05;
 /// Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): unknowns and variables count in the order in which the model and the
 /// recording have them.
 const UNTOLD: f64 = 2.0;
+/// Nor what is worth less by this part of the best: neither a baseline nor a push that is even or bent is known that well.
+const UNTOLD_PART: f64 = 0.003;
 /// What is worth less than this part of the best, with edges that are far apart, cannot be the best with finer ones.
 const NEAR: f64 = 0.9;
 
@@ -55,6 +57,8 @@ pub(crate) struct Cause {
     pub(crate) everywhere: bool,
     /// By how much that of each channel falls.
     pub(crate) gains: Vec<f64>,
+    /// By how much that of each run falls: it rises where the cause would act and does not.
+    pub(crate) of_runs: Vec<f64>,
 }
 
 /// What is scanned.
@@ -94,7 +98,8 @@ impl Scene<'_> {
             judged.extend(finer.collect::<Result<Vec<_>, PredictError>>()?);
         }
         let most = judged.iter().map(|j| j.0).fold(f64::NEG_INFINITY, f64::max);
-        let first = judged.into_iter().find(|j| j.0 >= most - UNTOLD);
+        let told = UNTOLD.max(UNTOLD_PART * most);
+        let first = judged.into_iter().find(|j| j.0 >= most - told);
         first.map(|(_, unknown, along, found)| self.cause(unknown, along, found)).transpose()
     }
 
@@ -226,10 +231,26 @@ impl Scene<'_> {
             })
             .collect();
         let gains = gains(self.problem, &self.projection.residual, &after);
+        let square = |run: &Vec<f64>| dot(run, run);
+        let of_runs =
+            residual.iter().zip(&after).map(|(before, after)| square(before) - square(after)).collect();
         let worth = found.worth();
         let everywhere = found.all_along() && !found.runs.contains(&false);
         let Found { bins, interval, runs, price, members, .. } = found;
-        Ok(Cause { unknown, along, bins, interval, runs, members, sizes, worth, price, everywhere, gains })
+        Ok(Cause {
+            unknown,
+            along,
+            bins,
+            interval,
+            runs,
+            members,
+            sizes,
+            worth,
+            price,
+            everywhere,
+            gains,
+            of_runs,
+        })
     }
 }
 

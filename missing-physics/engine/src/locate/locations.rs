@@ -310,7 +310,9 @@ impl Places<'_> {
     ) -> Vec<(f64, Location)> {
         let within = cause.within(along);
         let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
-        let runs: Vec<bool> = cause.runs.iter().enumerate().map(|(r, acts)| *acts && touched(r)).collect();
+        // A run that hardly comes there, or the worse for a cause there, does not show it.
+        let shows = |run: usize| cause.runs[run] && touched(run) && cause.of_runs[run] > 0.0;
+        let runs: Vec<bool> = (0..cause.runs.len()).map(shows).collect();
         // A size that may as well be nothing says nothing.
         let known = cause.sizes.iter().any(|(_, [size, error])| size.abs() > CI95 * error);
         let as_if = (known && unknown.is_model_s()).then(|| AsIf {

@@ -155,8 +155,13 @@ fn amounts(
     size: impl Fn(f64) -> f64,
     within: impl Fn(usize, usize) -> bool,
 ) -> Vec<Vec<f64>> {
-    let of_row = |run: usize, x: f64| if within(run, bins.of(x)) { size(bins.along(x)) } else { 0.0 };
-    along.values.iter().enumerate().map(|(r, v)| v.iter().map(|x| of_row(r, *x)).collect()).collect()
+    let of_row = |run: usize, (x, expected): (&f64, &f64)| {
+        if within(run, bins.of(*x)) { size(bins.along(*expected)) } else { 0.0 }
+    };
+    let of_run = |(run, (values, expected)): (usize, (&Vec<f64>, &Vec<f64>))| {
+        values.iter().zip(expected).map(|row| of_row(run, row)).collect()
+    };
+    along.values.iter().zip(&along.expected).enumerate().map(of_run).collect()
 }
 
 /// What is asked of: a component of an unknown, along a variable.
@@ -214,8 +219,10 @@ impl Responses {
         let edges = bins.len() + 1;
         let runs = problem.rows.len();
         let mut columns: Vec<Vec<Vec<f64>>> = vec![Vec::with_capacity(POWERS * edges); runs];
-        let placed = |values: &Vec<f64>| values.iter().map(|x| (bins.of(*x), bins.along(*x))).collect();
-        let rows: Vec<Vec<(usize, f64)>> = along.values.iter().map(placed).collect();
+        let placed = |(values, expected): (&Vec<f64>, &Vec<f64>)| {
+            values.iter().zip(expected).map(|(x, e)| (bins.of(*x), bins.along(*e))).collect()
+        };
+        let rows: Vec<Vec<(usize, f64)>> = along.values.iter().zip(&along.expected).map(placed).collect();
         let only = |power: usize, bin: usize| -> Vec<Vec<f64>> {
             let size = |&(b, x): &(usize, f64)| if b == bin { x.powi(power as i32) } else { 0.0 };
             rows.iter().map(|run| run.iter().map(size).collect()).collect()

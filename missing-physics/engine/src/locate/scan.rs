@@ -153,8 +153,8 @@ fn normals(
         for c in 0..problem.channels() {
             for &i in &problem.rows[r].valid[c] {
                 let x = along.values[r][i];
-                let u = bins.along(x);
                 let known = columns.len() - 1;
+                let u = bins.along(along.expected[r][i]);
                 for (a, column) in row.iter_mut().zip(&columns[..known]) {
                     *a = column[k];
                 }

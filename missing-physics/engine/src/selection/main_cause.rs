@@ -21,7 +21,7 @@ use crate::selection::share::{Cut, unseen_misfit};
 
 /// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
 const NEEDED: f64 = 5.0;
-/// Wald's statistic at which a mechanism's size is as large as its standard error: of a smaller one nothing is known.
+/// Wald's statistic at which a size that may have either sign is as large as its standard error: of a smaller one nothing is known.
 const SIZE_KNOWN: f64 = 1.0;
 /// What a set of several leaves must be so many times smaller than what it leaves without any one of them: one that takes away less may
 /// be imitating the leftover. So must what a set leaves be with a cause in a part of the data.
@@ -211,8 +211,8 @@ impl<'a> Judge<'a> {
                 .collect();
             let needed = |i: usize| {
                 self.judged(i).filter(|j| {
-                    let least = if found.is_none() { SIZE_KNOWN } else { 2.0 * NEEDED };
-                    self.each_acts(j, least) && self.needed(i, j) && self.beats_its_parts(j)
+                    let acts = if found.is_none() { self.each_sign_known(j) } else { self.each_acts(j) };
+                    acts && self.needed(i, j) && self.beats_its_parts(j)
                 })
             };
             let judged: Vec<Judged> = wanted.into_par_iter().filter_map(needed).collect();
@@ -269,7 +269,7 @@ impl<'a> Judge<'a> {
 
     /// Whether a candidate is an explanation beside a leftover, each member of which acts there.
     pub(crate) fn acts(&self, at: usize) -> bool {
-        self.judged(at).is_some_and(|judged| self.each_acts(&judged, 2.0 * NEEDED))
+        self.judged(at).is_some_and(|judged| self.each_acts(&judged))
     }
 
     /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them; none where the baseline
@@ -382,28 +382,42 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Whether each member of a set acts, with errors that allow for the leftover: Wald's statistic of its parameters against where it is off is
-    /// above `least`.
-    fn each_acts(&self, judged: &Judged, least: f64) -> bool {
+    /// Whether each member of a set acts, by Wald's statistic of its strengths.
+    fn each_acts(&self, judged: &Judged) -> bool {
+        self.each_departs(judged, 2.0 * NEEDED, |_| true)
+    }
+
+    /// Whether the sign is known of each strength that may have either. Of one that has a single sign, such as a stop's stiffness, evidence alone
+    /// says whether it is there: an error as large as the stiffness is one of a stop that may be harder.
+    fn each_sign_known(&self, judged: &Judged) -> bool {
+        let table = &self.problem.shared;
+        let open =
+            |slot: usize| table.lower[slot] < table.start[slot] && table.start[slot] < table.upper[slot];
+        self.each_departs(judged, SIZE_KNOWN, open)
+    }
+
+    /// Whether Wald's statistic of each member's strengths among those `asked`, against where the member is off and with errors that allow for the
+    /// leftover, is above `least`.
+    fn each_departs(&self, judged: &Judged, least: f64, asked: impl Fn(usize) -> bool) -> bool {
         let Candidate { set, selection, fit, .. } = &judged.candidate;
         let covariance = covariance(&fit.information);
-        let acts = |m: &usize| {
+        let table = &self.problem.shared;
+        let departs = |m: &usize| {
             let mechanism = &self.problem.spec().mechanisms[*m];
             let strength = |i: &usize| {
-                let parameter = &self.problem.shared.index[selection.shared[*i]];
-                mechanism.parameters.contains(parameter) && !mechanism.shape_parameters.contains(parameter)
+                let slot = selection.shared[*i];
+                let parameter = &table.index[slot];
+                let of_it = mechanism.parameters.contains(parameter);
+                of_it && !mechanism.shape_parameters.contains(parameter) && asked(slot)
             };
             let known = |i: &usize| covariance[(*i, *i)].is_finite();
             let at: Vec<usize> = (0..selection.shared.len()).filter(strength).filter(known).collect();
-            let off = |i: usize| self.problem.shared.start[selection.shared[i]];
-            let departure = DVector::from_iterator(
-                at.len(),
-                at.iter().map(|&i| fit.shared[selection.shared[i]] - off(i)),
-            );
+            let departure = |&i: &usize| fit.shared[selection.shared[i]] - table.start[selection.shared[i]];
+            let departure = DVector::from_iterator(at.len(), at.iter().map(departure));
             let of_it = covariance.select_rows(&at).select_columns(&at);
             at.is_empty() || of_it.cholesky().is_none_or(|c| departure.dot(&c.solve(&departure)) > least)
         };
-        set.iter().all(acts)
+        set.iter().all(departs)
     }
 
     /// Whether a set of several is likelier than it is without any one member and with a leftover in that one's place.
@@ -444,7 +458,7 @@ impl<'a> Judge<'a> {
                 let less = &other.candidate.set;
                 less.len() < set.len() && less.iter().all(|m| set.contains(m))
             };
-            rivals.iter().any(part) && !self.each_acts(judged, 2.0 * NEEDED)
+            rivals.iter().any(part) && !self.each_acts(judged)
         };
         let mut rivals: Vec<Judged> = rivals.iter().filter(|judged| !adds(judged)).cloned().collect();
         rivals.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));
