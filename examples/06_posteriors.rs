@@ -11,7 +11,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints what it measures")]
 #![allow(clippy::unwrap_used, reason = "what the tests share stops where data are damaged")]
 
-#[path = "../bayes-sim/tests/common/mod.rs"]
+#[path = "../bayes-sim/tests/bayes/common/mod.rs"]
 mod common;
 
 use std::error::Error;
@@ -39,7 +39,7 @@ const PUBLISHED: [(&str, [f64; 3]); 10] = [
     ("lotka_volterra", [0.9994, 0.9968, 0.9808]),
 ];
 
-/// Simulations and training with seeds of their own; the first are those of `bayes-sim/tests/posteriors.rs`.
+/// Simulations and training with seeds of their own; the first are those of `bayes-sim/tests/bayes/posteriors.rs`.
 fn train(
     name: &str,
     task: &Task,

@@ -167,16 +167,17 @@ fn algorithm_2_does_not_believe_what_cannot_be() {
 #[test]
 fn a_ball_of_much_chance_moves_the_paddle_less() {
     let (seen, _) = straight(0.85, 0.05);
-    let step = |log10_kappa: f64| {
-        let mut tracker = Stochastic::new(learned(0.85, log10_kappa), SPACE, StochasticSettings::default());
+    let known = learned(0.85, 4.0);
+    let step = |next: NextBounce| {
+        let mut tracker = Stochastic::new(next, SPACE, StochasticSettings::default());
         tracker.heard(&seen[0], [0.5, 0.1], &mut dice(1));
         let goal = tracker.heard(&seen[1], [0.5, 0.1], &mut dice(1)).unwrap();
         (0.5 - goal.y_m).abs()
     };
-    let (sure, unsure) = (step(4.0), step(2.0));
+    let (sure, unsure) = (step(known.clone()), step(learned(0.85, 2.0)));
     // With a paddle that is wide enough it stays where it is.
     let wide = StochasticSettings { touch_m: 0.5, ..StochasticSettings::default() };
-    let mut tracker = Stochastic::new(learned(0.85, 4.0), SPACE, wide);
+    let mut tracker = Stochastic::new(known, SPACE, wide);
     tracker.heard(&seen[0], [0.4, 0.1], &mut dice(1));
     assert_eq!(tracker.heard(&seen[1], [0.4, 0.1], &mut dice(1)).unwrap().y_m, 0.4);
     println!("{sure:.3} m where the ball is sure, {unsure:.3} m where it is not");

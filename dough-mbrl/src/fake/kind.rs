@@ -18,7 +18,7 @@ pub struct DoughKind {
 const AXIAL_FLOW: [f64; 2] = [0.275, 0.9];
 
 /// Pressure (Pa) that dough bears with 1, 2, 3, 4 and 5 g of water: found once, by palpating the fake as in the test
-/// `stiffness_is_that_of_table_7_1`, so that its stiffness is that of Table 7.1.
+/// `stiffness_is_that_of`, so that its stiffness is that of Table 7.1.
 const HARDNESS_PA: [f64; 5] = [9260.0, 7280.0, 6310.0, 4730.0, 3440.0];
 
 impl DoughKind {

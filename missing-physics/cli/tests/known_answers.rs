@@ -639,7 +639,7 @@ fn measured_drops_are_drag_or_nothing() {
 }
 
 /// The measured decay of a wave: four effects at once, two of them outside the list (an arm that rings at two frequencies, a sensor
-/// whose rest value moved; `liquid-haptics/tests/measured_slosh.rs` takes it apart). The frequency that falls with the amplitude takes away
+/// whose rest value moved; `liquid-haptics/tests/liquid/measured_slosh.rs` takes it apart). The frequency that falls with the amplitude takes away
 /// nine tenths of the misfit, and the rest is said to be left.
 #[test]
 fn a_measured_wave_is_explained_in_part() {

@@ -154,7 +154,7 @@ fn mutants_are_read_or_refused() {
     let seeds = std::fs::read_to_string(kept()).unwrap();
     for kind in wanted() {
         let known = seeds.lines().filter_map(|line| line.strip_prefix(kind.name)?.trim().parse().ok());
-        for seed in (0..24).chain(known) {
+        for seed in (0..10).chain(known) {
             assert_eq!(caught(&kind, seed), None, "{} {seed}", kind.name);
         }
     }

@@ -122,6 +122,8 @@ pub struct Location {
     pub from: Option<f64>,
     /// End of the interval.
     pub to: Option<f64>,
+    /// Whether that is all that the variable takes in rows that were measured.
+    pub whole_range: bool,
     /// Labels of the runs in which it shows.
     pub runs: Vec<String>,
     /// Share of the whole misfit that lies here, in [0, 1].

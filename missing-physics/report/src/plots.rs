@@ -30,7 +30,7 @@ fn key(changed: bool, shaded: bool) -> String {
         key.push_str(" Blue: with what was found.");
     }
     if shaded {
-        key.push_str(" Without the shaded rows the simulation would hold.");
+        key.push_str(" The misfit is traced to the shaded rows.");
     }
     key
 }

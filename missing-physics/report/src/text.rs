@@ -353,6 +353,7 @@ fn place_words(d: &Diagnosis, l: &Location) -> String {
             let (from, to) = (significant(from, 3), significant(to, 3));
             let ends =
                 if from == to { format!("at {v} = {from}") } else { format!("{v} from {from} to {to}") };
+            let ends = if l.whole_range { format!("all along {ends}") } else { ends };
             format!(", {ends} {unit}").trim_end().to_owned()
         }
         _ => String::new(),

@@ -8,7 +8,7 @@ use super::flights::{Flights, HEADER, describe, filmed};
 use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
 use super::rig::RigMaker;
-use crate::physics::flight::{Effects, FlightWorld, Gust, Knock, Mast, Push};
+use crate::physics::flight::{Drawn, DrawnRun, Effects, FlightWorld, Gust, Knock, Mast, Push};
 
 /// Makes worlds of the domain `trajectory`.
 #[derive(Debug, Clone, Copy)]
@@ -42,8 +42,11 @@ impl Maker for Trajectory {
         } else if hidden.unlisted() {
             unlisted(effects, &mut key, &mut rng);
         }
-        let data = world.draw(seed ^ 0x5eed).csv(6);
-        Concealed::table(HEADER.into(), data, key)
+        let drawn = world.draw(seed ^ 0x5eed);
+        if world.effects.push.at_height {
+            key.place = key.place.map(|jet| in_runs_that_come_there(jet, &drawn));
+        }
+        Concealed::table(HEADER.into(), drawn.csv(6), key)
     }
 
     fn without_leftover(&self, hidden: Hidden, seed: u64) -> Option<Concealed> {
@@ -169,9 +172,35 @@ fn local(world: &mut FlightWorld, key: &mut Key, rng: &mut ChaCha8Rng) {
     key.place = Some(place);
 }
 
+/// A place along the height, in the runs that were seen there (none stands for all).
+fn in_runs_that_come_there(place: Place, drawn: &Drawn) -> Place {
+    let comes_there = |run: &&DrawnRun| {
+        let heights = run.channels.last();
+        heights.is_some_and(|heights| heights.iter().any(|z| *z > place.from && *z < place.to))
+    };
+    let there: Vec<String> = drawn.runs.iter().filter(comes_there).map(|run| run.label.clone()).collect();
+    if there.len() == drawn.runs.len() { place } else { place.in_runs(there) }
+}
+
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
     use super::*;
+
+    /// Balls that stay below a jet of air do not feel it.
+    #[test]
+    fn a_jet_is_in_the_runs_that_come_there() {
+        let mut named = 0;
+        for seed in 0..60 {
+            let concealed = Trajectory.conceal(Hidden::Local, seed);
+            let place = concealed.key.place.unwrap();
+            if place.variable == "z_m" {
+                assert!(place.runs.len() < 8, "{place:?}");
+                named += usize::from(!place.runs.is_empty());
+            }
+        }
+        assert!(named > 8, "{named}");
+    }
 
     /// A wind brings its drag along, whatever was drawn before it; beside a linear drag the key names both.
     #[test]

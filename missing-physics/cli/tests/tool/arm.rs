@@ -90,7 +90,8 @@ fn machine() -> String {
 }
 
 #[test]
-fn friction_is_named_in_each_joint_of_an_arm_that_rubs() {
+#[ignore = "long: .ci/run --long"]
+fn long_friction_is_named_in_each_joint_of_an_arm_that_rubs() {
     let answer = answer(&machine(), &rows());
     let names: Vec<String> = (1..=JOINTS).map(|j| format!("coulomb-friction@j{j}")).collect();
     let truth: Vec<(&str, f64)> = names.iter().map(String::as_str).zip(FRICTION).collect();

@@ -1,7 +1,6 @@
 //! Variables along which a cause may act in an interval, and bins along them.
 
 use crate::fit::optimum::Fit;
-use crate::fit::prediction::residuals;
 use crate::model::{LocalCauses, PredictError, Quantity};
 use crate::problem::Problem;
 
@@ -32,8 +31,9 @@ impl Along {
         Self { quantity, expected: values.clone(), values, error }
     }
 
-    /// Takes the baseline's residuals, `[run][channel][measured row]`, off what is a channel, row by row.
-    fn expect(&mut self, problem: &Problem<'_>, left: &[Vec<Vec<f64>>]) {
+    /// Takes the baseline's residuals, by run, channel after channel, in sigmas, off what is a channel: whatever has its readings to the bit
+    /// (see [`LocalCauses::state`]).
+    fn expect(&mut self, problem: &Problem<'_>, left: &[&[f64]], sigma: &[f64]) {
         let is_channel = |channel: &usize| {
             let mut runs = problem.rows.iter().zip(&problem.recording.runs).zip(&self.values);
             runs.all(|((rows, run), values)| {
@@ -44,14 +44,21 @@ impl Along {
         };
         let Some(channel) = (0..problem.channels()).find(is_channel) else { return };
         for ((rows, expected), left) in problem.rows.iter().zip(&mut self.expected).zip(left) {
-            rows.valid[channel].iter().zip(&left[channel]).for_each(|(&i, left)| expected[i] -= left);
+            let before: usize = rows.valid[..channel].iter().map(Vec::len).sum();
+            let of_channel = rows.valid[channel].iter().zip(&left[before..]);
+            of_channel.for_each(|(&i, left)| expected[i] -= left * sigma[channel]);
         }
     }
 }
 
 /// The variables along which an interval may lie: the inputs, in the order of the recording (the number of the row where there are none),
-/// and what the model follows beside them.
-pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, PredictError> {
+/// and what the model follows beside them. `left` is what the baseline leaves, by run, channel after channel, in sigmas.
+pub(crate) fn variables(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    left: &[&[f64]],
+    sigma: &[f64],
+) -> Result<Vec<Along>, PredictError> {
     let recording = &problem.recording;
     let causes = problem.model.extensions().local_causes;
     let errors = causes.map(LocalCauses::variable_errors).unwrap_or_default();
@@ -78,8 +85,7 @@ pub(crate) fn variables(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Along>, 
     };
     let followed = states.into_iter().zip(values).filter(|(_, values)| whole(values));
     all.extend(followed.map(|(quantity, values)| Along::new(quantity, values, 0.0)));
-    let left = residuals(problem, fit)?;
-    all.iter_mut().for_each(|along| along.expect(problem, &left));
+    all.iter_mut().for_each(|along| along.expect(problem, left, sigma));
     Ok(all)
 }
 

@@ -32,7 +32,7 @@ const COUNT_PART: f64 = 0.05;
 /// Kass and Raftery 1995, doi:10.1080/01621459.1995.10476572): unknowns and variables count in the order in which the model and the
 /// recording have them.
 const UNTOLD: f64 = 2.0;
-/// Nor what is worth less by this part of the best: neither a baseline nor a push that is even or bent is known that well.
+/// Nor what acts in one run and is worth less by this part of the best: neither a baseline nor a push that is even or bent is known that well.
 const UNTOLD_PART: f64 = 0.003;
 /// What is worth less than this part of the best, with edges that are far apart, cannot be the best with finer ones.
 const NEAR: f64 = 0.9;
@@ -98,8 +98,11 @@ impl Scene<'_> {
             judged.extend(finer.collect::<Result<Vec<_>, PredictError>>()?);
         }
         let most = judged.iter().map(|j| j.0).fold(f64::NEG_INFINITY, f64::max);
-        let told = UNTOLD.max(UNTOLD_PART * most);
-        let first = judged.into_iter().find(|j| j.0 >= most - told);
+        let untold = |found: &Found| {
+            let once = found.runs.iter().filter(|acts| **acts).count() == 1;
+            if once { UNTOLD.max(UNTOLD_PART * most) } else { UNTOLD }
+        };
+        let first = judged.into_iter().find(|j| j.0 >= most - untold(&j.3));
         first.map(|(_, unknown, along, found)| self.cause(unknown, along, found)).transpose()
     }
 

@@ -282,10 +282,10 @@ impl Scan<'_> {
         // Edges that may be anywhere are worth what they are on average, not what the best of them is.
         let likelihoods = judged.iter().map(|e| (0.5 * (e.worth - best.worth)).exp());
         let average = best.worth + 2.0 * (likelihoods.sum::<f64>() / judged.len() as f64).ln();
-        // What acts where it moves no reading may act there or not: the wider interval of those that are as likely.
         let from = middle(&judged, |e| e.interval.0, -EVEN);
         let to = middle(&judged, |e| e.interval.1, EVEN);
         let middle = likeliest(judged.iter().filter(|e| e.interval == (from, to))).unwrap_or(best);
+        let middle = widest(&judged, middle);
         let price = price(middle.form);
         let (interval, form, gain) = (middle.interval, middle.form, average.max(found.worth()) + price);
         Found { bins: self.bins.clone(), interval, form, gain, price, ..found }
@@ -297,6 +297,16 @@ struct Edges {
     interval: (usize, usize),
     form: Form,
     worth: f64,
+}
+
+/// What acts where it moves no reading, as a force does at the last row, may act there or not: the widest interval that is as likely as one.
+fn widest<'a>(judged: &'a [Edges], one: &'a Edges) -> &'a Edges {
+    let (from, to) = one.interval;
+    let same = |e: &&Edges| {
+        let holds = e.interval.0 <= from && e.interval.1 >= to && e.form == one.form;
+        holds && (e.worth - one.worth).abs() <= ROUNDING * one.worth.abs()
+    };
+    judged.iter().filter(same).max_by_key(|e| e.interval.1 - e.interval.0).unwrap_or(one)
 }
 
 fn likeliest<'a>(edges: impl Iterator<Item = &'a Edges>) -> Option<&'a Edges> {

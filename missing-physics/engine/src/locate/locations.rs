@@ -43,7 +43,9 @@ impl<'a> Ground<'a> {
             .collect::<Result<_, _>>()?;
         let sizes = (selection.nuisance.len(), selection.shared.len());
         let projection = Projection::new(&columns, sizes);
-        let (variables, unknowns) = (variables(problem, baseline)?, unknowns(problem));
+        let left: Vec<&[f64]> = columns.iter().filter_map(|run| run.last().map(Vec::as_slice)).collect();
+        let variables = variables(problem, baseline, &left, sigma)?;
+        let unknowns = unknowns(problem);
         Ok(Self { columns, sizes, variables, projection, unknowns })
     }
 
@@ -265,6 +267,7 @@ impl Places<'_> {
             variable_unit: within.along.quantity.unit.clone(),
             from,
             to,
+            whole_range: within.members.is_none() && within.interval == (0, within.bins.len()),
             runs: (0..runs.len()).filter(|&r| runs[r]).map(label).collect(),
             share: 0.0,
             mean_residual: mean,
@@ -310,7 +313,7 @@ impl Places<'_> {
     ) -> Vec<(f64, Location)> {
         let within = cause.within(along);
         let touched = |run: usize| (0..along.values[run].len()).any(|row| within.holds(run, row));
-        // A run that hardly comes there, or the worse for a cause there, does not show it.
+        // A run shows a cause where it comes to its place and its readings fit better with it.
         let shows = |run: usize| cause.runs[run] && touched(run) && cause.of_runs[run] > 0.0;
         let runs: Vec<bool> = (0..cause.runs.len()).map(shows).collect();
         // A size that may as well be nothing says nothing.
@@ -326,7 +329,7 @@ impl Places<'_> {
                 if let Some((along, [from, to])) = stretch {
                     place.variable = Some(along.quantity.name.clone());
                     place.variable_unit = along.quantity.unit.clone();
-                    (place.from, place.to) = (Some(from), Some(to));
+                    (place.from, place.to, place.whole_range) = (Some(from), Some(to), false);
                 }
                 (gain, Location { as_if: as_if.clone(), ..place })
             })
@@ -349,6 +352,7 @@ impl Places<'_> {
                 variable_unit: along.quantity.unit.clone(),
                 from: Some(at),
                 to: Some(at),
+                whole_range: false,
                 runs: vec![self.problem.recording.runs[event.run].label.clone()],
                 share: 0.0,
                 mean_residual: residual,

@@ -149,11 +149,11 @@ fn normals(
         let mut binned = vec![DMatrix::zeros(width, width); bins.len()];
         let mut others = DMatrix::zeros(width, width);
         let mut row = vec![0.0; width];
+        let known = columns.len() - 1;
         let mut k = 0;
         for c in 0..problem.channels() {
             for &i in &problem.rows[r].valid[c] {
                 let x = along.values[r][i];
-                let known = columns.len() - 1;
                 let u = bins.along(along.expected[r][i]);
                 for (a, column) in row.iter_mut().zip(&columns[..known]) {
                     *a = column[k];

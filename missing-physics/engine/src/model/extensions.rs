@@ -191,6 +191,9 @@ pub trait LocalCauses: Sync {
 
     /// Those of a run, `[state][row]`.
     ///
+    /// A state that is a measured channel (the angle of a joint with an encoder) is given as the channel's readings, unchanged to the last bit:
+    /// so it is recognised as one, and sizes go along what the baseline expects there rather than along readings that hold the misfit itself.
+    ///
     /// # Errors
     /// As [`Model::predict`](super::Model::predict).
     fn state(&self, _run: &Run, _shared: &[f64], _nuisance: &[f64]) -> Result<Vec<Vec<f64>>, PredictError> {

@@ -87,7 +87,17 @@ fn long_many_rows_of_coloured_noise() {
 /// The least rows that are accepted, and some more: one run of a free fall with two unknowns and an unknown noise.
 #[test]
 fn one_run_of_a_few_rows() {
-    for rows in [4, 5, 6, 8, 12] {
+    one_run_of([4, 6]);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_one_run_of_some_more_rows() {
+    one_run_of([5, 8, 12]);
+}
+
+fn one_run_of(numbers_of_rows: impl IntoIterator<Item = usize>) {
+    for rows in numbers_of_rows {
         println!("{rows} rows");
         holds(World { runs: 1, rows, ..World::NULL });
     }
@@ -131,6 +141,16 @@ impl Model for TwoSensors {
 /// digits.
 #[test]
 fn a_few_rows_of_a_sensor_that_all_mechanisms_act_on() {
+    all_mechanisms_act_on_rows_of_a_sensor([7]);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_some_more_rows_of_a_sensor_that_all_mechanisms_act_on() {
+    all_mechanisms_act_on_rows_of_a_sensor([8, 9, 12]);
+}
+
+fn all_mechanisms_act_on_rows_of_a_sensor(numbers_of_rows: impl IntoIterator<Item = usize>) {
     let digits = 1e-7_f64;
     let world = |seed: u64, rows: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -150,7 +170,7 @@ fn a_few_rows_of_a_sensor_that_all_mechanisms_act_on() {
             resolution: vec![digits, digits],
         }
     };
-    for rows in [7, 8, 9, 12] {
+    for rows in numbers_of_rows {
         println!("{rows} rows");
         holds_of(&TwoSensors::new(), |seed| world(seed, rows), WORLDS);
     }

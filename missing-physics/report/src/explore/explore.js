@@ -256,7 +256,7 @@
     values[kind] = element("output", { class: "num" });
     legend.append(element("span", {}, mark(kind), words, values[kind]));
   }
-  const shadeKey = element("span", {}, element("i", { style: "background:var(--shade);height:.8rem" }), "without these rows the simulation would hold");
+  const shadeKey = element("span", {}, element("i", { style: "background:var(--shade);height:.8rem" }), "rows to which the misfit is traced");
   const bandKey = element("span", {}, element("i", { style: "background:var(--band);height:.8rem" }), "twice the noise");
   legend.append(shadeKey, bandKey);
   const where = element("p", { class: "note where" });

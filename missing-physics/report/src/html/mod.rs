@@ -139,7 +139,7 @@ fn next(next: &NextExperiment) -> String {
 }
 
 /// What the colours of the curves mean.
-const CURVES_KEY: &str = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>simulated</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>without these rows the simulation would hold</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
+const CURVES_KEY: &str = "<p class=\"key note\"><span><i style=\"background:var(--data)\"></i>measured</span><span><i style=\"background:var(--before)\"></i>simulated</span><span><i style=\"background:var(--after)\"></i>with what was found</span><span><i style=\"background:var(--shade);height:.8rem\"></i>rows to which the misfit is traced</span><span><i style=\"background:var(--band);height:.8rem\"></i>twice the noise</span></p>";
 
 /// A section; nothing where it would be empty.
 fn section(page: &mut String, title: &str, body: &str) {

@@ -6,9 +6,6 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-#[path = "common/wrist.rs"]
-mod wrist;
-
 use std::f64::consts::PI;
 
 use hw_traits::ErrorKind;
@@ -23,7 +20,7 @@ use liquid_haptics::viscosity::{Bottle, Regime, Verdict, ViscosityFit};
 use liquid_haptics::volume::{ErrorCorrelation, ForceGain, Liquid, MassFit, VolumeFit, fit_mass};
 use liquid_haptics::wrench::{Departures, Grasp, world_from_body};
 
-use self::wrist::{poses, programme};
+use crate::common::wrist::{poses, programme};
 
 const GRASP: Grasp = Grasp {
     container_mass_kg: 0.08,
@@ -34,7 +31,7 @@ const GRASP: Grasp = Grasp {
 };
 
 fn load(mass: f64, density: f64, viscosity: f64) -> Load {
-    wrist::load(&GRASP, [mass, mass / density, viscosity], 600)
+    crate::common::wrist::load(&GRASP, [mass, mass / density, viscosity], 600)
 }
 
 #[test]

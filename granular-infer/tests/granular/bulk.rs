@@ -5,8 +5,7 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
+use crate::common;
 use std::f64::consts::PI;
 
 use granular_infer::dem::{

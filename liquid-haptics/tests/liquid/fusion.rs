@@ -5,9 +5,6 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-#[path = "common/wrist.rs"]
-mod wrist;
-
 use std::f64::consts::PI;
 
 use hw_traits::clock::Clock;
@@ -22,7 +19,7 @@ use liquid_haptics::fusion::{
 use liquid_haptics::volume::SettledPose;
 use liquid_haptics::wrench::Grasp;
 
-use self::wrist::{poses, programme};
+use crate::common::wrist::{poses, programme};
 
 const GRASP: Grasp = Grasp {
     container_mass_kg: 0.085,
@@ -83,7 +80,7 @@ fn turn(wrist: &mut FakeWrist, angle_rad: f64, rate_rad_s: f64) -> f64 {
 
 fn feel(fill: f64, density: f64, viscosity: f64, seed: u64) -> Felt {
     let volume = fill * bottle().capacity_m3();
-    let load = wrist::load(&GRASP, [density * volume, volume, viscosity], 500);
+    let load = crate::common::wrist::load(&GRASP, [density * volume, volume, viscosity], 500);
     let mut wrist = FakeWrist::new(load, AXIA80, seed).unwrap().with_surface(SURFACE);
     let poses = poses(&run(&mut wrist, &programme(4000)).unwrap());
     turn(&mut wrist, 0.5 * PI, 1.0);

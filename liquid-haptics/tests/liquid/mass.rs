@@ -5,13 +5,9 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-#[path = "common/poses.rs"]
-mod poses;
-
+use crate::common::poses::{GRASP, SIGMA_N, noisy, sweep, tilts};
 use liquid_haptics::volume::{ForceGain, MassFit, SettledPose, VolumeError, fit_mass};
 use liquid_haptics::wrench::Grasp;
-use poses::{GRASP, SIGMA_N, noisy, sweep, tilts};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -6,10 +6,6 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-#[path = "common/poses.rs"]
-mod poses;
-
 use std::f64::consts::PI;
 
 use liquid_haptics::volume::{
@@ -17,7 +13,9 @@ use liquid_haptics::volume::{
     fit_mass,
 };
 
-use poses::{CAVITY, GRASP, SIGMA_N, SIGMA_NM, bottle, exact, fit, holds, noisy, sweep, tilts};
+use crate::common::poses::{
+    CAVITY, GRASP, SIGMA_N, SIGMA_NM, bottle, exact, fit, holds, noisy, sweep, tilts,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

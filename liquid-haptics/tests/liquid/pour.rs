@@ -1,11 +1,9 @@
 //! Pouring against quadrature: what has left is what was wanted.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
-mod common;
-
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use common::Cavity;
+use crate::common::Cavity;
 use liquid_haptics::container::{Container, ContainerError, Cylinder, Fill};
 use liquid_haptics::pour::{Bead, Mouth, Pour, PourError};
 use nalgebra::UnitVector3;

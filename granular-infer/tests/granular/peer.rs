@@ -5,8 +5,7 @@
     reason = "a test stops where it fails, and says what it saw"
 )]
 
-mod common;
-
+use crate::common;
 use granular_infer::campaign::MODULUS_PA;
 use granular_infer::dem::{Funnel, Law, Pour, Rest};
 

@@ -1,8 +1,7 @@
 //! Grains against closed forms, conservation laws and refusals.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
-mod common;
-
+use crate::common;
 use approx::assert_relative_eq;
 use granular_infer::dem::{
     Coefficients, DemError, Law, Pour, Rest, Setup, Shape, Simulation, Wall, heap, stable_step_s,

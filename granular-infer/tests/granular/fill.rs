@@ -1,8 +1,7 @@
 //! The funnel's filling.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
-mod common;
-
+use crate::common;
 use approx::assert_relative_eq;
 use granular_infer::dem::{Funnel, Pour};
 

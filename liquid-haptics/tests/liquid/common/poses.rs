@@ -1,5 +1,5 @@
 //! Settled poses, simulated by quadrature.
-#![allow(dead_code, clippy::unwrap_used, reason = "not every test needs all; a test stops where it fails")]
+#![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
 use liquid_haptics::container::Cylinder;
 use liquid_haptics::volume::{ErrorCorrelation, Liquid, SettledPose, VolumeEstimate, VolumeFit};

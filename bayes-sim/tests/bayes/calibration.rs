@@ -106,7 +106,8 @@ fn an_exact_posterior_passes_and_wrong_ones_fail() {
 }
 
 #[test]
-fn a_local_test_tells_a_wrong_posterior_from_an_exact_one() {
+#[ignore = "long: .ci/run --long"]
+fn long_a_local_test_tells_a_wrong_posterior_from_an_exact_one() {
     let tests = tests(600, 2);
     let exact = local_c2st(&Conjugate::new(1.0, 0.0), &tests, &[0.5, -0.5], 19, 3).unwrap();
     let wrong = local_c2st(&Conjugate::new(1.0, 0.7), &tests, &[0.5, -0.5], 19, 3).unwrap();

@@ -1,5 +1,8 @@
 //! A tilted cylinder by brute force: it shares nothing with what is tested.
 
+pub(crate) mod poses;
+pub(crate) mod wrist;
+
 use std::f64::consts::PI;
 
 /// A cylindrical cavity of radius and length that begins `bottom` above the container's outer bottom (m).
@@ -11,7 +14,6 @@ pub(crate) struct Cavity {
 }
 
 impl Cavity {
-    #[allow(dead_code, reason = "pouring takes the container's")]
     pub(crate) fn capacity(&self) -> f64 {
         PI * self.radius * self.radius * self.length
     }
@@ -42,7 +44,6 @@ impl Cavity {
     }
 
     /// Centre of mass (across, along) of a volume at a tilt, by bisection for the level.
-    #[allow(dead_code, reason = "pouring needs no centre of mass")]
     pub(crate) fn center(&self, tilt: f64, volume: f64, columns: usize) -> [f64; 2] {
         let reach = self.radius + self.length + self.bottom;
         let (mut low, mut high) = (-reach, reach);

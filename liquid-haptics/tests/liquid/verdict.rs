@@ -1,18 +1,16 @@
 //! What poses leave open about a volume, and that it is said.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops where it fails")]
 
-mod common;
-#[path = "common/poses.rs"]
-mod poses;
-
 use std::f64::consts::PI;
 
+use crate::common::poses::{
+    CAVITY, GRASP, NONE, SIGMA_NM, bottle, exact, fit, holds, noisy, sweep, sweep_at, tilts,
+};
 use liquid_haptics::container::{Container, Cylinder};
 use liquid_haptics::volume::{
     Candidate, Cause, ForceGain, Liquid, MassFit, SettledPose, Verdict, VolumeError, VolumeFit, fit_mass,
 };
 use liquid_haptics::wrench::{Departures, Grasp};
-use poses::{CAVITY, GRASP, NONE, SIGMA_NM, bottle, exact, fit, holds, noisy, sweep, sweep_at, tilts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

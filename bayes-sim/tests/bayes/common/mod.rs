@@ -121,7 +121,7 @@ pub(crate) fn reference(task: &Task, i: usize, count: usize) -> std::io::Result<
     };
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("../bayes-sim")
-        .join(if beside { "tests/data" } else { "../../shared/sbibm" })
+        .join(if beside { "tests/bayes/data" } else { "../../shared/sbibm" })
         .join(format!("{kept_task}/num_observation_{i}"));
     let open = |name: &str| {
         let path = folder.join(name);

@@ -1,0 +1,7 @@
+//! All tests of the crate: one program, linked once.
+
+mod forces;
+mod grasp;
+mod motion;
+mod stiffness;
+mod vision;

@@ -1,0 +1,4 @@
+//! All tests of the crate: one program, linked once.
+
+mod forces;
+mod geometry;
