@@ -1,6 +1,8 @@
 //! Where a concealed cause acts: from which length on the band answers a dough less, which impacts went unheard, where a table is softer.
 #![allow(clippy::unwrap_used, reason = "a test stops where it fails")]
 
+use std::ops::Range;
+
 use missing_physics::data::Recording;
 use missing_physics::diagnosis::Diagnosis;
 use missing_physics::engine::{Options, diagnose};
@@ -86,9 +88,19 @@ fn impacts_that_went_unheard_are_found_one_by_one() {
 /// Places are heard to some millimetres, the stripe is two to four centimetres wide.
 #[test]
 fn a_softer_stripe_of_the_table_is_found_where_it_is() {
+    softer_stripes_are_found(0..1);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_softer_stripes_of_tables_are_found_where_they_are() {
+    softer_stripes_are_found(1..3);
+}
+
+fn softer_stripes_are_found(which: Range<usize>) {
     const WITHIN_M: f64 = 0.01;
     let stripe = |world: &Concealed| world.key.place.as_ref().is_some_and(|place| place.variable == "x_m");
-    for world in worlds_of("bounce", Hidden::Local).filter(stripe).take(3) {
+    for world in worlds_of("bounce", Hidden::Local).filter(stripe).take(which.end).skip(which.start) {
         let (_, answer) = diagnosed(&world);
         let (place, hidden) = (answer.location.first().unwrap(), world.key.place.as_ref().unwrap());
         assert_eq!(place.variable.as_deref(), Some("x_m"));
@@ -102,12 +114,22 @@ fn a_softer_stripe_of_the_table_is_found_where_it_is() {
 /// A hull's baseline can be scaled: beside an amount of what was measured it would leave nothing, of whatever was measured.
 #[test]
 fn a_bump_on_the_way_of_a_hull_is_found_where_it_is() {
+    bumps_on_the_way_of_hulls_are_found(0..1);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_bumps_on_the_way_of_hulls_are_found_where_they_are() {
+    bumps_on_the_way_of_hulls_are_found(1..3);
+}
+
+fn bumps_on_the_way_of_hulls_are_found(which: Range<usize>) {
     const PLAIN: f64 = 15.0;
     let of_a_hull = |world: &Concealed| {
         let bump = world.key.place.as_ref().is_some_and(|place| place.variable == "inclinometer_rad");
         bump && world.key.strength.is_some_and(|strength| strength > PLAIN)
     };
-    for world in worlds_of("motion", Hidden::Local).filter(of_a_hull).take(3) {
+    for world in worlds_of("motion", Hidden::Local).filter(of_a_hull).take(which.end).skip(which.start) {
         let (_, answer) = diagnosed(&world);
         let (place, hidden) = (answer.location.first().unwrap(), world.key.place.as_ref().unwrap());
         assert_eq!(place.variable.as_deref(), Some("inclinometer_rad"));
