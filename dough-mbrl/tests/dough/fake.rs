@@ -99,7 +99,17 @@ fn too_stiff_a_dough_is_said() {
 
 #[test]
 fn a_camera_sees_the_dough_as_it_is() {
-    for seed in 0..3 {
+    cameras_see_doughs_as_they_are(0..3);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_cameras_see_doughs_as_they_are() {
+    cameras_see_doughs_as_they_are(3..8);
+}
+
+fn cameras_see_doughs_as_they_are(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
         let mut rig = FakeRig::new(DoughKind::B, NONE, seed);
         let setup = Setup::of(rig.camera_in_world());
         let goal = Goal::cylinder(0.14, 4e-5).unwrap();
@@ -254,6 +264,18 @@ fn axial_flow_lengthens_and_leaves_stiffness() {
 
 #[test]
 fn longer_goals_take_more_rolls_and_the_same_seed_the_same_rolls() {
+    longer_goals_take_more_rolls([0.06, 0.1, 0.15]);
+}
+
+#[test]
+#[ignore = "long: .ci/run --long"]
+fn long_the_longest_goal_takes_most_rolls() {
+    longer_goals_take_more_rolls([0.06, 0.1, 0.2]);
+    longer_goals_take_more_rolls([0.06, 0.15, 0.2]);
+}
+
+/// Lengths in m, rising.
+fn longer_goals_take_more_rolls(lengths_m: [f64; 3]) {
     let run = |length_m: f64| {
         let mut rig = FakeRig::new(DoughKind::A, NONE, 7);
         let setup = Setup::of(rig.camera_in_world());
@@ -262,11 +284,11 @@ fn longer_goals_take_more_rolls_and_the_same_seed_the_same_rolls() {
         let done = setup.run(&mut rig, &mut Heuristic::default(), &goal, 4e-5, &mut rng).unwrap();
         (done, rig.now_s().unwrap())
     };
-    let runs = [0.06, 0.1, 0.15].map(run);
+    let runs = lengths_m.map(run);
     let rolls = [0, 1, 2].map(|k| runs[k].0.rolls.len());
     assert!(rolls.windows(2).all(|w| w[0] < w[1]), "{rolls:?}");
     assert_eq!(runs[1].0.end, End::Reached);
-    assert_eq!(runs[1], run(0.1));
+    assert_eq!(runs[1], run(lengths_m[1]));
 }
 
 proptest! {
