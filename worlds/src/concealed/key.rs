@@ -184,4 +184,10 @@ impl Place {
     pub fn in_runs(self, runs: impl IntoIterator<Item = String>) -> Self {
         Self { runs: runs.into_iter().collect(), ..self }
     }
+
+    /// The same place in those of a recording's runs (by their labels) that show it; in all where all do, or none does.
+    pub(crate) fn in_the_runs(self, shown: impl IntoIterator<Item = (String, bool)>) -> Self {
+        let (there, elsewhere): (Vec<_>, Vec<_>) = shown.into_iter().partition(|(_, shows)| *shows);
+        if elsewhere.is_empty() { self } else { self.in_runs(there.into_iter().map(|(run, _)| run)) }
+    }
 }

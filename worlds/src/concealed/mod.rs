@@ -58,7 +58,11 @@ mod tests {
     /// Every maker's worlds, drawn once.
     fn worlds() -> &'static [Drawn] {
         static WORLDS: OnceLock<Vec<Drawn>> = OnceLock::new();
-        WORLDS.get_or_init(|| by_maker(|m| (m.domain(), KINDS.map(|hidden| m.conceal(hidden, 11)))))
+        WORLDS.get_or_init(|| worlds_from(11))
+    }
+
+    fn worlds_from(seed: u64) -> Vec<Drawn> {
+        by_maker(|m| (m.domain(), KINDS.map(|hidden| m.conceal(hidden, seed))))
     }
 
     /// What is drawn of every maker, side by side.
@@ -84,11 +88,20 @@ mod tests {
         }
     }
 
-    /// Every row has a field a column, finite numbers in all but labels, times that rise within a run, and two runs at least.
+    /// What is asked of one seed and one kind, of another seed and of all kinds.
     #[test]
-    fn files_are_well_formed() {
+    #[ignore = "long: .ci/run --long"]
+    fn long_worlds_of_another_seed_are_well_formed_and_come_again() {
+        let drawn = worlds_from(12);
+        assert_well_formed(&drawn);
+        assert_keys(&drawn);
+        assert_eq!(drawn, worlds_from(12));
+    }
+
+    /// Every row has a field a column, finite numbers in all but labels, times that rise within a run, and two runs at least.
+    fn assert_well_formed(drawn: &[Drawn]) {
         const LABELS: [&str; 3] = ["run", "segment", "site"];
-        for (domain, worlds) in worlds() {
+        for (domain, worlds) in drawn {
             for world in worlds {
                 let header = file(world, "recording.toml");
                 assert!(header.starts_with("format = 1\n"), "{header}");
@@ -127,6 +140,11 @@ mod tests {
     }
 
     #[test]
+    fn files_are_well_formed() {
+        assert_well_formed(worlds());
+    }
+
+    #[test]
     fn the_first_runs_are_kept_whole() {
         for (domain, worlds) in worlds() {
             for world in worlds.iter().filter(|w| !file(w, "data.csv").is_empty()) {
@@ -157,8 +175,12 @@ mod tests {
 
     #[test]
     fn the_key_says_what_is_hidden() {
+        assert_keys(worlds());
+    }
+
+    fn assert_keys(drawn: &[Drawn]) {
         let kinds = makers().iter().map(|m| KINDS.map(|hidden| m.kind(hidden)));
-        for ((_, worlds), kinds) in worlds().iter().zip(kinds) {
+        for ((_, worlds), kinds) in drawn.iter().zip(kinds) {
             let keys = worlds.each_ref().map(|w| &w.key);
             // Wind brings its drag with it.
             let counts =

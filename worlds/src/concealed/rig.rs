@@ -6,7 +6,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::draw::{great_strength, log_between, sign, strength};
-use super::key::{Concealed, Hidden, Key};
+use super::key::{Concealed, Hidden, Key, Place};
 use super::maker::Maker;
 use super::nuisances::{Nuisances, Pairs, difference, size_of_strength};
 
@@ -64,6 +64,11 @@ pub(crate) trait Rig: Sized {
 
     /// Writes an unlisted effect into the key.
     fn describe_unlisted(&self, which: usize, key: &mut Key);
+
+    /// Where an unlisted effect shows that changes the readings like this, in sigmas: the place that was described, or that in some runs.
+    fn where_shown(&self, place: Place, _change: &[f64]) -> Place {
+        place
+    }
 
     /// The sign of an unlisted effect.
     fn unlisted_sign(rng: &mut ChaCha8Rng) -> f64 {
@@ -146,6 +151,7 @@ pub(crate) trait Rig: Sized {
             key.leftover = shows.then(|| strength_of(all));
             effects = all;
             self.describe_unlisted(which, key);
+            key.place = key.place.take().map(|place| self.where_shown(place, &change));
         }
         [effects, listed]
     }

@@ -172,14 +172,12 @@ fn local(world: &mut FlightWorld, key: &mut Key, rng: &mut ChaCha8Rng) {
     key.place = Some(place);
 }
 
-/// A place along the height, in the runs that were seen there (none stands for all).
+/// A place along the height, in the runs that were seen there.
 fn in_runs_that_come_there(place: Place, drawn: &Drawn) -> Place {
-    let comes_there = |run: &&DrawnRun| {
-        let heights = run.channels.last();
-        heights.is_some_and(|heights| heights.iter().any(|z| *z > place.from && *z < place.to))
-    };
-    let there: Vec<String> = drawn.runs.iter().filter(comes_there).map(|run| run.label.clone()).collect();
-    if there.len() == drawn.runs.len() { place } else { place.in_runs(there) }
+    let within = |z: &f64| *z > place.from && *z < place.to;
+    let comes_there = |run: &DrawnRun| run.channels.last().is_some_and(|heights| heights.iter().any(within));
+    let runs: Vec<_> = drawn.runs.iter().map(|run| (run.label.clone(), comes_there(run))).collect();
+    place.in_the_runs(runs)
 }
 
 #[cfg(test)]

@@ -25,6 +25,8 @@ const UNLISTED: usize = 4;
 const BEYOND: f64 = 0.03;
 /// The strength at which that is judged, in sigmas.
 const CLEAR: f64 = 30.0;
+/// A run shows what moves all of its readings by this many sigmas together.
+const SHOWS: f64 = 3.0;
 
 /// A machine with its sensors.
 pub(crate) struct Machine {
@@ -134,6 +136,21 @@ impl Rig for Machine {
         key.place = self.place(which);
     }
 
+    /// A bump is in the runs that it moves: a flank is felt where it is steep, and a machine may creep over the top.
+    fn where_shown(&self, place: Place, change: &[f64]) -> Place {
+        if !place.runs.is_empty() {
+            return place;
+        }
+        let mut rest = change;
+        let mut shows = |run: &Run| {
+            let own;
+            (own, rest) = rest.split_at(run.rows * self.noises.len());
+            own.iter().map(|c| c * c).sum::<f64>().sqrt() >= SHOWS
+        };
+        place
+            .in_the_runs(self.world.runs.iter().enumerate().map(|(r, run)| ((r + 1).to_string(), shows(run))))
+    }
+
     fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
         let header = self.header(rng);
         let input = plants::statement(&self.world.plant).input;
@@ -198,31 +215,13 @@ impl Machine {
                 let position = self.world.plant.joints().first().map_or(0, |joint| joint.position);
                 let outputs = self.world.plant.outputs();
                 let (name, _) = outputs.iter().find(|o| o.1 == position)?;
-                let place = Place::new(name, at - 2.0 * width, at + 2.0 * width);
-                Some(place.in_runs(self.runs_through(position, at, width)))
+                Some(Place::new(name, at - 2.0 * width, at + 2.0 * width))
             }
             What::Change => {
                 let later = (run..self.world.runs.len()).map(|run| (run + 1).to_string());
                 Some(Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(later))
             }
             What::Hum => None,
-        }
-    }
-
-    /// The runs in which a state comes so near to a bump's middle that it is half as high there as at most.
-    fn runs_through(&self, state: usize, middle: f64, width: f64) -> Vec<String> {
-        let near = width * (2.0 * f64::ln(2.0)).sqrt();
-        let comes_near = |run: &usize| {
-            let states = self.world.states(*run);
-            states.iter().any(|state_of_row| (state_of_row[state] - middle).abs() <= near)
-        };
-        let count = self.world.runs.len();
-        let through: Vec<usize> = (0..count).filter(comes_near).collect();
-        // None stands for all.
-        if through.len() == count {
-            Vec::new()
-        } else {
-            through.iter().map(|run| (run + 1).to_string()).collect()
         }
     }
 
