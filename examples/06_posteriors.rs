@@ -2,7 +2,7 @@
 //! posteriors, beside what its authors published for neural posterior estimation (NPE), and expected coverage.
 //!
 //! ```text
-//! cargo run --release -p examples --example 06_posteriors -- --small   1,000 simulations of two_moons, one observation: seconds
+//! cargo run --release -p examples --example 06_posteriors -- --small   300 simulations of two_moons, one observation: seconds
 //! cargo run --release -p examples --example 06_posteriors              1e3, 1e4 and 1e5, all tasks, ten observations: hours
 //! cargo run --release -p examples --example 06_posteriors -- slcp autoregressive 100000 --observations=3 --points=3000
 //! ```
@@ -25,7 +25,9 @@ use bayes_sim::mdrff::{Mdrff, MdrffSettings};
 use bayes_sim::posterior::ConditionalDensity;
 use common::{Task, simulators};
 
-/// Mean C2ST of NPE at 1e3, 1e4 and 1e5 simulations (shared/sbibm/c2st_wide.csv).
+/// Numbers of simulations.
+const COUNTS: [usize; 3] = [1_000, 10_000, 100_000];
+/// Mean C2ST of NPE at each of them (shared/sbibm/c2st_wide.csv).
 const PUBLISHED: [(&str, [f64; 3]); 10] = [
     ("gaussian_linear", [0.6945, 0.5522, 0.5060]),
     ("two_moons", [0.7251, 0.6064, 0.5417]),
@@ -54,6 +56,12 @@ fn train(
     })
 }
 
+/// The published score of a task at a number of simulations.
+fn published(task: &str, count: usize) -> Option<f64> {
+    let (_, scores) = PUBLISHED.iter().find(|(name, _)| *name == task)?;
+    COUNTS.iter().zip(scores).find(|(c, _)| **c == count).map(|(_, score)| *score)
+}
+
 /// The number behind an option, or a default.
 fn number(arguments: &[String], option: &str, default: usize) -> Result<usize, Box<dyn Error>> {
     let given = arguments.iter().find_map(|a| a.strip_prefix(option));
@@ -79,19 +87,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         simulators::lotka_volterra(),
     ];
     let densities = ["mdn", "mdrff", "autoregressive"];
-    let counts = [1_000, 10_000, 100_000];
     let any_task = tasks.iter().any(|t| named(t.name));
     let any_density = densities.iter().any(|d| named(d));
-    let any_count = counts.iter().any(|c| named(&c.to_string()));
+    let asked: Vec<usize> = COUNTS.into_iter().filter(|c| named(&c.to_string())).collect();
+    let counts = match asked.as_slice() {
+        [] if small => vec![300],
+        [] => COUNTS.to_vec(),
+        _ => asked,
+    };
     let tasks: Vec<&Task> = tasks
         .iter()
         .filter(|t| if any_task { named(t.name) } else { !small || t.name == "two_moons" })
         .collect();
-    let counts = || {
-        (0..)
-            .zip(counts)
-            .filter(|(_, c)| if any_count { named(&c.to_string()) } else { !small || *c == 1_000 })
-    };
     let observations = number(&arguments, "--observations=", if small { 1 } else { 10 })?.clamp(1, 10);
     let points = number(&arguments, "--points=", if small { 1_000 } else { 10_000 })?.clamp(50, 10_000);
     let seed = number(&arguments, "--seed=", 1)?;
@@ -104,9 +111,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         "task", "sims", "density", "C2ST", "NPE", "coverage", "train s"
     );
     for task in tasks {
-        let published = PUBLISHED.iter().find(|p| p.0 == task.name).map_or([f64::NAN; 3], |p| p.1);
-        for (i, count) in counts() {
-            let npe = published[i];
+        for &count in &counts {
+            let npe = published(task.name, count).map_or("-".to_owned(), |score| format!("{score:.3}"));
             for name in densities.iter().filter(|d| !any_density || named(d)) {
                 let start = Instant::now();
                 let density = train(name, task, count, seed as u64)?;
@@ -125,7 +131,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 };
                 let score = sum / observations as f64;
                 println!(
-                    "{:24} {count:>7} {name:15} {score:>7.3} {npe:>7.3} {coverage:>9} {seconds:>9.1}",
+                    "{:24} {count:>7} {name:15} {score:>7.3} {npe:>7} {coverage:>9} {seconds:>9.1}",
                     task.name
                 );
             }

@@ -65,6 +65,8 @@ struct Course<'a> {
     effects: &'a Effects,
     drive: Drive<'a>,
     joints: &'static [Joint],
+    /// The longest step.
+    longest_s: f64,
 }
 
 impl MachineWorld {
@@ -74,9 +76,7 @@ impl MachineWorld {
         let pace = 1.0 + effects.clock_rate;
         // The clock says (1 + rate) t.
         let row_s = self.row_s / pace;
-        let knots = (0..of_run.rows).map(|k| k as f64 * row_s).collect();
-        let drive = Drive::new(knots, &of_run.command, self.linear, &effects.input);
-        let course = Course { world: self, run, effects, drive, joints: self.plant.joints() };
+        let course = Course::new(self, run, effects, row_s);
         let outputs = self.plant.outputs();
         // When each output is read: (time, output, row), and when commands jump.
         let mut stops: Vec<(f64, Option<(usize, usize)>)> =
@@ -110,9 +110,7 @@ impl MachineWorld {
     pub fn states(&self, run: usize) -> Vec<[f64; 4]> {
         let of_run = &self.runs[run];
         let effects = Effects::default();
-        let knots = (0..of_run.rows).map(|k| k as f64 * self.row_s).collect();
-        let drive = Drive::new(knots, &of_run.command, self.linear, &effects.input);
-        let course = Course { world: self, run, effects: &effects, drive, joints: self.plant.joints() };
+        let course = Course::new(self, run, &effects, self.row_s);
         let mut x = course.begin();
         let mut t = -of_run.lead_s;
         let mut states = Vec::with_capacity(of_run.rows);
@@ -126,7 +124,18 @@ impl MachineWorld {
     }
 }
 
-impl Course<'_> {
+impl<'a> Course<'a> {
+    /// A run whose rows are `row_s` apart.
+    fn new(world: &'a MachineWorld, run: usize, effects: &'a Effects, row_s: f64) -> Self {
+        let of_run = &world.runs[run];
+        let knots = (0..of_run.rows).map(|k| k as f64 * row_s).collect();
+        let drive = Drive::new(knots, &of_run.command, world.linear, &effects.input);
+        let lags = effects.outputs.iter().map(|sensor| sensor.lag_s).chain([effects.input.lag_s]);
+        let shortest_s = lags.filter(|lag| *lag > 0.0).fold(f64::INFINITY, f64::min);
+        let longest_s = (world.row_s / STEPS).min(0.5 * shortest_s);
+        Self { world, run, effects, drive, joints: world.plant.joints(), longest_s }
+    }
+
     /// The state before the run: springs at rest, lags in their steady state.
     fn begin(&self) -> State {
         let mut x = [0.0; STATES];
@@ -140,10 +149,7 @@ impl Course<'_> {
 
     /// From one time to another, in even steps.
     fn lead(&self, x: &mut State, t: f64, until: f64) {
-        let lags = self.effects.outputs.iter().map(|sensor| sensor.lag_s).chain([self.effects.input.lag_s]);
-        let shortest_s = lags.filter(|lag| *lag > 0.0).fold(f64::INFINITY, f64::min);
-        let longest_s = (self.world.row_s / STEPS).min(0.5 * shortest_s);
-        let steps = ((until - t) / longest_s - 1e-6).ceil().max(1.0);
+        let steps = ((until - t) / self.longest_s - 1e-6).ceil().max(1.0);
         let h = (until - t) / steps;
         for k in 0..steps as usize {
             self.advance(x, t + k as f64 * h, h);
