@@ -129,9 +129,11 @@ fn long_bumps_on_the_way_of_hulls_are_found_where_they_are() {
 }
 
 fn bumps_on_the_way_of_hulls_are_found(seeds: &[u64]) {
+    const PLAIN: f64 = 15.0;
     for world in seeds.iter().map(|seed| world_of("motion", Hidden::Local, *seed)) {
         let hidden = world.key.place.as_ref().unwrap();
         assert_eq!(hidden.variable, "inclinometer_rad");
+        assert!(world.key.strength.unwrap() > PLAIN);
         let (_, answer) = diagnosed(&world);
         let place = answer.location.first().unwrap();
         assert_eq!(place.variable.as_deref(), Some("inclinometer_rad"));

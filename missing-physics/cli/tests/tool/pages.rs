@@ -38,6 +38,9 @@ fn shows_what_the_tool_prints(path: &str, shown: usize) {
         compared += 1;
     }
     assert_eq!(compared, shown, "{path}");
+    // `.ci/pages` leaves these pages to this test: no command is without its text.
+    let commands = page.lines().filter(|line| line.starts_with("cargo run --release -- ")).count();
+    assert_eq!(commands, shown, "{path}");
 }
 
 #[test]
