@@ -96,7 +96,7 @@ impl Course<'_> {
     }
 
     /// Where a set explains the data doubtfully: the main cause, if that lacks some of its members, since these take away too little of
-    /// what is left without them; or is that set, where the doubt is half as likely by chance.
+    /// what is left without them; or is that set, where it has derivatives.
     fn less_beside_a_leftover(
         &self,
         ranking: &Ranking,
@@ -112,11 +112,10 @@ impl Course<'_> {
         let modes = problem.model.extensions().modes;
         let smooth =
             chosen.selection.added().all(|slot| modes.is_none_or(|modes| modes.jumps(slot).is_empty()));
-        let doubted = smooth && best.p_value <= 0.5 * self.options.alpha;
         let cause = Judge::new(problem, rule, ranking.all(), rough, |c| self.alike(c)).main_cause();
         cause.filter(|cause| {
             let less = &cause.chosen.candidate;
-            less.set.len() < chosen.set.len() && nested(less, chosen) || doubted && less.set == chosen.set
+            less.set.len() < chosen.set.len() && nested(less, chosen) || smooth && less.set == chosen.set
         })
     }
 

@@ -25,8 +25,8 @@ const UNLISTED: usize = 4;
 const BEYOND: f64 = 0.03;
 /// The strength at which that is judged, in sigmas.
 const CLEAR: f64 = 30.0;
-/// A run shows what moves all of its readings by this many sigmas together.
-const SHOWS: f64 = 3.0;
+/// A run in which an effect acts has its readings moved by this many sigmas together.
+const MOVED: f64 = 3.0;
 
 /// A machine with its sensors.
 pub(crate) struct Machine {
@@ -142,13 +142,13 @@ impl Rig for Machine {
             return place;
         }
         let mut rest = change;
-        let mut shows = |run: &Run| {
-            let own;
-            (own, rest) = rest.split_at(run.rows * self.noises.len());
-            own.iter().map(|c| c * c).sum::<f64>().sqrt() >= SHOWS
+        let mut moved = |run: &Run| {
+            let of_run;
+            (of_run, rest) = rest.split_at(run.rows * self.noises.len());
+            of_run.iter().map(|c| c * c).sum::<f64>().sqrt() >= MOVED
         };
         place
-            .in_the_runs(self.world.runs.iter().enumerate().map(|(r, run)| ((r + 1).to_string(), shows(run))))
+            .in_the_runs(self.world.runs.iter().enumerate().map(|(r, run)| ((r + 1).to_string(), moved(run))))
     }
 
     fn files(self, effects: Effects, rng: &mut ChaCha8Rng) -> [String; 2] {
