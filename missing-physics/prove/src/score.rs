@@ -67,6 +67,8 @@ pub struct DomainScore {
     pub set_size: f64,
     /// A mechanism named that is not there, of all worlds with listed effects.
     pub wrong_of_all: Part,
+    /// Worlds of listed effects alone whose names are right, answered `partly`: a leftover is said that is not there.
+    pub leftover_alarms: Part,
     /// Unlisted effects answered `unexplained`, of those that were doubted.
     pub unexplained: Part,
     /// Worlds of a listed effect with a smaller unlisted one: answered by exactly the listed one.
@@ -216,6 +218,7 @@ impl DomainScore {
             }
         }
         if right {
+            self.leftover_alarms.add(o.verdict == "partly");
             self.add_right(w);
         }
     }
@@ -270,7 +273,8 @@ impl DomainScore {
             "detected": part(self.detected), "oracle_detected": part(self.oracle_detected),
             "right": part(self.right), "ambiguous": part(self.ambiguous), "wrong": part(self.wrong),
             "answer_set_holds": part(self.holds), "answer_set_size": number(self.set_size),
-            "wrong_of_all": part(self.wrong_of_all), "unlisted_unexplained": part(self.unexplained),
+            "wrong_of_all": part(self.wrong_of_all), "leftover_alarms": part(self.leftover_alarms),
+            "unlisted_unexplained": part(self.unexplained),
             "main_cause": part(self.main_cause), "main_cause_among": part(self.main_cause_among),
             "wrong_beside_leftover": part(self.wrong_beside), "leftover_said": part(self.leftover_said),
             "leftover_shown": part(self.leftover_shown),

@@ -6,7 +6,7 @@ use super::score::{DomainScore, Part, Score};
 pub(super) type Measure = (&'static str, &'static str, fn(&DomainScore) -> String);
 
 /// All measures, in the order of the table.
-pub(super) const MEASURES: [Measure; 22] = [
+pub(super) const MEASURES: [Measure; 23] = [
     ("false alarms at 5 %", "in the band", |s| banded(s.alarms_5, 0.05)),
     ("false alarms at 1 %", "in the band", |s| banded(s.alarms_1, 0.01)),
     ("listed effects detected", "", |s| part(s.detected)),
@@ -17,6 +17,7 @@ pub(super) const MEASURES: [Measure; 22] = [
     ("  answer set holds the truth", ">= 95 %", |s| part(s.holds)),
     ("  sets in an answer", "<= 2", |s| number(s.set_size, 2)),
     ("wrong name, of all listed", "<= 5 %", |s| part(s.wrong_of_all)),
+    ("named right: a leftover said", "<= 5 %", |s| part(s.leftover_alarms)),
     ("unlisted and doubted: unexplained", ">= 80 %", |s| part(s.unexplained)),
     ("a leftover beside: main cause named", ">= 90 %", |s| part(s.main_cause)),
     ("  in the answer, with rivals", "", |s| part(s.main_cause_among)),
