@@ -100,9 +100,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .filter(|t| if any_task { named(t.name) } else { !small || t.name == "two_moons" })
         .collect();
     let observations = number(&arguments, "--observations=", if small { 1 } else { 10 })?.clamp(1, 10);
-    let points = number(&arguments, "--points=", if small { 1_000 } else { 10_000 })?.clamp(50, 10_000);
+    let points = number(&arguments, "--points=", if small { 300 } else { 10_000 })?.clamp(50, 10_000);
     let seed = number(&arguments, "--seed=", 1)?;
-    let tests = number(&arguments, "--coverage=", if small { 500 } else { 1_000 })?;
+    let tests = number(&arguments, "--coverage=", if small { 100 } else { 1_000 })?;
     println!(
         "C2ST: 0.5 for a posterior that cannot be told from the reference. Coverage: mean of coverage less level."
     );

@@ -21,8 +21,8 @@ const DRAWS: usize = 2000;
 /// Section 3.5: sliding friction as the only unknown, from 0.1 to 1, learned from few pours and from more.
 pub(crate) fn print(bench: &Bench) -> Outcome<()> {
     let prior = Prior::uniform(&[[0.1, 1.0]])?;
-    let unseen = bench.either(5, UNSEEN);
-    let learned_from: &[usize] = if bench.small { &[60] } else { &[500, 1000] };
+    let unseen = bench.either(2, UNSEEN);
+    let learned_from: &[usize] = if bench.small { &[30] } else { &[500, 1000] };
     let most = learned_from.iter().copied().max().unwrap_or(0);
     let mut rng = ChaCha8Rng::seed_from_u64(35);
     let drawn: Vec<f64> = (0..most + unseen).map(|_| prior.sample(&mut rng)[0]).collect();

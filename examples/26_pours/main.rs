@@ -72,7 +72,7 @@ fn main() -> Outcome<()> {
     let small = examples::small();
     let mut scene = Scene::default();
     if small {
-        scene.rig = Rig { count: 150, ..scene.rig };
+        scene.rig = Rig { count: 80, ..scene.rig };
     }
     let bench = Bench { scene, view: View::default(), posterior: GrainPosterior::shipped()?, small };
     repeated::print(&bench)?;

@@ -7,7 +7,7 @@ use crate::{Bench, HEIGHT_M, Outcome};
 
 /// Section 3.5: what chance alone does to the statistics of equal pours, at a small and at a large sliding friction.
 pub(crate) fn print(bench: &Bench) -> Outcome<()> {
-    let pours = bench.either(4, 500);
+    let pours = bench.either(2, 500);
     println!(
         "Equal pours, {pours} of each: variance over the mean's square ([Matl 2021]: two orders of magnitude or more)"
     );
