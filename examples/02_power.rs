@@ -36,7 +36,7 @@ fn size(world: &FlightWorld, seed: u64) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let count = if examples::small() { 1 } else { 60 };
+    let (count, factors): (_, &[f64]) = if examples::small() { (1, &[1.5]) } else { (60, &[1.0, 1.5, 2.0]) };
     let base = FlightWorld::thrown(Measured::Position);
     type Grow = fn(f64) -> Effects;
     // Name, the oracle's size in standard errors, and the effect of a size.
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     ];
     println!("{:16} {:>28} {:>12}", "effect", "times the oracle's size", "detected");
     for (k, (name, oracle, grow)) in kinds.iter().enumerate() {
-        for (j, factor) in [1.0, 1.5, 2.0].into_iter().enumerate().take(if examples::small() { 1 } else { 3 }) {
+        for (j, factor) in factors.iter().enumerate() {
             // Each throw is another one: the effect is grown until this one misses by the wanted size.
             let world = |seed| {
                 let unit = size(&FlightWorld { effects: grow(1.0), ..base }, seed);

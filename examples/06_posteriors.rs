@@ -2,7 +2,7 @@
 //! posteriors, beside what its authors published for neural posterior estimation (NPE), and expected coverage.
 //!
 //! ```text
-//! cargo run --release -p examples --example 06_posteriors -- --small   300 simulations of two_moons, one observation: seconds
+//! cargo run --release -p examples --example 06_posteriors -- --small   100 simulations of two_moons, one observation: seconds
 //! cargo run --release -p examples --example 06_posteriors              1e3, 1e4 and 1e5, all tasks, ten observations: hours
 //! cargo run --release -p examples --example 06_posteriors -- slcp autoregressive 100000 --observations=3 --points=3000
 //! ```
@@ -91,7 +91,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let any_density = densities.iter().any(|d| named(d));
     let asked: Vec<usize> = COUNTS.into_iter().filter(|c| named(&c.to_string())).collect();
     let counts = match asked.as_slice() {
-        [] if small => vec![300],
+        [] if small => vec![100],
         [] => COUNTS.to_vec(),
         _ => asked,
     };

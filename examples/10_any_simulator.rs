@@ -1,5 +1,5 @@
 //! A simulator in another language beside a recording with hidden friction: Python's standard library, and MuJoCo where it
-//! is installed.
+//! is installed (`--small`: one of them).
 
 use std::path::Path;
 use std::process::Command;
@@ -39,11 +39,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         std::fs::copy(program, folder.path().join("pendulum.py"))?;
         ask(title, folder.path())
     };
+    if examples::small() {
+        println!("== --small: no other program is tried");
+        return Ok(());
+    }
     let [stated, forces] = ["recordings/swing", "docs/forces"].map(|f| root.join(f).join("recording.toml"));
     let title = "docs/forces/pendulum.py, which knows of no friction and lets forces act on its joint";
     beside(title, &forces, &root.join("docs/forces/pendulum.py"))?;
-    if examples::small() || !python("mujoco") {
-        println!("== MuJoCo: not installed, or --small: not tried");
+    if !python("mujoco") {
+        println!("== MuJoCo: not installed: not tried");
         return Ok(());
     }
     beside("docs/mujoco/pendulum.py, MuJoCo", &stated, &root.join("docs/mujoco/pendulum.py"))?;

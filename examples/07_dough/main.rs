@@ -59,7 +59,7 @@ fn main() -> Result<(), Failure> {
     let seed = 1000 * argument("--seed").map_or(Ok(0), |s| s.parse::<u64>())?;
     let size = if examples::small() {
         let goals = vec![2.0, 4.0];
-        Size { explored: 60, each: [30, 20], seed, most: 50, goals, six: 2, twenty: 2, ten: 1, fifteen: 1 }
+        Size { explored: 60, each: [30, 20], seed, most: 100, goals, six: 2, twenty: 2, ten: 1, fifteen: 1 }
     } else {
         let goals = vec![2.0, 4.0, 6.0, 8.0, 10.0];
         Size {

@@ -22,7 +22,7 @@ const DRAWS: usize = 2000;
 pub(crate) fn print(bench: &Bench) -> Outcome<()> {
     let prior = Prior::uniform(&[[0.1, 1.0]])?;
     let unseen = bench.either(2, UNSEEN);
-    let learned_from: &[usize] = if bench.small { &[30] } else { &[500, 1000] };
+    let learned_from: &[usize] = if bench.small { &[50] } else { &[500, 1000] };
     let most = learned_from.iter().copied().max().unwrap_or(0);
     let mut rng = ChaCha8Rng::seed_from_u64(35);
     let drawn: Vec<f64> = (0..most + unseen).map(|_| prior.sample(&mut rng)[0]).collect();
