@@ -45,7 +45,7 @@ fn main() -> Outcome<()> {
     sweeps_of_the_bottle(&calibration, levels, sweeps)?;
     carton(sweeps, correlation)?;
     water_bottle(sweeps, correlation)?;
-    viscosity::which_liquid(if small { 2 } else { 5 })?;
+    viscosity::which_liquid(if small { 1 } else { 5 })?;
     pours::of_known(if small { 1 } else { 5 })?;
     pours::of_felt(if small { 1 } else { 5 }, correlation)?;
     mishaps()
