@@ -143,7 +143,7 @@ impl Rig for Container {
             },
             1 => Effects { play_nm: size, ..beside },
             2 => Effects { flex: sign * size, ..beside },
-            4 => Effects { regrasped_m: sign * size, slip_run: self.slip_run, ..beside },
+            4 => Effects { regrasped_m: sign * size, slip_run: self.regrasped_run(), ..beside },
             _ => Effects { spilt_kg: size, slip_run: self.slip_run, slip_pose: self.slip_pose, ..beside },
         }
     }
@@ -158,7 +158,7 @@ impl Rig for Container {
             1 => ("hysteresis of the torque sensor", None),
             2 => ("a gripper that gives way with the torque squared", None),
             4 => {
-                let later = (self.slip_run..self.world.sweeps.len()).map(|run| (run + 1).to_string());
+                let later = (self.regrasped_run()..self.world.sweeps.len()).map(|run| (run + 1).to_string());
                 let place = Place::new("run", f64::NEG_INFINITY, f64::INFINITY).in_runs(later);
                 ("another grip from one run on", Some(place))
             }
@@ -272,6 +272,11 @@ impl Container {
         self.world.sweeps.iter().map(|s| s.tilts_rad.len() as f64).sum()
     }
 
+    /// The first run with another grip, before which there is one without: in all runs it would be an error of the grasp's height.
+    fn regrasped_run(&self) -> usize {
+        self.slip_run.max(1)
+    }
+
     /// Where the poses of a run from its slip on are.
     fn after_slip(&self) -> Place {
         let late = &self.world.sweeps[self.slip_run].tilts_rad[self.slip_pose..];
@@ -296,6 +301,17 @@ mod tests {
 
     use super::*;
     use crate::concealed::rig::tests::every_effect_shows;
+
+    #[test]
+    fn another_grip_comes_after_the_first_run() {
+        for seed in 0..20 {
+            let container = Container::drawn(&mut ChaCha8Rng::seed_from_u64(seed));
+            let moved = container.response(container.unlisted(Effects::default(), 4, 1.0, 0.01));
+            let first = 2 * container.world.sweeps[0].tilts_rad.len();
+            assert!(moved[..first].iter().all(|change| *change == 0.0), "{seed}");
+            assert!(moved[first..].iter().any(|change| *change != 0.0), "{seed}");
+        }
+    }
 
     #[test]
     fn every_effect_changes_the_readings_by_more_than_a_baseline_takes() {
