@@ -10,7 +10,7 @@ use crate::locate::bins::{Along, Bins};
 use crate::locate::intervals::{Best, Found, Scan};
 use crate::locate::membership::{Members, Rows};
 use crate::locate::projection::{Projection, dot};
-use crate::locate::responses::{Asked, Column, Responses};
+use crate::locate::responses::{Asked, Column, Form, Responses};
 use crate::locate::unknowns::{Unknown, are_events};
 use crate::model::PredictError;
 use crate::problem::Problem;
@@ -34,6 +34,9 @@ const COUNT_PART: f64 = 0.05;
 const UNTOLD: f64 = 2.0;
 /// Nor what acts in one run and is worth less by this part of the best: neither a baseline nor a push that is even or bent is known that well.
 const UNTOLD_PART: f64 = 0.003;
+/// Nor what is straight or bent within its interval and is worth less by this part of the best: what truly acts has a shape of its own, to
+/// which another variable that grows with the first may come nearer.
+const SHAPE_PART: f64 = 0.01;
 /// What is worth less than this part of the best, with edges that are far apart, cannot be the best with finer ones.
 const NEAR: f64 = 0.9;
 
@@ -97,12 +100,25 @@ impl Scene<'_> {
             });
             judged.extend(finer.collect::<Result<Vec<_>, PredictError>>()?);
         }
-        let most = judged.iter().map(|j| j.0).fold(f64::NEG_INFINITY, f64::max);
-        let untold = |found: &Found| {
-            let once = found.runs.iter().filter(|acts| **acts).count() == 1;
-            if once { UNTOLD.max(UNTOLD_PART * most) } else { UNTOLD }
+        let Some(&(most, of, _, ref best)) = judged.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return Ok(None);
         };
-        let first = judged.into_iter().find(|j| j.0 >= most - untold(&j.3));
+        let within = best.interval != (0, best.bins.len());
+        let shape = if within { best.form } else { Form::Even };
+        let untold = |unknown: usize, found: &Found| {
+            let once = found.runs.iter().filter(|acts| **acts).count() == 1;
+            let shaped = unknown == of && ![shape, found.form].contains(&Form::Even);
+            let part = if shaped {
+                SHAPE_PART
+            } else if once {
+                UNTOLD_PART
+            } else {
+                0.0
+            };
+            UNTOLD.max(part * most)
+        };
+        let first =
+            judged.into_iter().find(|(worth, unknown, _, found)| *worth >= most - untold(*unknown, found));
         first.map(|(_, unknown, along, found)| self.cause(unknown, along, found)).transpose()
     }
 

@@ -126,6 +126,7 @@ pub(crate) fn locate(
             of_readings.iter().map(of_channel).collect()
         }
     };
+    let found = if found.is_empty() { places.throughout(variables) } else { found };
     Ok(leading(found))
 }
 
@@ -277,6 +278,21 @@ impl Places<'_> {
             z: gain.max(0.0).sqrt(),
             as_if: None,
         }
+    }
+
+    /// All rows of the channel that the baseline misses most, where no interval says more.
+    fn throughout(&self, variables: &[Along]) -> Vec<(f64, Location)> {
+        let (problem, runs) = (self.problem, vec![false; self.problem.rows.len()]);
+        let whole = |channel: usize| {
+            let along = variables.first()?;
+            let bins = Bins::new(problem, channel..channel + 1, along)?;
+            let within = Within { along, bins: &bins, interval: (0, bins.len()), members: None };
+            let mut place = self.of_rows(channel, &within, &runs, 0.0);
+            place.z = place.rms / place.sigma;
+            Some((place.z * place.z, place))
+        };
+        let most = (0..problem.channels()).filter_map(whole).max_by(|a, b| a.0.total_cmp(&b.0));
+        most.into_iter().collect()
     }
 
     /// Where a cause acts in one of several runs, and there in neighbouring rows only: from when to when. What happens once has a time
