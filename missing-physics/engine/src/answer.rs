@@ -10,6 +10,7 @@ use crate::estimate::estimates::{estimates, of_mechanism};
 use crate::estimate::open_noise::with_open_noise;
 use crate::fit::optimum::Fit;
 use crate::fit::prediction::predictions;
+use crate::law::describe::number;
 use crate::model::{Mechanism, PredictError};
 use crate::noise::process::Shape;
 use crate::noise::rule::NoiseRule;
@@ -18,7 +19,7 @@ use crate::repaired::Repaired;
 use crate::runs::spread::spread;
 use crate::selection::candidate::Candidate;
 use crate::selection::held_out::HeldOut;
-use crate::selection::main_cause::{Judged, MainCause};
+use crate::selection::main_cause::{self, MainCause};
 use crate::selection::ranking::{Best, Ranking, probabilities};
 
 /// Sets that are listed.
@@ -117,7 +118,23 @@ impl Answer<'_> {
                 "few data: {rows} measured values for {unknowns} unknowns: an effect has to be large to show, and what does not show is not ruled out"
             ));
         }
+        remarks.extend(self.at_bounds());
         remarks
+    }
+
+    /// Which parameters of the simulation alone ended at a bound that somebody set: what they may be is narrower than what the data ask for.
+    fn at_bounds(&self) -> Option<String> {
+        let (table, fit) = (&self.problem.shared, &self.baseline.fit);
+        let of_baseline = self.baseline.selection.shared.iter().filter(|slot| fit.at_bound.contains(slot));
+        let said = of_baseline.filter(|slot| fit.shared[**slot] != 0.0).map(|&slot| {
+            let parameter = &self.problem.spec().parameters[table.index[slot]];
+            format!("{} = {} {}", parameter.name, number(fit.shared[slot]), parameter.unit)
+                .trim_end()
+                .to_owned()
+        });
+        let all: Vec<String> = said.collect();
+        (!all.is_empty())
+            .then(|| format!("at a bound, beyond which the data ask for more: {}", all.join(", ")))
     }
 
     /// The data beside the plain simulation.
@@ -230,7 +247,8 @@ impl Answer<'_> {
     }
 
     /// The closest explanation, with what its parameters would be.
-    pub(crate) fn closest(&self, judged: &Judged) -> Closest {
+    pub(crate) fn closest(&self, closest: &main_cause::Closest) -> Closest {
+        let judged = &closest.judged;
         let spec = self.problem.spec();
         let of = |&m: &usize| {
             let mechanism = &spec.mechanisms[m];
@@ -241,7 +259,8 @@ impl Answer<'_> {
         };
         Closest {
             ids: self.ids(&judged.candidate.set),
-            share: judged.share,
+            share: closest.share,
+            as_likely: closest.as_likely.iter().map(|set| self.ids(set)).collect(),
             parameters: judged.candidate.set.iter().flat_map(of).collect(),
         }
     }

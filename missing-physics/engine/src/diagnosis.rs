@@ -209,8 +209,11 @@ pub struct ChannelFit {
 pub struct Closest {
     /// Identifiers.
     pub ids: Vec<String>,
-    /// The part of the squared misfit beyond the noise that it takes away on unseen data.
-    pub share: f64,
+    /// The part of the squared misfit beyond the noise that it takes away on unseen data; none where that is lost in the noise, though the set
+    /// is clearly likelier than the baseline.
+    pub share: Option<f64>,
+    /// Other sets that are as likely, where no share is known.
+    pub as_likely: Vec<Vec<String>>,
     /// Its parameters, as they are if it is at work and what it leaves is smooth.
     pub parameters: Vec<Estimate>,
 }

@@ -109,7 +109,7 @@ fn as_if(a: &AsIf) -> Value {
 }
 
 fn closest(c: &Closest) -> Value {
-    value!({"ids": c.ids, "share": c.share, "parameters": estimates(&c.parameters)})
+    value!({"ids": c.ids, "share": c.share, "as_likely": c.as_likely, "parameters": estimates(&c.parameters)})
 }
 
 fn limit(l: &Limit) -> Value {

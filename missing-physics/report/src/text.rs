@@ -251,15 +251,25 @@ pub(super) fn leftover_sentence(d: &Diagnosis, l: &Location) -> String {
 /// What comes closest where nothing explains the data, and what its parameters would be.
 pub(super) fn closest(d: &Diagnosis) -> Vec<String> {
     let Some(closest) = &d.closest else { return Vec::new() };
-    let share = 100.0 * floored(closest.share.max(0.0));
     // What takes away nearly all is not named where a leftover may stand in for it, or for a member.
-    let why = match closest.ids.len() {
-        _ if closest.share < NEARLY_ALL => "too little to be named",
+    let why = |share: f64| match closest.ids.len() {
+        _ if share < NEARLY_ALL => "too little to be named",
         _ if d.law.as_ref().is_some_and(leaves_nothing) => "but the law does better",
         1 => "but something smooth would do as well",
         _ => "but something smooth in place of one of them would do as well",
     };
-    let words = format!("{} takes away {share:.0} % of the misfit, {why}", named(d, &closest.ids));
+    let sets: Vec<String> =
+        std::iter::once(&closest.ids).chain(&closest.as_likely).map(|ids| named(d, ids)).collect();
+    let words = match closest.share {
+        Some(share) => {
+            let percent = 100.0 * floored(share.max(0.0));
+            format!("{} takes away {percent:.0} % of the misfit, {}", sets.join(" or "), why(share))
+        }
+        None => format!(
+            "clearly likelier than the simulation alone: {}; how much of the misfit stays is lost in the noise",
+            sets.join(" or ")
+        ),
+    };
     let parameters = closest.parameters.iter().map(|e| format!("{}, if it is at work", estimate(e)));
     std::iter::once(words).chain(parameters).collect()
 }
@@ -371,7 +381,12 @@ fn what(d: &Diagnosis) -> Vec<(&'static str, String)> {
     };
     let line = |m: &MechanismReport| {
         let parameters: Vec<String> = m.parameters.iter().map(estimate).collect();
-        format!("{}: {}; probability {}", m.name, parameters.join(", "), probability(m.probability))
+        let said = format!("{}: {}", m.name, parameters.join(", "));
+        // What does as well beside a leftover is told apart by what is left, of which a probability says nothing.
+        if d.verdict == Verdict::Partly && !d.confused_with.is_empty() {
+            return said;
+        }
+        format!("{said}; probability {}", probability(m.probability))
     };
     let (named, others): (Vec<_>, Vec<_>) = d.mechanisms.iter().partition(|m| in_answer(m));
     let probable = |m: &&MechanismReport| m.probability > 0.05 && d.verdict != Verdict::Unexplained;
@@ -415,14 +430,19 @@ const SLOW: f64 = 5.0;
 fn slow_errors(d: &Diagnosis) -> Option<String> {
     let slow =
         |n: &&ChannelNoise| n.scatter.is_none() && n.correlated_share > 0.5 && n.correlation_rows > SLOW;
-    let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
     let of = |n: &ChannelNoise| {
-        let (size, over) =
-            (in_unit(n.sigma, 2, unit_of(d, &n.channel)), significant(n.correlation_length, 2));
-        format!("an error of {} of {size} that varies over {over} {along}", n.channel)
+        let size = in_unit(n.sigma, 2, unit_of(d, &n.channel));
+        format!("an error of {} of {size} that varies over {}", n.channel, over(d, n))
     };
     let all: Vec<String> = d.noise.iter().filter(slow).map(of).collect();
     (!all.is_empty()).then(|| listed(&all))
+}
+
+/// Over what a channel's noise is correlated: along the noise variable, or from row to row.
+fn over(d: &Diagnosis, n: &ChannelNoise) -> String {
+    let by_row = n.correlation_length == n.correlation_rows;
+    let unit = d.variables.first().filter(|_| !by_row).map_or("rows", |(_, unit)| unit.as_str());
+    format!("{} {unit}", significant(n.correlation_length, 2))
 }
 
 /// A channel's noise, in one sentence.
@@ -443,12 +463,11 @@ pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
             n.source.word()
         );
     }
-    let along = d.variables.first().map_or("rows", |(_, u)| u.as_str());
-    let over = significant(n.correlation_length, 2);
+    let over = over(d, n);
     let left = d.leftover.iter().find(|place| place.channel == n.channel);
     if let Some(place) = left.filter(|_| n.correlated_share > 0.0) {
         return format!(
-            "{}: {} (from {}); what is left beside it is taken for an error of {} that varies over {over} {along}",
+            "{}: {} (from {}); what is left beside it is taken for an error of {} that varies over {over}",
             n.channel,
             in_unit(place.sigma, 2, unit),
             n.source.word(),
@@ -458,7 +477,7 @@ pub(super) fn noise_sentence(d: &Diagnosis, n: &ChannelNoise) -> String {
     let colour = if n.correlated_share > 0.0 {
         let blind =
             if n.correlation_rows > SLOW { ": a slow misfit of that size would not be seen" } else { "" };
-        format!(", {:.0} % of its variance correlated over {over} {along}{blind}", 100.0 * n.correlated_share)
+        format!(", {:.0} % of its variance correlated over {over}{blind}", 100.0 * n.correlated_share)
     } else {
         ", white".into()
     };

@@ -85,7 +85,7 @@ pub(super) fn experiments(
         if !equations.states.iter().any(|s| s.rate.has(equations.input_name(input))) {
             continue;
         }
-        let [low, high] = range(recording.runs.iter().flat_map(|r| r.inputs[1 + input].iter().copied()));
+        let [low, high] = commanded(recording, input);
         let both_ways = high.min(-low) > BOTH_WAYS * (high - low);
         let rest = if both_ways { 0.0 } else { 0.5 * (low + high) };
         for (shape, longer) in COLUMNS {
@@ -113,6 +113,15 @@ pub(super) fn experiments(
         }
     }
     list
+}
+
+/// From where to where an input was commanded; of one that was the same throughout, between that and nothing.
+fn commanded(recording: &Recording, input: usize) -> [f64; 2] {
+    let all = || recording.runs.iter().flat_map(|r| r.inputs[1 + input].iter().copied());
+    match all().find(|v| v.is_finite()).filter(|first| *first != 0.0) {
+        Some(first) if all().all(|v| v == first) => [first.min(0.0), first.max(0.0)],
+        _ => range(all()),
+    }
 }
 
 /// A run with given times that begins as another did; its inputs stay as they were there in the first row.
@@ -143,7 +152,34 @@ fn stays_near(model: &MotionModel, recording: &Recording, run: &Run) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::Shape;
+    use missing_physics::data::{Recording, Run};
+
+    use super::{Shape, commanded};
+
+    /// An input that was the same throughout may be off, and no more than it was; another one as far as it went.
+    #[test]
+    fn an_input_that_never_changed_is_between_that_and_nothing() {
+        let inputs = |command: [f64; 3]| vec![vec![0.0, 1.0, 2.0], command.into()];
+        let run = |command| Run { label: "1".into(), inputs: inputs(command), outputs: Vec::new(), kind: 0 };
+        let asked = |command| {
+            let runs = vec![run(command)];
+            commanded(
+                &Recording {
+                    channels: Vec::new(),
+                    variables: Vec::new(),
+                    runs,
+                    noise_along: None,
+                    calibration: Vec::new(),
+                    resolution: Vec::new(),
+                },
+                0,
+            )
+        };
+        assert_eq!(asked([50.0; 3]), [0.0, 50.0]);
+        assert_eq!(asked([-2.0; 3]), [-2.0, 0.0]);
+        assert_eq!(asked([0.0; 3]), [-0.5, 0.5]);
+        assert_eq!(asked([1.0, 3.0, 2.0]), [1.0, 3.0]);
+    }
 
     /// A ramp's ends and middle, the order of steps, and that the fastest wave is as fast as it should be.
     #[test]

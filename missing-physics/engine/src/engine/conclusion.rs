@@ -29,7 +29,7 @@ impl Course<'_> {
             }
             None => {
                 self.tell("what the closest explanation leaves", 0.0)?;
-                let judge = Judge::new(problem, rule, all, rough, |c| self.alike(c));
+                let judge = Judge::new(problem, rule, all, rough, |c| self.alike(c)).against_noise();
                 let cause = judge.main_cause();
                 (judge, cause)
             }
@@ -132,8 +132,8 @@ impl Course<'_> {
 
     /// What is said of a main cause that was found by pieces of a single run, where whole fifths left out show less of it.
     pub(super) fn seen_near_by(answer: &Answer<'_>, judge: &Judge<'_>, cause: &MainCause) -> Option<String> {
-        let Judged { candidate, cut, .. } = &cause.chosen;
-        let far = judge.share(&candidate.set).filter(|_| *cut == Cut::Hundredths)?;
+        let Judged { candidate, look, .. } = &cause.chosen;
+        let far = judge.share(&candidate.set).filter(|_| look.cut == Cut::Hundredths)?;
         Some(format!(
             "{}: named by hundredths of the run, every fifth of them left out; of whole fifths left out, where what dies away lies in one of \
              them, {:.0} % of the misfit",

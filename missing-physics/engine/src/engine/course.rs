@@ -170,7 +170,7 @@ impl Course<'_> {
             (Some(cause), _, Some(law)) => {
                 let mut diagnosis = answer.skeleton(adequacy, Verdict::Unexplained, baseline, before)?;
                 diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
-                diagnosis.closest = Some(answer.closest(&cause.chosen));
+                diagnosis.closest = Some(answer.closest(&cause.chosen.clone().into()));
                 tell_law(&mut diagnosis, answer, law, baseline);
                 (diagnosis, Some(cause.chosen.least_squares))
             }
@@ -192,7 +192,7 @@ impl Course<'_> {
                 diagnosis.mechanisms = answer.mechanisms(ranking, best.as_ref())?;
                 let closest = near.as_ref().unwrap_or(&judge).closest();
                 diagnosis.closest = closest.as_ref().map(|closest| answer.closest(closest));
-                let misses = closest.map_or_else(|| self.least_squares.clone(), |c| c.least_squares);
+                let misses = closest.map_or_else(|| self.least_squares.clone(), |c| c.judged.least_squares);
                 self.unexplained(&mut diagnosis, answer, ranking, &misses.set, white)?;
                 (diagnosis, Some(misses))
             }

@@ -1,12 +1,14 @@
 //! Laws of an extended model: fitted, judged and put into words.
 
+use nalgebra::DVector;
+
 use crate::diagnosis::{Estimate, Law};
 use crate::estimate::estimates::estimates;
-use crate::fit::optimum::Fit;
+use crate::fit::optimum::{Fit, covariance};
 use crate::fit::prediction::predictions;
 use crate::law::extended::{Added, Extended};
-use crate::law::found::{Found, compared, improves};
-use crate::model::PredictError;
+use crate::law::found::{Found, LEAST_GAIN, compared, improves};
+use crate::model::{Parameter, PredictError};
 use crate::noise::rule::NoiseRule;
 use crate::problem::Problem;
 use crate::repaired::Repaired;
@@ -33,6 +35,9 @@ pub(crate) fn extended(
     if fitted.fit.at_bound.iter().any(|slot| *slot >= model.inner_shared) {
         return Ok(None);
     }
+    if !departs(&fitted, model.inner_shared) {
+        return Ok(None);
+    }
     let Ok(score) = held_out(&wide, &fitted) else { return Ok(None) };
     if !improves(seen, &score) {
         return Ok(None);
@@ -40,6 +45,14 @@ pub(crate) fn extended(
     let added: Vec<usize> =
         (0..wide.shared.index.len()).skip(model.inner_shared).map(|slot| wide.shared.index[slot]).collect();
     let coefficients = estimates(&wide, &fitted, &added, &[], rule, false);
+    // Of a coefficient that may have any value nothing is known.
+    let open = |(e, &p): (&Estimate, &usize)| {
+        let Parameter { lower, upper, .. } = wide.spec().parameters[p];
+        e.ci95[0] <= lower && upper <= e.ci95[1]
+    };
+    if coefficients.iter().zip(&added).any(open) {
+        return Ok(None);
+    }
     let (heldout_rmse, gain) = (compared(problem, seen, &score), score.log_score - seen.log_score);
     let law = Law {
         heldout_rmse,
@@ -58,6 +71,18 @@ pub(crate) fn extended(
     let predictions = predictions(&wide, &fitted.fit)?;
     let repaired = Repaired { law: Some(model.law(&problem.recording)), ..Repaired::of(&wide, &fitted) };
     Ok(Some(Found { law, predictions, held_out: score, fit: fitted.fit, repaired, of_terms: None }))
+}
+
+/// Whether what was added, off where its parameters are zero, is known to be there: all of them together, by Wald's statistic. Of what has its
+/// amplitudes in each run evidence alone says so.
+fn departs(fitted: &Candidate, first: usize) -> bool {
+    let (fit, selection) = (&fitted.fit, &fitted.selection);
+    let at: Vec<usize> = (0..selection.shared.len()).filter(|&i| selection.shared[i] >= first).collect();
+    let values = DVector::from_iterator(at.len(), at.iter().map(|&i| fit.shared[selection.shared[i]]));
+    let of_them = covariance(&fit.information).select_rows(&at).select_columns(&at);
+    // Errors without bounds are those of what is not known at all.
+    let statistic = of_them.cholesky().map(|factor| values.dot(&factor.solve(&values)));
+    statistic.is_some_and(|statistic| statistic > 2.0 * LEAST_GAIN)
 }
 
 /// An oscillation in words.
@@ -177,7 +202,7 @@ fn smooth(
 }
 
 /// A number with five digits, without an exponent where that reads well.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let rounded = format!("{value:.4e}");
     match rounded.parse::<f64>() {
         Ok(plain) if (1e-4..1e6).contains(&plain.abs()) => plain.to_string(),

@@ -4,7 +4,7 @@
 //! candidate terms, another power of a variable, a curved scale of a reading, an oscillation of one frequency, and a smooth curve over a variable.
 
 pub(crate) mod added;
-mod describe;
+pub(crate) mod describe;
 pub(crate) mod extended;
 pub(crate) mod found;
 mod prediction;

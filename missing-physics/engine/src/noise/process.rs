@@ -64,6 +64,12 @@ impl Shape {
         [1.0 + 2.0 * sum, 1.0 + 2.0 * squares]
     }
 
+    /// How many times larger than for white noise the variance is of the mean of so many evenly spaced rows.
+    pub(crate) fn of_mean(&self, rows: usize) -> f64 {
+        let lag = |k: usize| (1.0 - k as f64 / rows as f64) * self.at_lag(k as f64);
+        1.0 + 2.0 * (1..rows).map(lag).sum::<f64>()
+    }
+
     /// Log prior weight against white noise: colour has to show, and a faint slow part (which would swallow any faint
     /// slow effect) has to show most.
     pub fn log_prior(&self) -> f64 {

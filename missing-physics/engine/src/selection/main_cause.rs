@@ -9,6 +9,7 @@ use crate::adequacy::linearised::curves::Curves;
 use crate::diagnosis::NEARLY_ALL;
 use crate::fit::gauss_newton::{End, solve_until};
 use crate::fit::optimum::{Fit, covariance};
+use crate::fit::prediction::residuals_at;
 use crate::leftover::fit::{given, with_leftover};
 use crate::leftover::process::Process;
 use crate::model::PredictError;
@@ -17,7 +18,7 @@ use crate::noise::rule::{NoiseRule, NoiseState};
 use crate::problem::{Problem, Selection};
 use crate::selection::candidate::Candidate;
 use crate::selection::evidence::evidence;
-use crate::selection::share::{Cut, unseen_misfit};
+use crate::selection::share::{Cut, Look, misfit, unseen_misfit};
 
 /// Log Bayes factor by which each member of the set is needed, and by which the set leads its rivals.
 const NEEDED: f64 = 5.0;
@@ -30,6 +31,9 @@ pub(crate) const SMALLER: f64 = 3.0;
 const LEAST: f64 = 0.5;
 /// Noise alone moves a sum of squares by so many standard deviations at most.
 const CHANCE: f64 = 3.0;
+/// Blocks of rows whose means are looked at where the rows themselves show nothing, and the fewest such blocks of a channel.
+const BLOCKS: [usize; 3] = [4, 16, 64];
+const FEWEST_BLOCKS: usize = 16;
 /// A rival takes away at least this part of the misfit.
 const RIVAL_SHARE: f64 = 0.85;
 /// Log Bayes factor of a leftover against one that is larger by a factor e, with eight directions open to a smooth leftover.
@@ -52,8 +56,8 @@ pub(crate) struct Judged {
     process: Process,
     /// The part of the squared misfit that it takes away on unseen data.
     pub(crate) share: f64,
-    /// How a single run was cut for that.
-    pub(crate) cut: Cut,
+    /// How these were looked at.
+    pub(crate) look: Look,
     misfit: f64,
 }
 
@@ -61,6 +65,21 @@ pub(crate) struct Judged {
 pub(crate) struct MainCause {
     pub(crate) chosen: Judged,
     pub(crate) rivals: Vec<Judged>,
+}
+
+/// What comes closest where nothing explains the data.
+pub(crate) struct Closest {
+    pub(crate) judged: Judged,
+    /// The part of the squared misfit that it takes away on unseen data; none where that is lost in the noise.
+    pub(crate) share: Option<f64>,
+    /// Other sets that are as likely where no share is known.
+    pub(crate) as_likely: Vec<Vec<usize>>,
+}
+
+impl From<Judged> for Closest {
+    fn from(judged: Judged) -> Self {
+        Self { share: Some(judged.share), as_likely: Vec::new(), judged }
+    }
 }
 
 /// Candidates, judged by what they leave.
@@ -73,8 +92,7 @@ pub(crate) struct Judge<'a> {
     least_squares: Vec<Option<LeastSquares>>,
     /// By candidate, once it was asked for: with a leftover in the model.
     judged: Vec<OnceLock<Option<Judged>>>,
-    /// How a single run is cut.
-    cut: Cut,
+    look: Look,
     /// What the baseline leaves.
     base: f64,
 }
@@ -115,27 +133,55 @@ impl<'a> Judge<'a> {
         let judged = all.iter().map(|_| OnceLock::new()).collect();
         let rule = rule.beside_a_leftover();
         let rough = rough.clone();
-        Self { problem, rule, rough, all, least_squares, judged, cut: Cut::Fifths, base: 0.0 }.with_base()
+        let look = Look { cut: Cut::Fifths, block: 1 };
+        Self { problem, rule, rough, all, least_squares, judged, look, base: 0.0 }.with_base()
+    }
+
+    /// The same judge; where row by row the baseline's misfit is lost in the noise, one that looks at blocks of rows, the shortest in which it is
+    /// not, if there are any.
+    pub(crate) fn against_noise(self) -> Self {
+        let longest =
+            (0..self.problem.channels()).map(|c| self.problem.count(c)).min().unwrap_or(0) / FEWEST_BLOCKS;
+        let blocks = BLOCKS.into_iter().filter(|block| *block <= longest);
+        let mut looks = blocks.map(|block| Look { block, ..self.look });
+        if self.base > self.misfit_of_noise() {
+            return self;
+        }
+        looks
+            .find_map(|look| Some(self.looking(look)).filter(|judge| judge.base > judge.misfit_of_noise()))
+            .unwrap_or(self)
     }
 
     /// A judge by unseen data that lie close to those seen; of a single run only, since of several the others show what each one does.
     pub(crate) fn near(&self) -> Option<Self> {
         (self.problem.recording.runs.len() == 1).then_some(())?;
+        Some(self.looking(Look { cut: Cut::Hundredths, ..self.look }))
+    }
+
+    /// The same fits, judged by another look at the data.
+    fn looking(&self, look: Look) -> Self {
         let again = |known: &Option<LeastSquares>| {
             let LeastSquares { fit, seen, .. } = known.as_ref()?;
-            Some(LeastSquares { fit: fit.clone(), seen: *seen, unseen: OnceLock::new() })
+            let seen = if look.block == self.look.block { *seen } else { self.seen(fit, look.block)? };
+            Some(LeastSquares { fit: fit.clone(), seen, unseen: OnceLock::new() })
         };
         let judge = Self {
             problem: self.problem,
             rule: self.rule.clone(),
             rough: self.rough.clone(),
             all: self.all,
-            least_squares: self.least_squares.iter().map(again).collect(),
+            least_squares: self.least_squares.par_iter().map(again).collect(),
             judged: self.all.iter().map(|_| OnceLock::new()).collect(),
-            cut: Cut::Hundredths,
+            look,
             base: 0.0,
         };
-        Some(judge.with_base())
+        judge.with_base()
+    }
+
+    /// What a fit leaves of the data it is fitted to, in blocks of so many rows.
+    fn seen(&self, fit: &Fit, block: usize) -> Option<f64> {
+        let left = residuals_at(self.problem, &fit.shared, &fit.nuisance).ok()?;
+        Some(misfit(&left, &fit.noise, &self.rough, block).max(0.0))
     }
 
     fn with_base(mut self) -> Self {
@@ -167,7 +213,7 @@ impl<'a> Judge<'a> {
     fn unseen(&self, at: usize) -> Option<f64> {
         let LeastSquares { fit, unseen, .. } = self.least_squares[at].as_ref()?;
         let selection = &self.all[at].selection;
-        let misfit = || unseen_misfit(self.problem, selection, fit, &self.rough, self.cut).ok();
+        let misfit = || unseen_misfit(self.problem, selection, fit, &self.rough, self.look).ok();
         *unseen.get_or_init(misfit)
     }
 
@@ -219,7 +265,7 @@ impl<'a> Judge<'a> {
             let evidence = |j: &Judged| j.candidate.evidence;
             let most = judged.iter().map(evidence).fold(f64::NEG_INFINITY, f64::max);
             // Where the evidence beside a leftover does not decide, unseen data have a say.
-            let left = |j: &Judged| j.misfit + self.rough.whole_spread(self.problem);
+            let left = |j: &Judged| j.misfit + self.rough.whole_spread(self.problem, self.look.block);
             let worth = |j: &Judged| evidence(j) - OF_A_FACTOR * left(j).ln();
             let as_likely = judged.into_iter().filter(|j| evidence(j) > most - NEEDED);
             match as_likely.max_by(|a, b| worth(a).total_cmp(&worth(b))) {
@@ -272,29 +318,51 @@ impl<'a> Judge<'a> {
         self.judged(at).is_some_and(|judged| self.each_acts(&judged))
     }
 
-    /// The set that leaves least of unseen data, of those whose members each take away most of what is left without them; none where the baseline
-    /// predicts them within their noise.
-    pub(crate) fn closest(&self) -> Option<Judged> {
+    /// The set that leaves least of unseen data, of those that take away more than noise alone may and whose members each take away most of what is
+    /// left without them; where the baseline predicts unseen data within their noise, the likeliest set.
+    pub(crate) fn closest(&self) -> Option<Closest> {
         if self.base <= self.misfit_of_noise() {
-            return None;
+            return self.likeliest();
         }
         let mut order: Vec<(f64, usize)> = (0..self.all.len())
             .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
             .filter_map(|i| self.least_squares[i].as_ref().map(|least_squares| (least_squares.seen, i)))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let shown = self.base - self.rough.whole_spread(self.problem, self.look.block);
         let helps = |&(_, i): &(f64, usize)| {
-            let misfit = self.unseen(i).filter(|misfit| *misfit < self.base)?;
+            let misfit = self.unseen(i).filter(|misfit| *misfit < shown)?;
             self.each_helps(i).then_some((misfit, i))
         };
         let mut close: Vec<(f64, usize)> = order.iter().filter_map(helps).take(CLOSE).collect();
         close.sort_by(|a, b| a.0.total_cmp(&b.0));
-        close.into_iter().find_map(|(_, i)| self.judged(i))
+        let known = |judged: &Judged| self.each_sign_known(judged);
+        close.into_iter().find_map(|(_, i)| self.judged(i).filter(known)).map(Closest::from)
+    }
+
+    /// The likeliest set without a leftover, the smallest of those that are as likely, where it is clearly likelier than the baseline. What part of
+    /// the misfit it takes away is not known.
+    fn likeliest(&self) -> Option<Closest> {
+        let least = self.all[self.at(&[])?].evidence + NEEDED;
+        let mut likely: Vec<usize> = (0..self.all.len())
+            .filter(|&i| !self.all[i].set.is_empty() && self.all[i].ruled_out.is_none())
+            .filter(|&i| self.least_squares[i].is_some() && self.all[i].evidence >= least)
+            .collect();
+        likely.sort_by(|&a, &b| self.all[b].evidence.total_cmp(&self.all[a].evidence));
+        let as_likely = self.all[*likely.first()?].evidence - NEEDED;
+        likely.retain(|&i| self.all[i].evidence >= as_likely);
+        let members = likely.iter().map(|&i| self.all[i].set.len()).min()?;
+        likely.retain(|&i| self.all[i].set.len() == members);
+        let known = |judged: &Judged| self.each_sign_known(judged);
+        let mut judged = likely.into_iter().filter_map(|i| self.judged(i).filter(known));
+        let first = judged.next()?;
+        let others = judged.map(|judged| judged.candidate.set).take(MOST_RIVALS).collect();
+        Some(Closest { judged: first, share: None, as_likely: others })
     }
 
     /// The misfit that noise alone may leave.
     fn misfit_of_noise(&self) -> f64 {
-        CHANCE * self.rough.whole_spread(self.problem)
+        CHANCE * self.rough.whole_spread(self.problem, self.look.block)
     }
 
     /// Whether a set leaves nothing but noise of unseen data; or takes away most of the baseline's misfit there, and predicts them no worse than it
@@ -336,8 +404,8 @@ impl<'a> Judge<'a> {
             Candidate { fit, alternative_modes: Vec::new(), evidence: worth, ruled_out, ..of.clone() };
         let least_squares =
             Candidate { fit: least_squares.clone(), alternative_modes: Vec::new(), ..of.clone() };
-        let (share, cut) = (1.0 - misfit / self.base, self.cut);
-        sound.then_some(Judged { candidate, least_squares, process, share, cut, misfit })
+        let (share, look) = (1.0 - misfit / self.base, self.look);
+        sound.then_some(Judged { candidate, least_squares, process, share, look, misfit })
     }
 
     /// The least-squares fit with errors that allow for a leftover: those beside the leftover that the residual shows, or, along the parameters' own
@@ -451,14 +519,15 @@ impl<'a> Judge<'a> {
                     || j.misfit < RIVAL_MISFIT * chosen.misfit
             })
             .collect();
-        // One that only adds to another is no further answer.
+        // One that only adds to another, or to the chosen one, is no further answer.
+        let at_work = |judged: &Judged| self.problem.at_work(&judged.candidate.set);
         let adds = |judged: &Judged| {
-            let set = &judged.candidate.set;
+            let set = at_work(judged);
             let part = |other: &Judged| {
-                let less = &other.candidate.set;
+                let less = at_work(other);
                 less.len() < set.len() && less.iter().all(|m| set.contains(m))
             };
-            rivals.iter().any(part) && !self.each_acts(judged)
+            std::iter::once(chosen).chain(&rivals).any(part) && !self.each_acts(judged)
         };
         let mut rivals: Vec<Judged> = rivals.iter().filter(|judged| !adds(judged)).cloned().collect();
         rivals.sort_by(|a, b| b.candidate.evidence.total_cmp(&a.candidate.evidence));

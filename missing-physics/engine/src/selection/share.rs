@@ -8,6 +8,7 @@ use crate::fit::optimum::Fit;
 use crate::fit::prediction::residuals_at;
 use crate::model::PredictError;
 use crate::noise::rough::RoughNoise;
+use crate::noise::rule::NoiseState;
 use crate::problem::{Problem, Selection};
 
 /// Groups in which runs, or the rows of a single run, are left out.
@@ -35,7 +36,32 @@ impl Cut {
     }
 }
 
-/// Sum of squares, in units of the noise beside which slow effects are seen, by which unseen data miss a fit beyond the noise.
+/// How unseen data are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Look {
+    pub(crate) cut: Cut,
+    /// The mean of so many neighbouring rows is one reading: what is slow stands out against less noise.
+    pub(crate) block: usize,
+}
+
+/// Sum of squares, in units of the noise beside which slow effects are seen, by which a fit misses readings beyond the noise, `[run][channel][row]`.
+pub(crate) fn misfit(
+    residual: &[Vec<Vec<f64>>],
+    white: &NoiseState,
+    rough: &RoughNoise,
+    block: usize,
+) -> f64 {
+    let of_column = |(channel, column): (usize, &Vec<f64>)| {
+        let of_block = |rows: &[f64]| {
+            let sum = rows.iter().sum::<f64>() / white.sigma[channel];
+            sum * sum / rows.len() as f64 - rough.block(channel, rows.len())
+        };
+        column.chunks(block).map(of_block).sum::<f64>()
+    };
+    residual.iter().flat_map(|run| run.iter().enumerate()).map(of_column).sum()
+}
+
+/// The [`misfit`] of unseen data.
 ///
 /// Each run (or each of five groups of runs) is left out in turn, its nuisance parameters then fitted to it; of a single run, every fifth
 /// of its pieces, its nuisance parameters then fitted to all of it where the rest of the rows does not tell them. Fits are plain least squares: a slow misfit is not taken for noise.
@@ -44,16 +70,10 @@ pub(crate) fn unseen_misfit(
     selection: &Selection,
     fit: &Fit,
     rough: &RoughNoise,
-    cut: Cut,
+    Look { cut, block }: Look,
 ) -> Result<f64, PredictError> {
     let white = &fit.noise;
-    let miss = |residual: Vec<Vec<Vec<f64>>>| -> f64 {
-        let of_column = |(channel, column): (usize, &Vec<f64>)| {
-            let squares: f64 = column.iter().map(|v| (v / white.sigma[channel]).powi(2)).sum();
-            squares - rough.rows(channel, column.len())
-        };
-        residual.iter().flat_map(|run| run.iter().enumerate()).map(of_column).sum()
-    };
+    let miss = |residual: &[Vec<Vec<f64>>]| misfit(residual, white, rough, block);
     let runs = problem.recording.runs.len();
     let known = selection.without_shared();
     let folds = if runs > 1 { runs.min(FOLDS) } else { FOLDS };
@@ -65,7 +85,7 @@ pub(crate) fn unseen_misfit(
         let (shared, _) = chords.solve((&seen, &train), selection, (fit.shared.clone(), nuisance(&train)))?;
         let unseen = problem.of_runs(&test);
         let (shared, nuisance) = chords.solve((&unseen, &test), &known, (shared, nuisance(&test)))?;
-        Ok(miss(residuals_at(&unseen, &shared, &nuisance)?))
+        Ok(miss(&residuals_at(&unseen, &shared, &nuisance)?))
     };
     let of_rows = |fold: usize| -> Result<f64, PredictError> {
         let rows = problem.recording.runs[0].len();
@@ -88,7 +108,7 @@ pub(crate) fn unseen_misfit(
             let start = (&trained.shared[..], &trained.nuisance[..]);
             solve_until(End::again(problem), problem, &known, white, start)?.nuisance
         };
-        Ok(miss(residuals_at(&without(false), &trained.shared, &nuisance)?))
+        Ok(miss(&residuals_at(&without(false), &trained.shared, &nuisance)?))
     };
     let chords = (runs > 1).then(|| Chords::new(problem, selection, white, fit)).transpose()?;
     let of_fold = |fold: usize| chords.as_ref().map_or_else(|| of_rows(fold), |chords| of_runs(chords, fold));
