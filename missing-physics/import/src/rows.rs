@@ -259,7 +259,10 @@ impl Rows {
         let counter = ["bounce", "step"].iter().find_map(|name| self.numbers(name)).map(<[f64]>::to_vec);
         let along = ["trajectory", "slosh", "custom", "motion"].contains(&domain);
         let mut runs = Vec::new();
-        for (label, rows) in groups {
+        for (label, mut rows) in groups {
+            if let Some(times) = &times {
+                self.remarks.extend(without_odd_times(times, &mut rows));
+            }
             let pause = cut.gap_s.or_else(|| {
                 let usual = times.as_deref().map(|t| usual_step(t, &rows));
                 usual.filter(|step| unnamed && along && *step > 0.0).map(|step| PAUSE * step)
@@ -419,6 +422,27 @@ impl Rows {
         }
         text
     }
+}
+
+/// Takes away rows whose time stands apart from those of both neighbours, which are close to each other: one that was mistyped would begin a run of its
+/// own, or take what follows it along.
+fn without_odd_times(times: &[f64], rows: &mut Vec<usize>) -> Option<String> {
+    /// Neighbours are close within so many usual steps, and what is further away from either is apart.
+    const CLOSE: f64 = 3.0;
+    let far = CLOSE * usual_step(times, rows);
+    let odd = |w: &[usize]| {
+        let [before, at, after] = [w[0], w[1], w[2]].map(|row| times[row]);
+        let close = before < after && after - before <= far;
+        (close && (at - after > far || before - at > far)).then(|| (w[1], [before, at, after]))
+    };
+    let found: Vec<(usize, [f64; 3])> = rows.windows(3).filter_map(odd).collect();
+    rows.retain(|row| found.iter().all(|(odd, _)| odd != row));
+    let said = |(_, [before, at, after]): &(usize, [f64; 3])| {
+        format!("{} between {} and {}", written(*at), written(*before), written(*after))
+    };
+    let all: Vec<String> = found.iter().map(said).collect();
+    (!all.is_empty())
+        .then(|| format!("rows whose time is not one of its place are left out, t_s = {}", brief(&all)))
 }
 
 /// The usual time from row to row.

@@ -197,3 +197,25 @@ fn files_in_memory_are_imported_like_files_on_disk() {
     let nothing = read_bytes(Path::new("a.csv"), b"t,z\n");
     assert!(matches!(nothing, Err(ImportError::Broken { .. })), "{nothing:?}");
 }
+
+/// Runs in columns of one sheet, in one of which a time was typed wrong: the row is left out and said, and what follows it stays in its run.
+#[test]
+fn a_time_that_was_typed_wrong_does_not_tear_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drops.csv");
+    let mut text = String::from("run,t_s,z_m\n");
+    for run in ["a", "b"] {
+        for row in 0..12 {
+            let t = f64::from(row) / 30.0;
+            let written = if (run, row) == ("b", 8) { 1.089 } else { t };
+            text.push_str(&format!("{run},{written:.4},{:.4}\n", 1.0 - 4.9 * t * t));
+        }
+    }
+    std::fs::write(&path, text).unwrap();
+    let asked = Request { files: vec![path], ..Request::default() };
+    let imported = import(&Request { domain: "trajectory".into(), ..asked }).unwrap();
+    let rows = rows(&imported, &["t_s", "z_m"]);
+    let of = |label: &str| rows.iter().filter(|(l, _)| l == label).count();
+    assert_eq!((of("a"), of("b"), rows.len()), (12, 11, 23), "{}", imported.text);
+    assert!(imported.text.contains("1.089 between 0.2333 and 0.3"), "{}", imported.text);
+}

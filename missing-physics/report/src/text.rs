@@ -219,12 +219,12 @@ pub(super) fn where_sentence(d: &Diagnosis, l: &Location) -> String {
     let mean = if is_rounding { 0.0 } else { l.mean_residual };
     let unit = unit_of(d, &l.channel);
     format!(
-        "{}: measured less simulated is {} on average, at most {} ({:.0} sigma, {:.0} % of the misfit)",
+        "{}: measured less simulated is {} on average, at most {} ({:.0} % of the misfit, {:.0} sigma in all)",
         place_words(d, l),
         in_unit(mean, 2, unit),
         in_unit(l.largest_residual, 2, unit),
-        l.z,
         100.0 * l.share,
+        l.z,
     )
 }
 
