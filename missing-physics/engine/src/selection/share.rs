@@ -52,9 +52,12 @@ pub(crate) fn misfit(
     block: usize,
 ) -> f64 {
     let of_column = |(channel, column): (usize, &Vec<f64>)| {
+        // The same for all blocks but the last one, which may be shorter.
+        let of_noise = rough.block(channel, block);
         let of_block = |rows: &[f64]| {
             let sum = rows.iter().sum::<f64>() / white.sigma[channel];
-            sum * sum / rows.len() as f64 - rough.block(channel, rows.len())
+            let noise = if rows.len() == block { of_noise } else { rough.block(channel, rows.len()) };
+            sum * sum / rows.len() as f64 - noise
         };
         column.chunks(block).map(of_block).sum::<f64>()
     };
